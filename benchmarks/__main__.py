@@ -13,10 +13,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     What the benchmarks need is imported only here: numpy after its number of cores is set.
 
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        The arguments; by default those of the process.
+    `argv`: the arguments; by default those of the process.
     """
 
     def parse() -> argparse.Namespace:

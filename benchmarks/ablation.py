@@ -176,14 +176,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
 def run_without(part: str, trajectory: str, noise: str) -> dict[str, float | None]:
     """Return the figures of a trial without a part of Method III.
 
-    Parameters
-    ----------
-    part : str
-        In `PARAMETERS` or `PUT_TOGETHER`.
-    trajectory : str
-        See `method_trials.GROUPS`.
-    noise : str
-        Standard deviation of the force sensors.
+    `part`: in `PARAMETERS` or `PUT_TOGETHER`; `trajectory`: see `method_trials.GROUPS`; `noise`: standard
+    deviation of the force sensors.
     """
     settings = [Setting("control.method", "hybrid"), Setting("sensors.force_noise", noise)]
     settings += [Setting(f"control.{name}", value) for name, value in PARAMETERS.get(part, {}).items()]

@@ -101,11 +101,7 @@ def gathered_cells(side: int) -> list[int]:
 def measured(side: int, repeats: int) -> Size:
     """Build a bed and run the session on it; the median of the repeats counts.
 
-    Parameters
-    ----------
-    side : int
-        Pins along each side.
-    repeats : int
+    `side`: pins along each side.
     """
     built, spent, cells, means = [], [], [], []
     known = scene(side)

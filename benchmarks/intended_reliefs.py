@@ -34,15 +34,7 @@ VEINS = (((0.0, -30.0), (24.0, -5.0)), ((0.0, -5.0), (24.0, 20.0)), ((0.0, 20.0)
 
 
 def find_relief(name: str, x: Floats, y: Floats) -> Floats:
-    """Return the intended heights above rest at some places, m.
-
-    Parameters
-    ----------
-    name : str
-        One of `RELIEFS`.
-    x, y : ndarray
-        m.
-    """
+    """Return the intended heights above rest at some places, m. `name`: one of `RELIEFS`; `x`, `y`, m."""
     return 1e-3 * RELIEFS[name](1e3 * x, 1e3 * y)
 
 

@@ -34,16 +34,7 @@ LETTERS, INSET, INK = 20, (16, 12), (26, 31, 38)
 def draw_made(made: Made, out: Path) -> Path:
     """Draw a thing as it was formed and as it was intended, and return the picture's path.
 
-    Parameters
-    ----------
-    made : Made
-    out : Path
-        The JPEG.
-
-    Raises
-    ------
-    OutputError
-        When it cannot be written, or Pillow is missing.
+    `out`: the JPEG. Raises OutputError when it cannot be written, or Pillow is missing.
     """
     words = (
         f"{made.title}: formed on the bed {made.bed}, correlation {made.correlation:.3f}",
@@ -61,15 +52,8 @@ def draw_made(made: Made, out: Path) -> Path:
 def draw_relief(scene: Scene, relief: NDArray[Any], lowest: float, out: Path) -> Path:
     """Draw the skin over a bed's pins, without fingertip.
 
-    Parameters
-    ----------
-    scene : Scene
-    relief : ndarray (n,)
-        Heights of the pins above rest, m.
-    lowest : float
-        Lowest place of a pin's top in the pictures to be compared, above rest, m.
-    out : Path
-        The PNG.
+    `relief` (n,), heights of the pins above rest, m; `lowest`: lowest place of a pin's top in the pictures to
+    be compared, above rest, m; `out`: the PNG.
     """
     looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
     rest = Instant.at_rest(scene.layout, scene.actuator)
@@ -92,15 +76,7 @@ def draw_relief(scene: Scene, relief: NDArray[Any], lowest: float, out: Path) ->
 
 
 def join(files: Sequence[Path], words: Sequence[str], out: Path) -> Path:
-    """Put pictures side by side, with words in the corner of each.
-
-    Parameters
-    ----------
-    files : sequence of Path
-    words : sequence of str
-    out : Path
-        The JPEG.
-    """
+    """Put pictures side by side, with words in the corner of each. `out`: the JPEG."""
     try:
         from PIL import Image, ImageDraw, ImageFont
     except ImportError:

@@ -75,17 +75,8 @@ class Made:
 def make(name: str, bed: str | None = None) -> Made:
     """Play the recorded strokes of a thing on a bed at rest.
 
-    Parameters
-    ----------
-    name : str
-        One of `THINGS`.
-    bed : str, optional
-        One of `BEDS`; that of the file when left out. Places and sizes are scaled with its width.
-
-    Raises
-    ------
-    DigiclayError
-        When the file cannot be read, or a stroke not be formed.
+    `name`: one of `THINGS`; `bed`: one of `BEDS`; that of the file when left out. Places and sizes are scaled
+    with its width. Raises DigiclayError when the file cannot be read, or a stroke not be formed.
     """
     recorded = read_strokes(STROKES / f"{name}.toml")
     own, other = BEDS[recorded.bed], BEDS[bed or recorded.bed]
@@ -107,13 +98,7 @@ def make(name: str, bed: str | None = None) -> Made:
 
 
 def rescale(strokes: tuple[PointerStroke, ...], share: float) -> tuple[PointerStroke, ...]:
-    """Return strokes on a bed of another width; depths and heights stay.
-
-    Parameters
-    ----------
-    strokes : tuple of PointerStroke
-    share : float
-    """
+    """Return strokes on a bed of another width; depths and heights stay."""
     return tuple(
         replace(one, moves=tuple((at, share * x, share * y) for at, x, y in one.moves)) for one in strokes
     )

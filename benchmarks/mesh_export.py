@@ -66,14 +66,8 @@ def formed(side: int) -> Formed:
 def measured(side: int, kind: str, file: str) -> Export:
     """Export a bed once for the time, and once more for the memory.
 
-    Parameters
-    ----------
-    side : int
-        Pins along each side.
-    kind : str
-        Of the mesh: solid, surface, pins or features.
-    file : str
-        Format, one of `FORMATS`.
+    `side`: pins along each side; `kind`: of the mesh: solid, surface, pins or features; `file`: format, one
+    of `FORMATS`.
     """
     bed = formed(side)
     finding = Finding() if kind == "features" else None

@@ -54,14 +54,7 @@ class Ledger:
     ) -> None:
         """Take down a call.
 
-        Parameters
-        ----------
-        name : str
-        call : callable
-        arguments : tuple
-            Their shapes and types are part of the key.
-        known : dict
-            Keyword arguments.
+        `arguments`: their shapes and types are part of the key; `known`: keyword arguments.
         """
         kinds = (one.shape if isinstance(one, np.ndarray) else type(one).__name__ for one in arguments)
         key = (name, *kinds)
@@ -172,12 +165,7 @@ def period_calls(system: System, trajectories: Sequence[Trajectory], count: int)
 
     The finger's poses are not counted: they are worked out for many periods at once.
 
-    Parameters
-    ----------
-    system : System
-    trajectories : sequence of Trajectory
-        One a finger.
-    count : int
+    `trajectories`: one a finger.
     """
     own = {name: _fields_counted(getattr(system, name)) for name in ("grid", "selection", "plan")}
     system = dataclasses.replace(system, **own)

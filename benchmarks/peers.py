@@ -120,15 +120,7 @@ class Line:
         self.pulp: Any = cell.touch.pulp
 
     def underside(self, t: float, x: Floats, y: Floats) -> Floats:
-        """Return the finger's underside, m.
-
-        Parameters
-        ----------
-        t : float
-            s.
-        x, y : ndarray (k,)
-            m.
-        """
+        """Return the finger's underside, m. `t`, s; `x`, `y` (k,), m."""
         at_x, at_y, at_z = self.finger(t)
         inward = 1.0 - ((x - at_x) / self.tip.length) ** 2 - ((y - at_y) / self.tip.width) ** 2
         kept = np.maximum(inward, 1.0 - JOIN)
@@ -138,12 +130,8 @@ class Line:
     def rates(self, x: Floats, y: Floats, command: Floats) -> Callable[[float, Floats], Floats]:
         """Return the right-hand side for some cells, the first of which the finger may touch.
 
-        Parameters
-        ----------
-        x, y : ndarray (k,)
-            Places of the cells the finger may touch, m.
-        command : ndarray (n,)
-            Commands of the cells that are integrated; the first k are those above.
+        `x`, `y` (k,), places of the cells the finger may touch, m; `command` (n,), commands of the cells that
+        are integrated; the first k are those above.
         """
         k, n, cell, contact = x.size, command.size, self.cell, self.contact
         out, weights, speeds = np.zeros((n, 5)), self.pulp.shares, self.pulp.rates[:, 0]
@@ -174,14 +162,7 @@ def peer(
 ) -> tuple[Measured, float, int]:
     """Integrate a problem by one of the `SOLVERS`; return it, the CPU time, s, and the evaluations.
 
-    Parameters
-    ----------
-    known : Problem
-    solver : callable
-    tolerance : float
-        Relative.
-    periods : int, optional
-        Control periods to integrate; by default all.
+    `tolerance`: relative; `periods`: control periods to integrate; by default all.
     """
     line = Line(known)
     system, grid = line.system, line.system.grid
@@ -235,15 +216,7 @@ def reference_and_check(known: Problem) -> tuple[Measured, float]:
 def points(known: Problem, exact: Measured, name: str, tolerances: tuple[float, ...]) -> Iterator[Work]:
     """Give the points of one solver, one a tolerance.
 
-    Parameters
-    ----------
-    known : Problem
-    exact : Measured
-        Its exact solution.
-    name : str
-        Key of `SOLVERS`.
-    tolerances : tuple of float
-        Relative.
+    `exact`: its exact solution; `name`: key of `SOLVERS`; `tolerances`: relative.
     """
     for tolerance in tolerances:
         found, took, evaluations = peer(known, SOLVERS[name], tolerance)

@@ -32,13 +32,7 @@ STYLE: dict[str, Any] = {
 def draw_precision(work: Sequence[Work], out: Path, lines: str = "full lines: ours; dashed: peers") -> Path:
     """Draw the work-precision plot, one panel a problem, and return its path; `lines` heads the legend.
 
-    Parameters
-    ----------
-    work : sequence of Work
-    out : Path
-        The PNG.
-    lines : str
-        Head of the legend.
+    `out`: the PNG; `lines`: head of the legend.
     """
     names = list(dict.fromkeys(one.problem for one in work))
     columns = min(3, len(names))
@@ -77,11 +71,7 @@ def _panel(panel: Any, work: Sequence[Work]) -> None:
 def write(figure: Any, out: Path) -> Path:
     """Write a figure into a folder that may have to be made, and return its path.
 
-    Parameters
-    ----------
-    figure : Figure
-    out : Path
-        The PNG.
+    `figure` Figure; `out`: the PNG.
     """
     out.parent.mkdir(parents=True, exist_ok=True)
     return save(figure, out)

@@ -99,15 +99,8 @@ def live(
 ) -> Scene:
     """Return a problem's scene under Method I, on its own bed or one of `side` rows and columns.
 
-    Parameters
-    ----------
-    name : str
-        Key of `PROBLEMS`.
-    period, step : float
-        Control period and physics step, s.
-    stepper : str
-    side : int, optional
-        Rows and columns of the bed; by default the problem's own.
+    `name`: key of `PROBLEMS`; `period`, `step`: control period and physics step, s; `side`: rows and columns
+    of the bed; by default the problem's own.
     """
     own, waypoints, joined, held = PROBLEMS[name]
     table: dict[str, Any] = {
@@ -126,12 +119,7 @@ def live(
 def problem(name: str, *, side: int | None = None) -> Problem:
     """Record a problem's commands, on its own bed or another, and work out which cells take part.
 
-    Parameters
-    ----------
-    name : str
-        Key of `PROBLEMS`.
-    side : int, optional
-        Rows and columns of the bed; by default the problem's own.
+    `name`: key of `PROBLEMS`; `side`: rows and columns of the bed; by default the problem's own.
     """
     scene, held = live(name, side=side), PROBLEMS[name][3]
     system = assemble(scene)
@@ -146,14 +134,7 @@ def problem(name: str, *, side: int | None = None) -> Problem:
 
 
 def replaying(scene: Scene, commands: Floats) -> System:
-    """Return a scene's system that plays commands.
-
-    Parameters
-    ----------
-    scene : Scene
-    commands : ndarray (t, n)
-        Held for a control period each.
-    """
+    """Return a scene's system that plays commands. `commands` (t, n), held for a control period each."""
     system = assemble(scene)
     return replace(system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0))
 
@@ -165,14 +146,7 @@ def _at(known: Problem, stepper: str, step: float) -> Scene:
 
 
 def solved(scene: Scene, commands: Floats) -> Measured:
-    """Integrate under recorded commands.
-
-    Parameters
-    ----------
-    scene : Scene
-    commands : ndarray (t, n)
-        Held for a control period each.
-    """
+    """Integrate under recorded commands. `commands` (t, n), held for a control period each."""
     system = replaying(scene, commands)
     run = periods(system, scene.trajectories(), begin(system), scene.periods)
     rows = [(state.row(0), state.row(system.rows.force).sum()) for state in run]
@@ -182,12 +156,7 @@ def solved(scene: Scene, commands: Floats) -> Measured:
 def timed(scene: Scene, commands: Floats, repeats: int) -> float:
     """Return the CPU time of a run of which nothing is kept, s: the median.
 
-    Parameters
-    ----------
-    scene : Scene
-    commands : ndarray (t, n)
-        Held for a control period each.
-    repeats : int
+    `commands` (t, n), held for a control period each.
     """
     spent = []
     for _ in range(repeats):
@@ -205,16 +174,7 @@ def ours(
 ) -> Iterator[Work]:
     """Give the points of one of our steppers, one a step.
 
-    Parameters
-    ----------
-    known : Problem
-    exact : Measured
-        Its exact solution.
-    stepper : str
-    steps : tuple of float
-        Physics steps, s.
-    repeats : int
-        Timed runs; the median counts.
+    `exact`: its exact solution; `steps`: physics steps, s; `repeats`: timed runs; the median counts.
     """
     for step in steps:
         scene = _at(known, stepper, step)

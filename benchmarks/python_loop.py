@@ -25,12 +25,7 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
 
     Only the cells that take part by the problem's sets are gone through, as for the solvers.
 
-    Parameters
-    ----------
-    known : Problem
-    step : float
-        Physics step, s.
-    periods : int
+    `step`: physics step, s.
     """
     line = Line(known)
     system, grid = line.system, line.system.grid
@@ -68,13 +63,7 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
 def looped(known: Problem, exact: Measured, step: float) -> Work:
     """Return the loop's point: a whole run at one step, s.
 
-    Parameters
-    ----------
-    known : Problem
-    exact : Measured
-        Its exact solution.
-    step : float
-        Physics step, s.
+    `exact`: its exact solution; `step`: physics step, s.
     """
     found, took = loop(known, step, known.scene.periods)
     height, force = found.against(exact)
@@ -104,12 +93,7 @@ class Scalar:
     def underside(self, pose: tuple[float, float, float], x: float, y: float) -> float:
         """Return the finger's underside over one cell, m.
 
-        Parameters
-        ----------
-        pose : (float, float, float)
-            The finger's lowest point, m.
-        x, y : float
-            Place of the cell, m.
+        `pose` (float, float, float), the finger's lowest point, m; `x`, `y`: place of the cell, m.
         """
         inward = 1.0 - ((x - pose[0]) / self.tip.length) ** 2 - ((y - pose[1]) / self.tip.width) ** 2
         kept = max(inward, 1.0 - JOIN)
@@ -118,22 +102,15 @@ class Scalar:
     def tension(self, height: float, under: float) -> float:
         """Return T in units of b/m.
 
-        Parameters
-        ----------
-        height, under : float
-            Of the pin, and of the finger's underside over it, m.
+        `height`, `under`: of the pin, and of the finger's underside over it, m.
         """
         return math.expm1(min(max(self.m * (height - under), 0.0), 500.0))
 
     def force(self, y: list[float], under: float) -> float:
         """Return the force, N.
 
-        Parameters
-        ----------
-        y : list of float
-            The cell's state: height, m; three filters, N; opening.
-        under : float
-            The finger's underside over the cell, m.
+        `y`: the cell's state: height, m; three filters, N; opening; `under`: the finger's underside over the
+        cell, m.
         """
         relaxed = sum(w * z for w, z in zip(self.weights, y[1:4], strict=True))
         return float(self.share * max(self.unit * self.tension(y[0], under) - relaxed, 0.0))
@@ -141,14 +118,9 @@ class Scalar:
     def step(self, y: list[float], openings: list[float], unders: list[float]) -> None:
         """Move a cell on by a step, in place.
 
-        Parameters
-        ----------
-        y : list of float
-            The cell's state: height, m; three filters, N; opening.
-        openings : list of float
-            The valve's opening at the Gauss points of the step.
-        unders : list of float
-            The finger's underside at start, middle and end of the step, m; empty for a cell it may not touch.
+        `y`: the cell's state: height, m; three filters, N; opening; `openings`: the valve's opening at the
+        Gauss points of the step; `unders`: the finger's underside at start, middle and end of the step, m;
+        empty for a cell it may not touch.
         """
         mobility = free = bow = 0.0
         for (node, weight), opening in zip(WHOLE, openings, strict=True):

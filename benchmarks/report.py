@@ -23,15 +23,8 @@ __all__ = ["add_kind", "kept", "made_with", "progress", "table"]
 def add_kind(kinds: Any, name: str, help: str, examples: str, *, out: bool = True) -> argparse.ArgumentParser:
     """Add a benchmark with the options all of them take.
 
-    Parameters
-    ----------
-    kinds : argparse's subparsers
-    name : str
-    help : str
-    examples : str
-        Lines below *examples* in its help.
-    out : bool
-        Whether it can keep its results in a folder.
+    `kinds` argparse's subparsers; `examples`: lines below *examples* in its help; `out`: whether it can keep
+    its results in a folder.
     """
     parser = add_command(kinds, name, help, f"examples:\n{examples}")
     parser.add_argument("--quick", action="store_true", help="fewer and shorter runs")
@@ -79,14 +72,7 @@ class Steps(Line):
 def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:
     """Return the bar of a benchmark, on stderr; one that draws nothing with --quiet.
 
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-        `quiet` is asked for.
-    label : str
-        In front of the bar.
-    total : int
-        Steps of the bar.
+    `arguments`: `quiet` is asked for; `label`: in front of the bar; `total`: steps of the bar.
     """
     return Steps(io.StringIO() if arguments.quiet else sys.stderr, label, total)
 
@@ -94,22 +80,8 @@ def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:
 def kept(out: Path | None, name: str, text: str, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
     """Write a benchmark's text as ``name.md`` and its figures as ``name.csv``, if there is a folder for them.
 
-    Parameters
-    ----------
-    out : Path or None
-        The folder.
-    name : str
-        Of both files, without suffix.
-    text : str
-    head : sequence of str
-        Names of the columns of the CSV.
-    rows : sequence of sequences
-        Their values.
-
-    Raises
-    ------
-    OutputError
-        When the folder cannot be written.
+    `out`: the folder; `name`: of both files, without suffix; `head`: names of the columns of the CSV; `rows`:
+    their values. Raises OutputError when the folder cannot be written.
     """
     if out is None:
         return

@@ -63,13 +63,7 @@ class Size:
 def study(scene: Scene, name: str, count: int) -> list[Scene]:
     """Return the runs of a study: a parameter of the scene spread evenly.
 
-    Parameters
-    ----------
-    scene : Scene
-    name : str
-        Key of `STUDIES`.
-    count : int
-        Runs.
+    `name`: key of `STUDIES`; `count`: runs.
     """
     section, key, low, high = STUDIES[name]
     part: Any = scene.section(section)
@@ -90,14 +84,7 @@ def measured(scene: Scene, name: str, count: int, repeats: int) -> Size:
 
     One run alone and all in one call take turns, so that what else the machine does befalls both alike.
 
-    Parameters
-    ----------
-    scene : Scene
-    name : str
-        Key of `STUDIES`.
-    count : int
-        Runs of the study.
-    repeats : int
+    `name`: key of `STUDIES`; `count`: runs of the study.
     """
     scenes = study(scene, name, count)
     plain = study(replace(scene, recorder=None), name, count)

@@ -110,12 +110,7 @@ def _move(port: int, token: str) -> int:
 def sum_bins(bins: Sequence[tuple[float, int]], ends: Sequence[float]) -> list[int]:
     """Return how many times lie below each end, and not below the one before.
 
-    Parameters
-    ----------
-    bins : sequence of (float, int)
-        Lower ends of narrow bins, s, and their counts.
-    ends : sequence of float
-        ms, ascending.
+    `bins` (float, int), lower ends of narrow bins, s, and their counts; `ends`: ms, ascending.
     """
     starts = np.array([start for start, _ in bins]) * 1e3
     counts = np.array([count for _, count in bins])
@@ -145,12 +140,7 @@ def _text(figures: Mapping[str, Any], frames: int) -> Iterator[str]:
 def draw_deadlines(figures: Mapping[str, Any], out: Path) -> Path:
     """Draw the histograms of elapsed and processor time; return the picture's path.
 
-    Parameters
-    ----------
-    figures : mapping
-        Report of the server.
-    out : Path
-        The PNG.
+    `figures`: report of the server; `out`: the PNG.
     """
     from digiclay.plots.figure import empty
 

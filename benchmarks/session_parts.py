@@ -128,11 +128,7 @@ def _table(scene: Scene, plain: list[Took], split: list[dict[str, float]]) -> It
 def measured(scene: Scene, profile: cProfile.Profile | None = None) -> Took:
     """Run a session as `core.session.run_scene.run` does and return how long it took.
 
-    Parameters
-    ----------
-    scene : Scene
-    profile : cProfile.Profile, optional
-        Takes down what each function took.
+    `profile`: takes down what each function took.
     """
     system, trajectories = assemble(scene), scene.trajectories()
     state = simulation.begin(system)
@@ -147,12 +143,7 @@ def measured(scene: Scene, profile: cProfile.Profile | None = None) -> Took:
 def shares(profile: cProfile.Profile, whole: float) -> dict[str, float]:
     """Return what each of the parts took, s.
 
-    Parameters
-    ----------
-    profile : cProfile.Profile
-        Of `measured`.
-    whole : float
-        What all of it took, s; what no function of a part took is `the rest`.
+    `profile`: of `measured`; `whole`: what all of it took, s; what no function of a part took is `the rest`.
     """
     spent = dict.fromkeys(PARTS, 0.0)
     for entry in profile.getstats():

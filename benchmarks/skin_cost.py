@@ -37,11 +37,7 @@ class SkinCost:
 def measure_skin(rows: int, columns: int, updates: int) -> SkinCost:
     """Move all pins of a bed again and again, and time what Blender does then, drawing excepted.
 
-    Parameters
-    ----------
-    rows, columns : int
-    updates : int
-        How many are timed for each form, at least.
+    `updates`: how many are timed for each form, at least.
     """
     instant = Instant.at_rest(Layout(rows=rows, columns=columns))
     noise = 1e-3 * np.random.default_rng(0).standard_normal((2, len(instant.height)))

@@ -135,12 +135,7 @@ CASES[ALL] = Case(
 def scene(case: Case, stepper: str, step: float, period: float) -> Scene:
     """Return the scene of a case: 5 x 5 pins, and no recorder.
 
-    Parameters
-    ----------
-    case : Case
-    stepper : str
-    step, period : float
-        Physics step and control period, s.
+    `step`, `period`: physics step and control period, s.
     """
     table: dict[str, Any] = {**BED, **copy.deepcopy(dict(case.changes))}
     rest = table.get("actuator", {}).get("rest_height", 40e-3)

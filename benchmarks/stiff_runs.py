@@ -80,14 +80,7 @@ def strict() -> Iterator[None]:
 def allowed_range(height: Floats, force: Floats, stroke: float) -> str:
     """Return what is wrong with the heights and forces of a period; nothing: an empty text.
 
-    Parameters
-    ----------
-    height : ndarray (n,)
-        m.
-    force : ndarray (n,)
-        N.
-    stroke : float
-        m.
+    `height` (n,), m; `force` (n,), N; `stroke`, m.
     """
     if not (np.isfinite(height).all() and np.isfinite(force).all()):
         return "not finite"
@@ -99,10 +92,7 @@ def allowed_range(height: Floats, force: Floats, stroke: float) -> str:
 def _played(system: System, trajectories: Sequence[Trajectory], count: int) -> tuple[Floats, Floats, float]:
     """Run; return heights and commands, (t, n), and the largest force, N.
 
-    Raises
-    ------
-    AssertionError
-        When an invariant breaks.
+    Raises AssertionError when an invariant breaks.
     """
     rows, heights, commands, most = system.rows, [], [], 0.0
     start = begin(system)
@@ -149,15 +139,7 @@ def commands_of(case: Case) -> Floats:
 
 
 def live(case: Case, stepper: str, step: float) -> Floats:
-    """Run a case with its controller, and return the heights, (t, n).
-
-    Parameters
-    ----------
-    case : Case
-    stepper : str
-    step : float
-        Physics step, s.
-    """
+    """Run a case with its controller, and return the heights, (t, n). `step`: physics step, s."""
     known = scene(case, stepper, step, period_of(step))
     return _played(assemble(known), known.trajectories(), known.periods)[0]
 
@@ -176,14 +158,7 @@ def _replaying(
 def replayed(case: Case, commands: Floats, stepper: str, step: float, period: float) -> Floats:
     """Integrate a case under recorded commands and return the heights, (t, n).
 
-    Parameters
-    ----------
-    case : Case
-    commands : ndarray (t, n)
-        Held for `HOLD` each.
-    stepper : str
-    step, period : float
-        Physics step and control period, s.
+    `commands` (t, n), held for `HOLD` each; `step`, `period`: physics step and control period, s.
     """
     return _played(*_replaying(case, commands, stepper, step, period))[0]
 
@@ -191,11 +166,7 @@ def replayed(case: Case, commands: Floats, stepper: str, step: float, period: fl
 def largest_force(case: Case, commands: Floats) -> float:
     """Return the largest force on a cell at the end of a control period, N.
 
-    Parameters
-    ----------
-    case : Case
-    commands : ndarray (t, n)
-        Held for `HOLD` each.
+    `commands` (t, n), held for `HOLD` each.
     """
     return _played(*_replaying(case, commands, "bernoulli", 1e-3, PERIOD))[2]
 
@@ -203,13 +174,7 @@ def largest_force(case: Case, commands: Floats) -> float:
 def calls_of(case: Case, commands: Floats, step: float = 1e-3) -> float:
     """Return the numpy calls a control period of the default stepper makes, the median over the run.
 
-    Parameters
-    ----------
-    case : Case
-    commands : ndarray (t, n)
-        Held for `HOLD` each.
-    step : float
-        Physics step, s.
+    `commands` (t, n), held for `HOLD` each; `step`: physics step, s.
     """
     system, trajectories, count = _replaying(case, commands, "bernoulli", step, period_of(step))
     return statistics.median(period_calls(system, trajectories, count // 2)[0])
@@ -220,15 +185,7 @@ def reference(
 ) -> tuple[Floats, float]:
     """Return the heights every 5 ms, (t, n), and how far they may be off, m.
 
-    Parameters
-    ----------
-    case : Case
-    commands : ndarray (t, n)
-        Held for `HOLD` each.
-    step : float
-        Physics step, s.
-    integrate : callable, optional
-        See `outcome`.
+    `commands` (t, n), held for `HOLD` each; `step`: physics step, s; `integrate`: see `outcome`.
     """
     integrate = integrate or partial(replayed, case, commands)
     fine = integrate("richardson", step, PERIOD)
@@ -247,20 +204,10 @@ def outcome(
 ) -> Outcome:
     """Run one stepper at one step, and judge it.
 
-    Parameters
-    ----------
-    case : Case
-    commands : ndarray (t, n)
-        Held for `HOLD` each.
-    exact : ndarray (t, n)
-        Heights every 5 ms, m.
-    stepper : str
-    step : float
-        Physics step, s.
-    integrate : callable, optional
-        Returns what `replayed` does for a stepper, its step and the control period, s. Callers that judge
-        several steppers can keep the results: the finer run is the same for each, and that of the shortest
-        step is the reference's.
+    `commands` (t, n), held for `HOLD` each; `exact` (t, n), heights every 5 ms, m; `step`: physics step, s;
+    `integrate`: returns what `replayed` does for a stepper, its step and the control period, s. Callers that
+    judge several steppers can keep the results: the finer run is the same for each, and that of the shortest
+    step is the reference's.
     """
     integrate = integrate or partial(replayed, case, commands)
     period = period_of(step)

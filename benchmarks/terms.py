@@ -66,14 +66,7 @@ class Run:
 
 
 def without(scene: Scene, term: str) -> Scene | None:
-    """Return a scene without a term; None where it has none.
-
-    Parameters
-    ----------
-    scene : Scene
-    term : str
-        Key of `TERMS`, or `LONGER`.
-    """
+    """Return a scene without a term; None where it has none. `term`: key of `TERMS`, or `LONGER`."""
     if term == LONGER:
         simulation = replace(scene.simulation, physics_step=scene.simulation.control_period)
         return None if simulation == scene.simulation else replace(scene, simulation=simulation)
@@ -106,13 +99,7 @@ def _run(scene: Scene, commands: Floats | None, repeats: int) -> Run:
 def effect(scene: Scene, full: Run, repeats: int = 1) -> Effect:
     """Judge a scene against the run of the full one.
 
-    Parameters
-    ----------
-    scene : Scene
-    full : Run
-        Of the full scene.
-    repeats : int
-        Timed runs; the median counts.
+    `full`: of the full scene; `repeats`: timed runs; the median counts.
     """
     alive, played = _run(scene, None, repeats), _run(scene, full.commands, 1)
     system = assemble(scene)

@@ -69,14 +69,7 @@ class Ticks:
 def measure(rows: int, columns: int, pitch: float, bore: float, ticks: int) -> Ticks:
     """Add a bed, draw on it as a hand does, and time every tick.
 
-    Parameters
-    ----------
-    rows, columns : int
-        Of the bed.
-    pitch, bore : float
-        m.
-    ticks : int
-        How many are timed.
+    `rows`, `columns`: of the bed; `pitch`, `bore`, m; `ticks`: how many are timed.
     """
     found: dict[str, list[float]] = {name: [] for name in PARTS}
     elapsed, spent = [], []

@@ -100,13 +100,7 @@ def _lines(bed: Ticks) -> dict[str, Any]:
 def draw_histogram(found: Sequence[Ticks], goals: Sequence[float], out: Path) -> Path:
     """Draw how the times of the ticks are distributed, one panel a bed, and return the picture's path.
 
-    Parameters
-    ----------
-    found : sequence of Ticks
-    goals : sequence of float
-        Time that 99 of 100 ticks of each bed are to keep to, s.
-    out : Path
-        The PNG.
+    `goals`: time that 99 of 100 ticks of each bed are to keep to, s; `out`: the PNG.
     """
     with empty(7.2, 2.1 * len(found), STYLE, layout="constrained") as figure:
         panels = figure.subplots(len(found), 1, sharex=True, squeeze=False).ravel()

@@ -64,12 +64,7 @@ class Cost:
 def measured(rows: int, columns: int, ticks: int) -> Cost:
     """Add a bed, press and drag its fingertip, and time the ticks of its session.
 
-    Parameters
-    ----------
-    rows, columns : int
-        Pins of the bed.
-    ticks : int
-        How many are timed.
+    `rows`, `columns`: pins of the bed; `ticks`: how many are timed.
     """
     with _session(rows, columns) as bed:
         clock = _ticks(bed, WARM_UP)

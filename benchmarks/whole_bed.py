@@ -70,15 +70,7 @@ class Beside:
 
 
 def carry_out(arguments: argparse.Namespace, names: Sequence[str]) -> None:
-    """Run some problems, and print the tables.
-
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-        Of `precision`.
-    names : sequence of str
-        Keys of `PROBLEMS`.
-    """
+    """Run some problems, and print the tables. `arguments`: of `precision`; `names`: keys of `PROBLEMS`."""
     own, others, once, rounds = (
         (QUICK, QUICK_PEERS, {}, 1) if arguments.quick else (OURS, PEERS, ONCE, ROUNDS)
     )
@@ -119,19 +111,10 @@ def beside(
 ) -> Beside:
     """Run our steppers and both forms of the peers on a problem.
 
-    Parameters
-    ----------
-    known : Problem
-    exact : Measured
-        Its exact solution: the errors are those of all cells of the bed.
-    own, others : dict of str to tuple of float
-        Our steppers with their steps, s; the solvers with their tolerances.
-    once : dict of str to tuple of float
-        Solvers run over the whole bed only, and once.
-    rounds : int
-        Runs of `own` and `others`; the fastest counts.
-    done : callable
-        Told of each piece of the work: a piece a round, and one more.
+    `exact`: its exact solution: the errors are those of all cells of the bed; `own`, `others`: our steppers
+    with their steps, s; the solvers with their tolerances; `once`: solvers run over the whole bed only, and
+    once; `rounds`: runs of `own` and `others`; the fastest counts; `done`: told of each piece of the work: a
+    piece a round, and one more.
     """
     whole = everywhere(known)
     turns: list[tuple[list[Work], list[Work], list[Work]]] = []
@@ -164,13 +147,8 @@ def _fastest(runs: Sequence[list[Work]]) -> list[Work]:
 def report(found: Sequence[Beside], apart: Sequence[float], rounds: int) -> Iterator[str]:
     """Give the lines of the report; `apart` is how far two references are from each other, m.
 
-    Parameters
-    ----------
-    found : sequence of Beside
-    apart : sequence of float
-        Of each problem, how far two references are from each other, m.
-    rounds : int
-        Runs of each setting; the fastest counted.
+    `apart`: of each problem, how far two references are from each other, m; `rounds`: runs of each setting;
+    the fastest counted.
     """
     yield f"Peers over the whole bed: the problems on the paper's bed of {SIDE} x {SIDE}, for all methods."
     yield "Peers are told which cells take part, or go through all of them in the same form ('whole"

@@ -40,14 +40,7 @@ RATIOS = (*(_shown(level) for level in LEVELS), "loop / ours")
 def cheapest(work: list[Work], level: float, *, peer: bool) -> Work | None:
     """Return the fastest run with at most an error of height, m: one of ours, or one of the solvers.
 
-    Parameters
-    ----------
-    work : list of Work
-        Of one problem.
-    level : float
-        Error of height, m.
-    peer : bool
-        Whether a solver is asked for.
+    `work`: of one problem; `level`: error of height, m; `peer`: whether a solver is asked for.
     """
     fit = [one for one in work if one.peer == peer and one.method != LOOP and one.height_error <= level]
     return min(fit, key=lambda one: one.seconds, default=None)
@@ -56,12 +49,7 @@ def cheapest(work: list[Work], level: float, *, peer: bool) -> Work | None:
 def best_ratio(work: list[Work], level: float) -> float | None:
     """Return the best solver's time over our best, at a level of error; None where one does not reach it.
 
-    Parameters
-    ----------
-    work : list of Work
-        Of one problem.
-    level : float
-        Error of height, m.
+    `work`: of one problem; `level`: error of height, m.
     """
     mine, theirs = cheapest(work, level, peer=False), cheapest(work, level, peer=True)
     return theirs.seconds / mine.seconds if mine and theirs else None

@@ -15,14 +15,7 @@ from digiclay.core.scene.schema import Scene
 
 
 def change_finger(scene: Scene, part: str, **factors: float) -> Scene:
-    """Return a scene with some numbers of a part of its finger times a factor.
-
-    Parameters
-    ----------
-    scene : Scene
-    part : {"fingertip", "contact", "relaxation"}
-    **factors : float
-    """
+    """Return a scene with some numbers of a part of its finger times a factor."""
     known = scene.section(part)
     return scene.with_sections(
         **{part: replace(known, **{name: getattr(known, name) * by for name, by in factors.items()})}
@@ -30,12 +23,7 @@ def change_finger(scene: Scene, part: str, **factors: float) -> Scene:
 
 
 def list_models(true: Scene) -> dict[str, Scene]:
-    """Return scenes that differ from the true one, for controllers made for them.
-
-    Parameters
-    ----------
-    true : Scene
-    """
+    """Return scenes that differ from the true one, for controllers made for them."""
     sizes = ("length", "width", "height")
     # The laminar flow goes with the fourth power of the diameter.
     valves = {
@@ -60,12 +48,7 @@ def list_models(true: Scene) -> dict[str, Scene]:
 def run_mismatched(true: Scene, model: Scene) -> dict[str, float | None]:
     """Return the figures of a session whose controller is made for another device.
 
-    Parameters
-    ----------
-    true : Scene
-        The device, and the fingertip's path.
-    model : Scene
-        The device that the controller is made for.
+    `true`: the device, and the fingertip's path; `model`: the device that the controller is made for.
     """
     controller = assemble(model).controller
     assert controller is not None  # scenes of the benchmark have one
@@ -77,12 +60,8 @@ def run_controller(
 ) -> dict[str, float | None]:
     """Return RFD, losses and largest force of a session with a controller in place of the scene's.
 
-    Parameters
-    ----------
-    scene : Scene
-    controller : Controller
-    phase : sequence of float, optional
-        When the part starts and ends whose RFD is taken, over all its rows, s; by default rows in contact.
+    `phase`: when the part starts and ends whose RFD is taken, over all its rows, s; by default rows in
+    contact.
     """
     system = replace(assemble(scene), controller=controller)
     forces, losses = [], 0

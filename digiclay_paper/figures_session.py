@@ -22,11 +22,7 @@ PRESSING, LIFTING = (0.5, 1.5), (2.4, 3.4)
 def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
     """Draw the heights of the same cells, and the total force, side by side for all methods.
 
-    Parameters
-    ----------
-    sessions : mapping of str to Session
-        By method.
-    title : str
+    `sessions`: by method.
     """
     cells = session_cells(sessions[METHODS[0]].history)
     spots = sessions[METHODS[0]].history["position"][cells] * MM
@@ -76,13 +72,7 @@ def _list(sessions: Mapping[str, Session]) -> list[str]:
 
 
 def details(results: Results, title: str) -> Any:
-    """Draw a detail of the heights in the session: the first press, and what swings during the lift.
-
-    Parameters
-    ----------
-    results : Results
-    title : str
-    """
+    """Draw a detail of the heights in the session: the first press, and what swings during the lift."""
     shown = _detailed(results)
     with canvas(4.5 * max(len(shown), 3), 7.6, title) as (figure, place):
         wide = 4.5 * max(len(shown), 3) / len(shown)
@@ -140,11 +130,7 @@ def _swinging(time: Any, height: Any) -> Any:
 def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
     """Draw the final surfaces in relief and from above, side by side for all methods.
 
-    Parameters
-    ----------
-    sessions : mapping of str to Session
-        By method.
-    title : str
+    `sessions`: by method.
     """
     methods = _list(sessions)
     across = 0.3 + 6.6 * len(methods)
@@ -176,14 +162,7 @@ def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, 
 
 
 def profiles(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw sections through the final surfaces, formed and asked for.
-
-    Parameters
-    ----------
-    sessions : mapping of str to Session
-        By method.
-    title : str
-    """
+    """Draw sections through the final surfaces, formed and asked for. `sessions`: by method."""
     found = {method: list(sections(sessions[method])) for method in _list(sessions)}
     count = len(found[METHODS[0]])
     with canvas(13.5, 8.6, title) as (figure, place):

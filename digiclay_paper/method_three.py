@@ -26,10 +26,7 @@ METRICS = (
 def compare_methods(results: Results) -> Iterator[str]:
     """Give the lines of the table, a method a column, in Markdown.
 
-    Parameters
-    ----------
-    results : Results
-        With all methods, see `Results.compared`.
+    `results`: with all methods, see `Results.compared`.
     """
     methods = [method for method in COMPARED if method in results.session]
     yield f"| | {' | '.join(NAMES[method] for method in methods)} |"

@@ -24,15 +24,7 @@ CHAIN = (
 def page(results: Results, found: list[Claim], pictures: Mapping[str, str], took: float, version: str) -> str:
     """Return the page.
 
-    Parameters
-    ----------
-    results : Results
-    found : list of Claim
-    pictures : mapping
-        Name of the files, without an ending, to caption.
-    took : float
-        Time of all simulations, s.
-    version : str
+    `pictures`: name of the files, without an ending, to caption; `took`: time of all simulations, s.
     """
     return "\n".join(_lines(results, found, pictures, took, version)) + "\n"
 

@@ -72,12 +72,7 @@ def _plain(text: str) -> str:
 def table(rows: Iterable[Iterable[Any]], columns: Iterable[str] = COLUMNS) -> str:
     """Return rows as CSV, numbers with six digits.
 
-    Parameters
-    ----------
-    rows : iterable of iterables
-        Values of each row.
-    columns : iterable of str
-        Names of the columns.
+    `rows`: values of each row; `columns`: names of the columns.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

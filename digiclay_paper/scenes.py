@@ -42,13 +42,7 @@ QUICKER: Device = {
 def blister(method: str, height: float, profile: str) -> Scene:
     """Return a scene that presses, and raises or sinks a blister with a profile to `height`, m.
 
-    Parameters
-    ----------
-    method : str
-    height : float
-        Of the finger's lowest point over the bed at rest while it holds, m.
-    profile : str
-        Of the blister.
+    `height`: of the finger's lowest point over the bed at rest while it holds, m; `profile`: of the blister.
     """
     table = _table(method, 17, {}, {"profile": profile})
     there = 1.7 + abs(height + PRESS) / GENTLY
@@ -61,13 +55,8 @@ def held(
 ) -> tuple[Scene, float]:
     """Return a scene that shapes, is pressed quickly by `PRESSED` and held; and when, s.
 
-    Parameters
-    ----------
-    gain, position_gain : float
-        K_f of Method I or K_FF of Method II, 1/N, and K_p, 1/m.
-    device : mapping, optional
-        Sections of the scene that are not the default ones, such as `QUICKER`.
-    method : str, optional
+    `gain`, `position_gain`: K_f of Method I or K_FF of Method II, 1/N, and K_p, 1/m; `device`: sections of
+    the scene that are not the default ones, such as `QUICKER`.
     """
     size = PRESSED
     quick = 2.2 + size / QUICKLY
@@ -83,12 +72,7 @@ def held(
 def at_rest(noise: float, radius: float | None = None) -> Scene:
     """Return a scene of Method I that presses and holds still, with noisy force sensors.
 
-    Parameters
-    ----------
-    noise : float
-        Standard deviation of a cell's force sensor, N.
-    radius : float, optional
-        r_VM, m.
+    `noise`: standard deviation of a cell's force sensor, N; `radius`: r_VM, m.
     """
     known = {} if radius is None else {"radius": radius}
     table = _table("virtual_master", 13, known, {}) | {"sensors": {"force_noise": noise}}
@@ -114,13 +98,7 @@ def _with_path(found: Scene, points: list[tuple[float, float]]) -> Scene:
 
 
 def slowed(session: Scene, factor: float) -> Scene:
-    """Return a session that takes `factor` times as long.
-
-    Parameters
-    ----------
-    session : Scene
-    factor : float
-    """
+    """Return a session that takes `factor` times as long."""
     path = session.section("trajectory")
     way = tuple(replace(point, time=factor * point.time) for point in path.waypoints)
     lasting = replace(session.simulation, duration=0.0)

@@ -37,13 +37,7 @@ Told = Callable[[str], None]
 def vary(results: Results, extent: Extent, told: Told) -> None:
     """Run the drags of every variant, and locate a finger under noise.
 
-    Parameters
-    ----------
-    results : Results
-        Takes them in.
-    extent : Extent
-    told : callable
-        Hears what comes next.
+    `results`: takes them in; `told`: hears what comes next.
     """
     for variant, (setting, methods) in VARIANTS.items():
         for method in methods:
@@ -61,13 +55,7 @@ def vary(results: Results, extent: Extent, told: Told) -> None:
 def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Result]:
     """Run a drag, and return what it came to, and the whole of it.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its device and method.
-    way : Drag
-    speed : float
-        m/s.
+    `scene`: its device and method; `speed`, m/s.
     """
     follows, done = track(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
@@ -90,14 +78,8 @@ def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragge
 def located(noise: float, radius: float | None, *, thresholds: bool) -> Located:
     """Hold a finger still under Method I with noisy force sensors, and look where it is located.
 
-    Parameters
-    ----------
-    noise : float
-        Standard deviation of a cell's force sensor, N.
-    radius : float or None
-        r_VM, m; None: its default.
-    thresholds : bool
-        Whether the controller knows of the noise, and takes readings below its threshold for none.
+    `noise`: standard deviation of a cell's force sensor, N; `radius`: r_VM, m; None: its default;
+    `thresholds`: whether the controller knows of the noise, and takes readings below its threshold for none.
     """
     case = scenes.at_rest(noise, radius)
     assert isinstance(case.control, VirtualMaster)

@@ -18,10 +18,7 @@ ALLOWED = re.compile(r"[A-Za-z0-9._~-]{8,128}")
 def choose_token(given: str | None) -> tuple[str, bool]:
     """Return the token, and whether it was made just now: from the option, the environment, or at random.
 
-    Raises
-    ------
-    OutputError
-        When a given one is none.
+    Raises OutputError when a given one is none.
     """
     token, source = (given, "--token") if given is not None else (os.environ.get(VARIABLE), VARIABLE)
     if token is None:
@@ -36,11 +33,6 @@ def choose_token(given: str | None) -> tuple[str, bool]:
 def is_token(given: object, token: str) -> bool:
     """Return whether a client's token is the right one, in a time that does not depend on where it differs.
 
-    Parameters
-    ----------
-    given : object
-        From the client.
-    token : str
-        The server's.
+    `given`: from the client; `token`: the server's.
     """
     return isinstance(given, str) and hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())

@@ -56,14 +56,7 @@ class Due:
 
 
 def plan_periods(schedule: Schedule, now: float) -> tuple[Due, Schedule]:
-    """Return the periods that have begun by now, and the schedule after them.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    now : float
-        s.
-    """
+    """Return the periods that have begun by now, and the schedule after them. `now`, s."""
     begun = math.floor((now - schedule.start) / schedule.period + SLACK) + 1
     late = max(0, begun - schedule.planned)
     count = min(late, schedule.most)
@@ -96,13 +89,7 @@ class TimeCounts:
         self.longest[0] = max(self.longest[0], time)
 
     def count_above(self, time: float) -> int:
-        """Return how many times exceed a limit, by whole bins.
-
-        Parameters
-        ----------
-        time : float
-            s.
-        """
+        """Return how many times exceed a limit, by whole bins. `time`, s."""
         return int(self.bins[round(time / self.width) :].sum())
 
     def find_share(self, share: float) -> float:

@@ -20,20 +20,8 @@ MOST_UNREAD = 4096
 def open_display(link: DoorLink, path: str, rate: float, baud: int) -> Display:
     """Open the serial line of a display, and begin to send.
 
-    Parameters
-    ----------
-    link : DoorLink
-    path : str
-        Of the device.
-    rate : float
-        Frames a second.
-    baud : int
-        Bits a second.
-
-    Raises
-    ------
-    OutputError
-        When it is no serial line, or has no such speed.
+    `path`: of the device; `rate`: frames a second; `baud`: bits a second. Raises OutputError when it is no
+    serial line, or has no such speed.
     """
     import termios
     import tty

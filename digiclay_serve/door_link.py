@@ -56,16 +56,8 @@ class DoorLink:
     def order(self, request: Pose | Reset | Status, client: object) -> dict[str, Any] | None:
         """Carry out a request; return the answer, if it has one.
 
-        Parameters
-        ----------
-        request : Pose, Reset or Status
-        client : object
-            Anything that is equal for one client only.
-
-        Raises
-        ------
-        HeldError
-            When another client moves the fingertip.
+        `client`: anything that is equal for one client only. Raises HeldError when another client moves the
+        fingertip.
         """
         if isinstance(request, Status):
             return dict(self.counts)
@@ -84,10 +76,5 @@ class DoorLink:
         return None
 
     def leave(self, client: object) -> None:
-        """Note that a client has gone: another one may move the fingertip.
-
-        Parameters
-        ----------
-        client : object
-        """
+        """Note that a client has gone: another one may move the fingertip."""
         self._lease = release(self._lease, client)

@@ -107,13 +107,7 @@ async def _serve(settings: dict[str, Any]) -> None:
 
 
 async def _opened(opening: Any, host: str, port: int) -> Any:
-    """Return what has been opened.
-
-    Raises
-    ------
-    OutputError
-        When the address cannot be used.
-    """
+    """Return what has been opened. Raises OutputError when the address cannot be used."""
     try:
         return await opening
     except (OSError, OverflowError) as error:

@@ -108,13 +108,7 @@ class Doors(AbstractContextManager["Doors"]):
         return self._order
 
     def show(self, frame: bytes) -> None:
-        """Show a packed frame to the clients.
-
-        Raises
-        ------
-        OutputError
-            When the process of the doors has ended.
-        """
+        """Show a packed frame to the clients. Raises OutputError when the process of the doors has ended."""
         self._frames.write(frame)
         try:
             os.write(self._wake, b".")

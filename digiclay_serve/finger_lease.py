@@ -28,13 +28,7 @@ class Lease:
 def claim(lease: Lease, client: object, now: float) -> tuple[bool, Lease]:
     """Return whether a client may move the fingertip now, and the lease after that.
 
-    Parameters
-    ----------
-    lease : Lease
-    client : object
-        Anything that is equal for one client only.
-    now : float
-        By a clock that never goes back, s.
+    `client`: anything that is equal for one client only; `now`: by a clock that never goes back, s.
     """
     if lease.holder not in (None, client) and now < lease.until:
         return False, lease
@@ -42,11 +36,5 @@ def claim(lease: Lease, client: object, now: float) -> tuple[bool, Lease]:
 
 
 def release(lease: Lease, client: object) -> Lease:
-    """Return the lease after a client has gone.
-
-    Parameters
-    ----------
-    lease : Lease
-    client : object
-    """
+    """Return the lease after a client has gone."""
     return Lease() if lease.holder == client else lease

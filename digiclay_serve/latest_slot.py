@@ -42,13 +42,7 @@ class LatestSlot:
         return len(self._memory) - HEAD
 
     def write(self, value: bytes) -> None:
-        """Put a value in the place of the last one.
-
-        Raises
-        ------
-        ValueError
-            When it has another size.
-        """
+        """Put a value in the place of the last one. Raises ValueError when it has another size."""
         if len(value) != self.size:
             raise ValueError(f"a value must have {self.size} bytes (got {len(value)})")
         number = int(self._head[0])
@@ -74,10 +68,7 @@ class LatestSlot:
 def make_slot(size: int) -> tuple[LatestSlot, Path]:
     """Return a new slot, and the file by which another process opens it; remove that file then.
 
-    Parameters
-    ----------
-    size : int
-        Bytes of a value, a multiple of 8.
+    `size`: bytes of a value, a multiple of 8.
     """
     place = MEMORY if MEMORY.is_dir() else None
     with tempfile.NamedTemporaryFile(prefix="digiclay_", dir=place, delete=False) as file:

@@ -113,17 +113,7 @@ class _OscDoor(asyncio.DatagramProtocol):
 async def open_osc(link: DoorLink, host: str, port: int) -> tuple[Any, asyncio.Task[None]]:
     """Open the door; return its transport, and the task that sends frames.
 
-    Parameters
-    ----------
-    link : DoorLink
-    host : str
-    port : int
-        0: chosen by the system.
-
-    Raises
-    ------
-    OSError
-        When the address cannot be used.
+    `port`: 0: chosen by the system. Raises OSError when the address cannot be used.
     """
     loop = asyncio.get_running_loop()
     transport, door = await loop.create_datagram_endpoint(lambda: _OscDoor(link), local_addr=(host, port))

@@ -40,10 +40,7 @@ def read_osc(data: bytes) -> tuple[object, Pose | Reset | Subscription | Paramet
 
     The request of a client without the token is never looked at, so it is checked after that.
 
-    Raises
-    ------
-    ParameterError
-        When it is no OSC message with a token.
+    Raises ParameterError when it is no OSC message with a token.
     """
     rule = "must be an OSC message with the token as its first argument"
     try:

@@ -42,10 +42,7 @@ def _frame(body: bytes) -> bytes:
 def split_frames(data: bytes) -> tuple[list[bytes | None], bytes]:
     """Return the bodies of whole frames, None for each that is damaged, and what is left for later.
 
-    Parameters
-    ----------
-    data : bytes
-        What was left before, and what has come since.
+    `data`: what was left before, and what has come since.
     """
     *whole, rest = data.split(END)
     bodies: list[bytes | None] = []
@@ -60,15 +57,7 @@ def split_frames(data: bytes) -> tuple[list[bytes | None], bytes]:
 def pack_heights(sequence: int, period: int, stroke: float, heights: NDArray[np.floating[Any]]) -> bytes:
     """Write heights as a frame: each as a share of the stroke, in 65,535 counts.
 
-    Parameters
-    ----------
-    sequence : int
-        From 0 to 65,535.
-    period : int
-    stroke : float
-        m.
-    heights : ndarray (n,)
-        m.
+    `sequence`: from 0 to 65,535; `stroke`, m; `heights` (n,), m.
     """
     counts = np.rint(np.clip(heights / stroke, 0.0, 1.0) * FULL).astype("<u2")
     head = HEAD.pack(VERSION, HEIGHTS, sequence) + BODY.pack(period, stroke, len(counts))
@@ -130,13 +119,7 @@ class Ledger:
 def send(ledger: Ledger, now: float, *, busy: bool) -> tuple[int | None, Ledger]:
     """Return the sequence number of a frame to write now, None for none, and the account after it.
 
-    Parameters
-    ----------
-    ledger : Ledger
-    now : float
-        s.
-    busy : bool
-        Whether the line still has bytes to write.
+    `now`, s; `busy`: whether the line still has bytes to write.
     """
     ledger = expire(ledger, now)
     if busy or len(ledger.waiting) >= WINDOW:
@@ -147,29 +130,13 @@ def send(ledger: Ledger, now: float, *, busy: bool) -> tuple[int | None, Ledger]
 
 
 def expire(ledger: Ledger, now: float) -> Ledger:
-    """Return the account with frames that were not acknowledged in time as dropped.
-
-    Parameters
-    ----------
-    ledger : Ledger
-    now : float
-        s.
-    """
+    """Return the account with frames that were not acknowledged in time as dropped. `now`, s."""
     left = {number: at for number, at in ledger.waiting.items() if now - at < LOST}
     return replace(ledger, waiting=left, dropped=ledger.dropped + len(ledger.waiting) - len(left))
 
 
 def acknowledge(ledger: Ledger, body: bytes | None, now: float) -> Ledger:
-    """Return the account after a frame from the display.
-
-    Parameters
-    ----------
-    ledger : Ledger
-    body : bytes or None
-        From `split_frames`.
-    now : float
-        s.
-    """
+    """Return the account after a frame from the display. `body`: from `split_frames`; `now`, s."""
     sequence = None if body is None else read_acknowledgement(body)
     if sequence is None or sequence not in ledger.waiting:
         return replace(ledger, damaged=ledger.damaged + 1)

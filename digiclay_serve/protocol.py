@@ -147,13 +147,7 @@ def check_pose(values: Sequence[object]) -> tuple[float, ...]:
 
 
 def read_json(text: str) -> Pose | Reset | Status:
-    """Read a request in JSON.
-
-    Raises
-    ------
-    ParameterError
-        When it is none.
-    """
+    """Read a request in JSON. Raises ParameterError when it is none."""
     try:
         found: Any = json.loads(text)
     except (ValueError, RecursionError):
@@ -181,13 +175,7 @@ def read_json(text: str) -> Pose | Reset | Status:
 
 
 def read_binary(data: bytes) -> Pose | Reset:
-    """Read a request in binary.
-
-    Raises
-    ------
-    ParameterError
-        When it is none.
-    """
+    """Read a request in binary. Raises ParameterError when it is none."""
     if len(data) < HEAD.size or data[:2] != MARK:
         raise ParameterError("message", "", f"must begin with {MARK.decode()}", repr(data[:8]))
     _, version, kind, number = HEAD.unpack_from(data)
@@ -214,13 +202,7 @@ def pack_frame(frame: Frame) -> bytes:
 
 
 def unpack_frame(data: bytes) -> Frame:
-    """Read a frame in binary.
-
-    Raises
-    ------
-    ParameterError
-        When it is none.
-    """
+    """Read a frame in binary. Raises ParameterError when it is none."""
     start = HEAD.size + BODY.size
     mark, version, kind, pins = HEAD.unpack_from(data) if len(data) >= start else (b"", 0, 0, 0)
     if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) != start + 8 * pins:

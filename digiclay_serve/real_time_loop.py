@@ -72,19 +72,8 @@ def run_session(
 ) -> tuple[Session, dict[str, Any]]:
     """Run a session in real time until it is to stop; return it, and the figures of its deadlines.
 
-    Parameters
-    ----------
-    session : Session
-        Used up.
-    doors : Doors
-    writer : PartWriter or None
-        Of a take.
-    part : float
-        Duration of a part of it, s.
-    stopped : callable
-        Whether to stop.
-    tell : callable
-        Told what a person has to know, a line at a time.
+    `session`: used up; `writer`: of a take; `part`: duration of a part of it, s; `stopped`: whether to stop;
+    `tell`: told what a person has to know, a line at a time.
     """
     sys.setswitchinterval(SWITCH)
     room = max(1, round(part / session.system.period))

@@ -79,10 +79,7 @@ class Session:
 def begin_session(scene: Scene, limits: Limits = LIMITS) -> Session:
     """Begin a session at rest, its fingertip where the path of the scene begins.
 
-    Raises
-    ------
-    DigiclayError
-        When the scene's parts do not go together.
+    Raises DigiclayError when the scene's parts do not go together.
     """
     return _begin_at_rest(scene, assemble(scene), limits)
 
@@ -100,16 +97,8 @@ def follow(session: Session, target: Floats, number: int, count: int) -> Session
 
     A session that diverges goes back to a state it has kept, with the fingertip there; its recording too.
 
-    Parameters
-    ----------
-    session : Session
-        Used up.
-    target : ndarray (7,)
-        Lowest point, m, and unit quaternion, finite.
-    number : int
-        Of the pose.
-    count : int
-        Control periods, at least 1.
+    `session`: used up; `target` (7,), lowest point, m, and unit quaternion, finite; `number`: of the pose;
+    `count`: control periods, at least 1.
     """
     system = session.system
     if session.refused is not None and np.array_equal(target, session.refused):
@@ -162,14 +151,7 @@ def reset(session: Session) -> Session:
 
 
 def record(session: Session, room: int) -> Session:
-    """Begin to record.
-
-    Parameters
-    ----------
-    session : Session
-    room : int
-        Control periods for which there is room at once.
-    """
+    """Begin to record. `room`: control periods for which there is room at once."""
     now = snapshot.dump(session.system, session.state)
     period = session.state.period
     started = Recording.begin(now, period, session.pose[None], 0, room + 1)

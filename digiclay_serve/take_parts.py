@@ -66,11 +66,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
     def put(self, take: Take, *, last: bool = False) -> None:
         """Hand over a part without waiting for the disk; after a failure nothing is written any more.
 
-        Parameters
-        ----------
-        take : Take
-        last : bool
-            Whether the next part begins elsewhere, as after a reset.
+        `last`: whether the next part begins elsewhere, as after a reset.
         """
         if self.failure:
             return
@@ -129,15 +125,8 @@ class PartWriter(AbstractContextManager["PartWriter"]):
 def join_parts(parts: Sequence[Take]) -> Take:
     """Return one take of parts that follow each other.
 
-    Parameters
-    ----------
-    parts : sequence of Take
-        Oldest first, at least one.
-
-    Raises
-    ------
-    OutputError
-        When one does not begin with the state the last one ends with.
+    `parts`: oldest first, at least one. Raises OutputError when one does not begin with the state the last
+    one ends with.
     """
     first, *others = parts
     end, poses = first.end, [first.poses]

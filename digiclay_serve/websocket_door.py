@@ -63,12 +63,7 @@ class Wishes:
 
 
 def read_wishes(path: str) -> Wishes:
-    """Read the address of a request, ``/?format=binary&rate=1000``.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read the address of a request, ``/?format=binary&rate=1000``. Raises ParameterError."""
     try:
         address = urlsplit(path)
         given = dict(parse_qsl(address.query, keep_blank_values=True, max_num_fields=8))

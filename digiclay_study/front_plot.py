@@ -31,24 +31,9 @@ def draw_front(
 ) -> Figure:
     """Draw the trials over two outputs; the first one upwards, the second one to the right.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Two keys of `evaluation.FIGURES`.
-    values : ndarray (points, 2)
-        Of the unchanged scene, and of all trials; SI; infinite where there are none.
-    sound : ndarray of bool (points,)
-        Which keep the fingertip.
-    front : ndarray of int
-        Points of the front.
-    chosen : int
-        The chosen one of them.
-    title : str
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Its axes, by label: ``front``.
+    `names`: two keys of `evaluation.FIGURES`; `values` (points, 2), of the unchanged scene, and of all
+    trials; SI; infinite where there are none; `sound` bool (points,), which keep the fingertip; `front`:
+    points of the front; `chosen`: the chosen one of them. Returns its axes, by label: ``front``.
     """
     units = [read_unit(FIGURES[name][0], values[sound, number]) for number, name in enumerate(names)]
     shown = values * [factor for factor, _ in units]

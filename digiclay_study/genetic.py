@@ -35,17 +35,7 @@ def propose_generations(
     The same outcomes lead to the same generations: a search that is told kept outcomes from its beginning
     goes on as if it had never stopped.
 
-    Parameters
-    ----------
-    parameters : int
-    population : int
-        Points of a generation, at least 2.
-    seed : int
-
-    Yields
-    ------
-    ndarray, shape (population, parameters)
-        Shares, from 0 to 1.
+    `population`: points of a generation, at least 2. Yields (population, parameters), shares, from 0 to 1.
     """
     import optuna
     from optuna.samplers.nsgaii import PolynomialMutation, SBXCrossover

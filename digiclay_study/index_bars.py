@@ -26,18 +26,8 @@ FARTHEST = (-0.4, 1.4)
 def draw_indices(keys: Sequence[str], found: Mapping[str, Indices | None], title: str) -> Figure:
     """Draw first-order and total indices of each output; parameters with the largest totals are at the top.
 
-    Parameters
-    ----------
-    keys : sequence of str
-        The varied parameters.
-    found : mapping
-        Indices by output; None for one that does not vary, which has an empty panel.
-    title : str
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Its axes, by label: the outputs.
+    `keys`: the varied parameters; `found`: indices by output; None for one that does not vary, which has an
+    empty panel. Returns its axes, by label: the outputs.
     """
     totals = [one.total for one in found.values() if one is not None]
     low, high = _find_ends([one for one in found.values() if one is not None])

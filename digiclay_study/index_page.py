@@ -79,14 +79,7 @@ def format_index_table(findings: Findings) -> str:
 
 
 def format_page(findings: Findings, pictures: Sequence[str]) -> str:
-    """Return the page of a study in Markdown.
-
-    Parameters
-    ----------
-    findings : Findings
-    pictures : sequence of str
-        Files beside it.
-    """
+    """Return the page of a study in Markdown. `pictures`: files beside it."""
     return "\n".join(_write(findings, pictures)) + "\n"
 
 

@@ -39,20 +39,9 @@ class Indices:
 def compute_indices(values: Floats, parameters: int, seed: int, *, second: bool) -> Indices | None:
     """Return the Sobol indices of an output at the points of `sampling.sample_shares`.
 
-    Parameters
-    ----------
-    values : ndarray (points,)
-        In the order of the points; finite.
-    parameters : int
-    seed : int
-        Of the bootstrap, at least 1: SALib takes 0 for none.
-    second : bool
-        As at the sampling.
-
-    Returns
-    -------
-    Indices or None
-        None for an output that does not vary, or varies by rounding alone: its variance has no shares.
+    `values` (points,), in the order of the points; finite; `seed`: of the bootstrap, at least 1: SALib takes
+    0 for none; `second`: as at the sampling. Returns none for an output that does not vary, or varies by
+    rounding alone: its variance has no shares.
     """
     from SALib.analyze import sobol
 

@@ -13,10 +13,7 @@ def find_front(values: Floats) -> NDArray[np.intp]:
     A point dominates another if it is at most as large in both outputs, and less in one. Of equal points the
     first one is returned.
 
-    Parameters
-    ----------
-    values : ndarray (points, 2)
-        Points with a NaN are on no front.
+    `values` (points, 2), points with a NaN are on no front.
     """
     known = np.flatnonzero(~np.isnan(values).any(axis=1))
     order = known[np.lexsort((values[known, 1], values[known, 0]))]
@@ -34,10 +31,7 @@ def find_knee(front: Floats) -> int:
     With both outputs scaled to 0 to 1 over the front, the ends are (0, 1) and (1, 0), and that point has the
     least sum. It is the place where less of one output begins to cost much of the other.
 
-    Parameters
-    ----------
-    front : ndarray (k, 2)
-        Of at least one point, ordered by the first output.
+    `front` (k, 2), of at least one point, ordered by the first output.
     """
     extent = np.ptp(front, axis=0)
     scaled = (front - front.min(axis=0)) / np.where(extent > 0.0, extent, 1.0)

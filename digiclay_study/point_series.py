@@ -38,19 +38,8 @@ UNCHANGED = 0
 def open_folder(path: Path, name: str, subject: Subject, plan: Mapping[str, Any]) -> Iterator[Folder]:
     """Make the folder of a series, or go on with one of the same plan; nobody else works in it meanwhile.
 
-    Parameters
-    ----------
-    path : Path
-    name : str
-        Kind of the series: study.
-    subject : Subject
-    plan : mapping
-        What else the points depend on.
-
-    Raises
-    ------
-    OutputError
-        When it holds anything else, cannot be written, or another process works in it.
+    `name`: kind of the series: study; `plan`: what else the points depend on. Raises OutputError when it
+    holds anything else, cannot be written, or another process works in it.
     """
     unchanged = Point(UNCHANGED, (), subject.scene)
     description = {
@@ -98,10 +87,7 @@ class Evaluation:
     def evaluate_unchanged(self) -> Record | None:
         """Return the record of the unchanged scene; None after a stop.
 
-        Raises
-        ------
-        DigiclayError
-            When the scene itself fails.
+        Raises DigiclayError when the scene itself fails.
         """
         point = Point(UNCHANGED, (), self._subject.scene)
         self.evaluate([(point,)], ())
@@ -115,11 +101,7 @@ class Evaluation:
 
         These are not kept: the same command tries them again.
 
-        Parameters
-        ----------
-        bundles : sequence of sequence of Point
-        keys : sequence of str
-            The varied parameters.
+        `keys`: the varied parameters.
         """
         failed: dict[int, Record] = {}
 
@@ -147,18 +129,8 @@ def open_evaluation(
 ) -> Iterator[Evaluation]:
     """Open the pool of the options, with a progress line of all points.
 
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-    name : str
-        Kind of the series, at the beginning of the line.
-    subject : Subject
-    folder : Folder
-    pieces : int
-        Most bundles at a time.
-    total : int
-        Points of the series, the unchanged scene included.
-    stop : Stop
+    `name`: kind of the series, at the beginning of the line; `pieces`: most bundles at a time; `total`:
+    points of the series, the unchanged scene included.
     """
     records = select_done(folder.read_records(), errors=subject.errors)
     bar = Counted(sys.stderr, name, "points", len(records))
@@ -172,15 +144,7 @@ def open_evaluation(
 
 
 def describe_stop(path: Path, done: int, total: int) -> str:
-    """Return what a stopped command leaves.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-    done, total : int
-        Points.
-    """
+    """Return what a stopped command leaves. `path`: the folder; `done`, `total`: points."""
     said = f"{done} of {total} points are done and kept in {path}"
     return f"Stopped: {said}. The same command goes on from there."
 
@@ -194,15 +158,7 @@ def write_points(
 ) -> None:
     """Write a table of points, in SI units; the unchanged scene has its own values.
 
-    Parameters
-    ----------
-    path : Path
-    subject : Subject
-    points : sequence of Point
-    records : mapping of int to Record
-        Of these points at least, by their index.
-    extra : sequence of str
-        More outputs than those of the subject.
+    `records`: of these points at least, by their index; `extra`: more outputs than those of the subject.
     """
     own = tuple(find_value(subject.scene, one.key, "") for one in subject.ranges)
     rows = [

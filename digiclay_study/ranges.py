@@ -81,10 +81,7 @@ class Range:
 def read_range(said: str) -> Range:
     """Read a varied parameter and its range: ``control.force_gain=0.5:8:log``.
 
-    Raises
-    ------
-    ParameterError
-        In one line: key, rule, value.
+    Raises ParameterError: in one line: key, rule, value.
     """
     key, _, values = (part.strip() for part in said.partition("="))
     if not key or not values:
@@ -121,18 +118,8 @@ def read_range(said: str) -> Range:
 def fit_ranges(ranges: Sequence[Range], path: Path, settings: Sequence[Setting]) -> list[Range]:
     """Return ranges as the scene's parameters have them: whole numbers, and units.
 
-    Parameters
-    ----------
-    ranges : sequence of Range
-    path : Path
-        The scene's file.
-    settings : sequence of Setting
-        What is changed of it at every point.
-
-    Raises
-    ------
-    ParameterError, SceneError
-        In one line, where a parameter is unknown, given twice, or cannot have the ends of its range.
+    `path`: the scene's file; `settings`: what is changed of it at every point. Raises ParameterError,
+    SceneError: in one line, where a parameter is unknown, given twice, or cannot have the ends of its range.
     """
     scene = load(path, settings)
     keys = [one.key for one in ranges]

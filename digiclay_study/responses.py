@@ -47,16 +47,8 @@ class Response:
 def find_excess_losses(records: Sequence[Record], reference: Record) -> Floats:
     """Return by how much the loss of contact of each run exceeds what is allowed, shape (points,).
 
-    Parameters
-    ----------
-    records : sequence of Record
-    reference : Record
-        Of the unchanged scene.
-
-    Returns
-    -------
-    ndarray
-        Above 0 for a run that loses the fingertip; NaN for one that failed or never touches.
+    `reference`: of the unchanged scene. Returns above 0 for a run that loses the fingertip; NaN for one that
+    failed or never touches.
     """
     usual = reference["figures"].get(LOSS) or 0.0
     shares = np.array([get_figure(record, LOSS) for record in records])
@@ -69,18 +61,8 @@ def make_response(name: str, records: Sequence[Record], excess: Floats) -> Respo
     Left out they would leave holes in the design of a study; at their own values runs that touch for a moment
     only would count as good.
 
-    Parameters
-    ----------
-    name : str
-        A key of `evaluation.FIGURES`.
-    records : sequence of Record
-    excess : ndarray (points,)
-        From `find_excess_losses`.
-
-    Raises
-    ------
-    OutputError
-        When no run has such a value.
+    `name`: a key of `evaluation.FIGURES`; `excess` (points,), from `find_excess_losses`. Raises OutputError
+    when no run has such a value.
     """
     values = np.array([get_figure(record, name) for record in records])
     absent = np.isnan(values)
@@ -95,12 +77,6 @@ def make_response(name: str, records: Sequence[Record], excess: Floats) -> Respo
 
 
 def get_figure(record: Record, name: str) -> float:
-    """Return a figure of a record; NaN where there is none.
-
-    Parameters
-    ----------
-    record : Record
-    name : str
-    """
+    """Return a figure of a record; NaN where there is none."""
     value = record.get("figures", {}).get(name)
     return np.nan if value is None else float(value)

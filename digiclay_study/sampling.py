@@ -18,13 +18,7 @@ def describe_problem(parameters: int) -> dict[str, Any]:
 def count_points(samples: int, parameters: int, *, second: bool) -> int:
     """Return how many points a design has.
 
-    Parameters
-    ----------
-    samples : int
-        Of the Sobol sequence.
-    parameters : int
-    second : bool
-        Whether second-order indices are computed.
+    `samples`: of the Sobol sequence; `second`: whether second-order indices are computed.
     """
     return samples * (2 * parameters + 2 if second else parameters + 2)
 
@@ -35,20 +29,8 @@ def sample_shares(samples: int, parameters: int, seed: int, *, second: bool) -> 
     Each sample gives a block of points: A, A with one parameter of B each, for the second order B with one
     parameter of A each, and B. A and B are halves of a scrambled Sobol point.
 
-    Parameters
-    ----------
-    samples : int
-        A power of two, for the balance of the Sobol sequence.
-    parameters : int
-    seed : int
-        Of the scrambling, at least 1.
-    second : bool
-        Whether second-order indices are computed.
-
-    Returns
-    -------
-    ndarray, shape (points, parameters)
-        In [0, 1).
+    `samples`: a power of two, for the balance of the Sobol sequence; `seed`: of the scrambling, at least 1;
+    `second`: whether second-order indices are computed. Returns (points, parameters), in [0, 1).
     """
     from SALib.sample import sobol
 

@@ -57,11 +57,7 @@ class Subject:
 def add_subject(parser: argparse.ArgumentParser, metrics: str) -> None:
     """Add the options by which `read_subject` finds what is varied and measured, and where.
 
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser
-    metrics : str
-        Default of --metric.
+    `metrics`: default of --metric.
     """
     add_scene(parser)
     parser.add_argument(
@@ -76,12 +72,7 @@ def add_subject(parser: argparse.ArgumentParser, metrics: str) -> None:
 
 
 def read_count(least: int, most: int) -> Callable[[str], int]:
-    """Return what reads a whole number within bounds.
-
-    Parameters
-    ----------
-    least, most : int
-    """
+    """Return what reads a whole number within bounds."""
 
     def read(text: str) -> int:
         if not text.isdecimal() or not least <= int(text) <= most:
@@ -94,10 +85,7 @@ def read_count(least: int, most: int) -> Callable[[str], int]:
 def read_subject(arguments: argparse.Namespace) -> Subject:
     """Return what the options vary and measure.
 
-    Raises
-    ------
-    ParameterError, SceneError, OutputError
-        In one line.
+    Raises ParameterError, SceneError, OutputError: in one line.
     """
     names = tuple(dict.fromkeys(find_figure(word.strip()) for word in arguments.metric.split(",")))
     path, settings = find(arguments.scene), settings_of(arguments)
@@ -109,14 +97,7 @@ def read_subject(arguments: argparse.Namespace) -> Subject:
 
 
 def refuse_too_many(option: str, points: int) -> None:
-    """Refuse a plan of more points than a sweep may have.
-
-    Parameters
-    ----------
-    option : str
-        That is to blame.
-    points : int
-    """
+    """Refuse a plan of more points than a sweep may have. `option`: that is to blame."""
     if points > MOST:
         raise ParameterError(option, "", f"must come to {MOST} points at most", f"{points} points")
 
@@ -124,14 +105,8 @@ def refuse_too_many(option: str, points: int) -> None:
 def make_points(subject: Subject, shares: NDArray[Any], first: int, progress: Any = None) -> list[Point]:
     """Return the points at shares of the ranges.
 
-    Parameters
-    ----------
-    subject : Subject
-    shares : ndarray (points, parameters)
-    first : int
-        Index of the first point.
-    progress : callable, optional
-        Told how many points are made, and of how many.
+    `shares` (points, parameters); `first`: index of the first point; `progress` callable, optional, told how
+    many points are made, and of how many.
     """
     rows = [
         tuple(one.find_word(share) for one, share in zip(subject.ranges, row, strict=True)) for row in shares

@@ -52,10 +52,7 @@ class Trials:
     def find_front(self) -> NDArray[np.intp]:
         """Return the runs on the front, ordered by the first output.
 
-        Raises
-        ------
-        OutputError
-            When no run keeps the fingertip and has both outputs.
+        Raises OutputError when no run keeps the fingertip and has both outputs.
         """
         front = find_front(np.where(self.sound[:, None], self.values, np.nan))
         if not front.size:
@@ -66,13 +63,7 @@ class Trials:
 def judge_trials(names: Sequence[str], records: Sequence[Record], reference: Record) -> Trials:
     """Return the trials that records are of.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Two keys of `evaluation.FIGURES`.
-    records : sequence of Record
-    reference : Record
-        Of the unchanged scene.
+    `names`: two keys of `evaluation.FIGURES`; `reference`: of the unchanged scene.
     """
     values = np.array([[get_figure(record, name) for name in names] for record in records])
     excess = find_excess_losses(records, reference)

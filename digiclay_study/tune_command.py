@@ -104,10 +104,7 @@ def _evolve(
 
     After a stop the generation that is not complete is missing.
 
-    Raises
-    ------
-    OutputError
-        When no worker survives a point: without it the next generation would be another one.
+    Raises OutputError when no worker survives a point: without it the next generation would be another one.
     """
     size, done = arguments.population, list[Point]()
     generations = propose_generations(len(subject.ranges), size, arguments.seed)

@@ -34,14 +34,7 @@ def carry_out(*words: str | Path) -> None:
 
 
 def save_jpeg(picture: Path, name: str) -> None:
-    """Write a picture into the docs as a JPEG.
-
-    Parameters
-    ----------
-    picture : Path
-    name : str
-        Its name there.
-    """
+    """Write a picture into the docs as a JPEG. `name`: its name there."""
     with Image.open(picture) as opened:
         opened.convert("RGB").save(PICTURES / name, quality=88, optimize=True)
 

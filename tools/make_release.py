@@ -47,21 +47,9 @@ def write_texts(folder: Path, version: str) -> None:
 def publish(made: Path, folder: Path, version: str, commit: str) -> None:
     """Put the files in place and tag the commit, both or neither.
 
-    Parameters
-    ----------
-    made : Path
-        Folder of the files, which is moved.
-    folder : Path
-        Where they are to be.
-    version, commit : str
-        Of the release.
-
-    Raises
-    ------
-    ReleaseError
-        When the tag cannot be made, or a signal has come before.
-    OSError
-        When the folder cannot be moved.
+    `made`: folder of the files, which is moved; `folder`: where they are to be; `version`, `commit`: of the
+    release. Raises ReleaseError when the tag cannot be made, or a signal has come before. Raises OSError when
+    the folder cannot be moved.
     """
     for number in SIGNALS:  # it takes an instant, and is not to be stopped between the two
         signal.signal(number, signal.SIG_IGN)
@@ -82,10 +70,7 @@ def _head() -> str:
 def release(version: str) -> Path:
     """Make a release of the current commit; return the folder of its files.
 
-    Raises
-    ------
-    ReleaseError
-        When there is none; then there is neither a tag nor a folder.
+    Raises ReleaseError when there is none; then there is neither a tag nor a folder.
     """
     folder = ROOT / "dist" / f"digiclay-{version}"
     obstacles = find_obstacles(ROOT, version, folder)

@@ -50,20 +50,8 @@ def refuse_stopped() -> None:
 def carry_out(command: Sequence[str | Path], folder: Path, added: dict[str, str], umask: int) -> None:
     """Run a command and whatever it starts to its end.
 
-    Parameters
-    ----------
-    command : list
-    folder : Path
-        Where it works.
-    added : dict
-        To the environment.
-    umask : int
-        Modes that new files do not get.
-
-    Raises
-    ------
-    ReleaseError
-        When it fails; what it printed goes to standard error. When a signal comes.
+    `folder`: where it works; `added`: to the environment; `umask`: modes that new files do not get. Raises
+    ReleaseError when it fails; what it printed goes to standard error. When a signal comes.
     """
     refuse_stopped()
     with tempfile.TemporaryFile() as output:
@@ -97,18 +85,8 @@ def carry_out(command: Sequence[str | Path], folder: Path, added: dict[str, str]
 def build(source: Path, out: Path, instant: int, added: dict[str, str], umask: int) -> None:
     """Build zip, wheel and source archive of a checkout.
 
-    Parameters
-    ----------
-    source : Path
-        The checkout; changed by the build.
-    out : Path
-        Folder of the three files.
-    instant : int
-        Time of all files in them, s since 1970 UTC.
-    added : dict
-        To the environment.
-    umask : int
-        Of the build.
+    `source`: the checkout; changed by the build; `out`: folder of the three files; `instant`: time of all
+    files in them, s since 1970 UTC; `added`: to the environment; `umask`: of the build.
     """
     added = {**added, "SOURCE_DATE_EPOCH": str(instant), "PYTHONPATH": ""}
     carry_out([sys.executable, source / "tools/extension.py", "--out", out], source, added, umask)
@@ -123,19 +101,8 @@ def build(source: Path, out: Path, instant: int, added: dict[str, str], umask: i
 def build_twice(scratch: Path, commit: str, instant: int) -> Path:
     """Build a commit in two folders and under different circumstances; return the first folder of files.
 
-    Parameters
-    ----------
-    scratch : Path
-        Folder for all of it.
-    commit : str
-        Of this repository.
-    instant : int
-        Time of the commit, s since 1970 UTC.
-
-    Raises
-    ------
-    ReleaseError
-        When a build fails, or the files of the two are not equal byte by byte.
+    `scratch`: folder for all of it; `commit`: of this repository; `instant`: time of the commit, s since 1970
+    UTC. Raises ReleaseError when a build fails, or the files of the two are not equal byte by byte.
     """
     made = []
     extension.wheels()  # fetched once
@@ -160,17 +127,8 @@ def build_twice(scratch: Path, commit: str, instant: int) -> Path:
 def check_files(folder: Path, version: str) -> None:
     """Check names, versions and size of the files, and how a package index would show them.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the three files.
-    version : str
-        That they must have.
-
-    Raises
-    ------
-    ReleaseError
-        For the first file that is wrong.
+    `folder`: of the three files; `version`: that they must have. Raises ReleaseError for the first file that
+    is wrong.
     """
     wheel, source = f"digiclay-{version}-py3-none-any.whl", f"digiclay-{version}.tar.gz"
     wanted = {f"digiclay-{version}.zip", wheel, source}

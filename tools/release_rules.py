@@ -116,19 +116,8 @@ def _find_in_reports(root: Path) -> list[str]:
 def find_obstacles(root: Path, version: str, folder: Path) -> list[str]:
     """Return all that stands in the way of a release.
 
-    Parameters
-    ----------
-    root : Path
-        The checkout.
-    version : str
-        To be released, such as ``0.1.0``.
-    folder : Path
-        Where the files are to be.
-
-    Returns
-    -------
-    list of str
-        A line each; empty when nothing does.
+    `root`: the checkout; `version`: to be released, such as ``0.1.0``; `folder`: where the files are to be.
+    Returns a line each; empty when nothing does.
     """
     if not VERSION.fullmatch(version):
         return [f"the version must be three numbers such as 0.1.0 (got {version!r})."]

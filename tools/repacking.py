@@ -19,12 +19,8 @@ ZIPPED_FILE, ZIPPED_FOLDER = (0o100000 | FILE) << 16, (0o040000 | FOLDER) << 16 
 def repack_zip(archive: Path, instant: int) -> None:
     """Write a zip or a wheel again, the same files in a fixed form.
 
-    Parameters
-    ----------
-    archive : Path
-        Replaced when all is written.
-    instant : int
-        Time of every file, s since 1970 UTC, below `LATEST`; before 1980 it counts as 1980.
+    `archive`: replaced when all is written; `instant`: time of every file, s since 1970 UTC, below `LATEST`;
+    before 1980 it counts as 1980.
     """
     when = time.gmtime(max(instant, EARLIEST))[:6]
     made = archive.with_name(f"{archive.name}.new")
@@ -42,12 +38,7 @@ def repack_zip(archive: Path, instant: int) -> None:
 def repack_tar(archive: Path, instant: int) -> None:
     """Write a .tar.gz again, the same files in a fixed form, owned by root.
 
-    Parameters
-    ----------
-    archive : Path
-        Replaced when all is written.
-    instant : int
-        Time of every file, s since 1970 UTC.
+    `archive`: replaced when all is written; `instant`: time of every file, s since 1970 UTC.
     """
     packed = io.BytesIO()
     with (

@@ -156,14 +156,7 @@ def _first_line(package: str) -> str:
 
 
 def make_package_page(package: str, modules: list[str]) -> str:
-    """Return the page of a package: its modules by their docstrings.
-
-    Parameters
-    ----------
-    package : str
-        Dotted name.
-    modules : list of str
-    """
+    """Return the page of a package: its modules by their docstrings. `package`: dotted name."""
     lines = [BEHIND, f"# {package}", "", _first_line(package), ""]
     for module in modules:
         lines += [f"::: {package}.{module}", ""]
@@ -188,13 +181,7 @@ def find_place(path: str) -> str:
 def relink(text: str, source: str, page: str) -> str:
     """Return Markdown whose links to files lead to their places in the site; without one they become text.
 
-    Parameters
-    ----------
-    text : str
-    source : str
-        File of the text in the repository.
-    page : str
-        Its place in the site.
+    `source`: file of the text in the repository; `page`: its place in the site.
     """
 
     def place(found: re.Match[str]) -> str:

@@ -36,13 +36,7 @@ ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np
 def mesh(name: str, shape: Shape, smooth_below: float = 0.6) -> Any:
     """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad.
 
-    Parameters
-    ----------
-    name : str
-    shape : Shape
-        Lengths in Blender units.
-    smooth_below : float
-        rad.
+    `shape`: lengths in Blender units; `smooth_below`, rad.
     """
     vertices, faces = shape
     made = bpy.data.meshes.new(name)
@@ -53,13 +47,7 @@ def mesh(name: str, shape: Shape, smooth_below: float = 0.6) -> Any:
 
 
 def points(name: str, count: int) -> Any:
-    """Make a mesh of `count` loose vertices with the attributes of a bed.
-
-    Parameters
-    ----------
-    name : str
-    count : int
-    """
+    """Make a mesh of `count` loose vertices with the attributes of a bed."""
     made = bpy.data.meshes.new(name)
     made.vertices.add(count)
     for attribute, (kind, _, _) in ATTRIBUTES.items():
@@ -115,13 +103,8 @@ def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
 def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
     """Put the fingertip to a pose, and give its ellipsoid the size of the finger.
 
-    Parameters
-    ----------
-    tip : bpy.types.Object
-        The empty, in the space of its bed.
-    at : ndarray (7,)
-        Lowest point, m, and quaternion w, x, y, z.
-    finger : Fingertip
+    `tip` bpy.types.Object, the empty, in the space of its bed; `at` (7,), lowest point, m, and quaternion w,
+    x, y, z.
     """
     move_fingertip(tip, at, finger)
     resize_fingertip(tip, finger)
@@ -130,14 +113,8 @@ def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
 def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
     """Put the fingertip to a pose; the size of its ellipsoid stays.
 
-    Parameters
-    ----------
-    tip : bpy.types.Object
-        The empty, in the space of its bed.
-    at : ndarray (7,)
-        Lowest point, m, and quaternion w, x, y, z.
-    finger : Fingertip
-        Of that size.
+    `tip` bpy.types.Object, the empty, in the space of its bed; `at` (7,), lowest point, m, and quaternion w,
+    x, y, z; `finger`: of that size.
     """
     tip.matrix_parent_inverse.identity()
     tip.rotation_mode = "QUATERNION"
@@ -149,11 +126,7 @@ def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
 def resize_fingertip(tip: Any, finger: Fingertip) -> None:
     """Give the ellipsoid in a fingertip the finger's semi-axes, and the empty a size to be seen about it.
 
-    Parameters
-    ----------
-    tip : bpy.types.Object
-        The empty.
-    finger : Fingertip
+    `tip` bpy.types.Object, the empty.
     """
     axes = np.array([finger.length, finger.width, finger.height])
     tip[AXES] = axes.tolist()
@@ -174,15 +147,8 @@ def pose(tip: Any) -> Floats:
     Reads `matrix_world`, which is live while the user drags the fingertip by whatever means.
     Only where it is and how it is turned count; its scale does not.
 
-    Parameters
-    ----------
-    tip : bpy.types.Object
-        The empty, child of its bed; it is the ellipsoid's center.
-
-    Raises
-    ------
-    DigiclayError
-        When the bed is not uniformly scaled.
+    `tip` bpy.types.Object, the empty, child of its bed; it is the ellipsoid's center. Raises DigiclayError
+    when the bed is not uniformly scaled.
     """
     bed = tip.parent
     uniform(bed)
@@ -197,11 +163,8 @@ def pose(tip: Any) -> Floats:
 def uniform(bed: Any) -> float:
     """Return how much larger than its drawing unit a bed stands in the world.
 
-    Raises
-    ------
-    DigiclayError
-        When the bed, or what it is parented to, is scaled differently along its axes, sheared,
-        mirrored, or scaled to nothing: lengths in it would mean nothing.
+    Raises DigiclayError when the bed, or what it is parented to, is scaled differently along its axes,
+    sheared, mirrored, or scaled to nothing: lengths in it would mean nothing.
     """
     fault = find_scale_fault(bed)
     if fault:
@@ -238,12 +201,7 @@ def _judge_scale(rows: tuple[tuple[float, ...], ...]) -> tuple[float, str]:
 def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
     """Return an sRGB color in the linear light of Blender's materials.
 
-    Parameters
-    ----------
-    color : (float, float, float)
-        sRGB, 0 to 1.
-    alpha : float
-        0 to 1.
+    `color` (float, float, float), sRGB, 0 to 1; `alpha`: 0 to 1.
     """
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return r, g, b, alpha

@@ -21,10 +21,7 @@ CORES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_M
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; return its exit code: 0, 2 for what a user can mend, 130 when stopped.
 
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        The arguments; by default those of the process.
+    `argv`: the arguments; by default those of the process.
     """
     return carry_out(lambda: _parsed(argv))
 

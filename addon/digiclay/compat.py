@@ -47,11 +47,7 @@ def shader_nodes(owner: Any) -> Any:
 def node_setting(modifier: Any, name: str) -> Any:
     """Return what a geometry nodes modifier sets an input of its tree to.
 
-    Parameters
-    ----------
-    modifier : bpy.types.NodesModifier
-    name : str
-        Of the input.
+    `modifier` bpy.types.NodesModifier; `name`: of the input.
     """
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):  # from 5.2 on; before that the modifier itself is the dictionary
@@ -62,11 +58,7 @@ def node_setting(modifier: Any, name: str) -> Any:
 def read_stored(owner: Any, name: str) -> dict[str, Any]:
     """Return all that is stored in a property group of an object, nested; what was never set is not in it.
 
-    Parameters
-    ----------
-    owner : bpy.types.ID
-    name : str
-        Of the group.
+    `owner` bpy.types.ID; `name`: of the group.
     """
     # From 5.0 on these values are kept apart from the custom properties.
     kept = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
@@ -77,13 +69,7 @@ def read_stored(owner: Any, name: str) -> dict[str, Any]:
 def set_node_setting(modifier: Any, name: str, value: Any) -> None:
     """Set an input of a geometry nodes modifier's tree, for the object that has the modifier.
 
-    Parameters
-    ----------
-    modifier : bpy.types.NodesModifier
-    name : str
-        Of the input.
-    value : object
-        Of the input's kind.
+    `modifier` bpy.types.NodesModifier; `name`: of the input; `value`: of the input's kind.
     """
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
@@ -96,12 +82,7 @@ def set_node_setting(modifier: Any, name: str, value: Any) -> None:
 def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
     """Insert a keyframe for an input of a geometry nodes modifier's tree, at its present value.
 
-    Parameters
-    ----------
-    modifier : bpy.types.NodesModifier
-    name : str
-        Of the input.
-    frame : int
+    `modifier` bpy.types.NodesModifier; `name`: of the input.
     """
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):

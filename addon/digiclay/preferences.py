@@ -168,10 +168,7 @@ class Preferences(bpy.types.AddonPreferences):
 def get(context: Any) -> Any:
     """Return the user's preferences; where the package is used without being enabled, the defaults.
 
-    Returns
-    -------
-    Preferences or Choices
-        With the same attributes.
+    Returns with the same attributes.
     """
     entry = context.preferences.addons.get(__package__)
     return Choices() if entry is None or entry.preferences is None else entry.preferences

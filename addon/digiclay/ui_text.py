@@ -16,10 +16,7 @@ _translate: Callable[[str], str] = _keep
 def set_translator(translate: Callable[[str], str] = _keep) -> None:
     """Set the function by which `localize` translates.
 
-    Parameters
-    ----------
-    translate : callable, optional
-        From a text in English to one in the language of the interface; English when left out.
+    `translate`: from a text in English to one in the language of the interface; English when left out.
     """
     global _translate
     _translate = translate
@@ -28,11 +25,7 @@ def set_translator(translate: Callable[[str], str] = _keep) -> None:
 def localize(text: str, *values: object) -> str:
     """Return a text in the language of the interface, with values in its places.
 
-    Parameters
-    ----------
-    text : str
-        English, with places as for `str.format`; the section *messages* of the catalogs has it.
-    *values : object
+    `text`: English, with places as for `str.format`; the section *messages* of the catalogs has it.
     """
     translated = _translate(text)
     return translated.format(*values) if values else translated

@@ -30,13 +30,8 @@ class Help(argparse.RawDescriptionHelpFormatter):
 def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
     """Add SCENE, or --scene where there is a default, and the options that change it.
 
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser
-    default : str
-        The scene where none is given; empty: one must be given.
-    optional : bool, optional
-        Whether SCENE may be missing, None then.
+    `default`: the scene where none is given; empty: one must be given; `optional`: whether SCENE may be
+    missing, None then.
     """
     said = "a .toml file, a sample's name, or the folder of a run"
     if default:
@@ -99,17 +94,8 @@ def name_methods(varied: str) -> str:
 def load_by_option(word: str, option: str) -> str:
     """Return the name of the method that a word of the command line names; load one of the user's own.
 
-    Parameters
-    ----------
-    word : str
-        Name of a method, or ``path/to/mine.py:Mine``.
-    option : str
-        That has the word, for messages.
-
-    Raises
-    ------
-    MethodError
-        In one line.
+    `word`: name of a method, or ``path/to/mine.py:Mine``; `option`: that has the word, for messages. Raises
+    MethodError: in one line.
     """
     try:
         return load_method(word)
@@ -120,16 +106,8 @@ def load_by_option(word: str, option: str) -> str:
 def add_command(commands: Any, name: str, help: str, epilog: str, said: str = "") -> argparse.ArgumentParser:
     """Add a command; its own help begins with `said`, or with `help` as a sentence.
 
-    Parameters
-    ----------
-    commands : argparse's subparsers
-    name : str
-    help : str
-        In the list of commands.
-    epilog : str
-        Examples.
-    said : str
-        Beginning of the command's own help.
+    `commands` argparse's subparsers; `help`: in the list of commands; `epilog`: examples; `said`: beginning
+    of the command's own help.
     """
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=help, description=said or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
@@ -141,14 +119,7 @@ def add_command(commands: Any, name: str, help: str, epilog: str, said: str = ""
 def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.ArgumentParser:
     """Add a command that works on a finished run.
 
-    Parameters
-    ----------
-    commands : argparse's subparsers
-    name : str
-    help : str
-        In the list of commands.
-    epilog : str
-        Examples.
+    `commands` argparse's subparsers; `help`: in the list of commands; `epilog`: examples.
     """
     parser = add_command(commands, name, help, epilog)
     parser.add_argument("run", metavar="RUN", type=Path, help="run folder of 'digiclay run'")
@@ -160,12 +131,7 @@ def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.Argume
 def told_as_options(*owners: str, **names: str) -> Iterator[None]:
     """Rename parameters of some owners to their options in an error, by equal name or `names`.
 
-    Parameters
-    ----------
-    *owners : str
-        Classes of parameters.
-    **names : str
-        Option of a field where it has another name.
+    `owners`: classes of parameters; `names`: option of a field where it has another name.
     """
     try:
         yield

@@ -108,12 +108,7 @@ class Folder:
     def write_index(self, failed: Mapping[str, str], said: str) -> Path:
         """Write the page about all jobs; `failed` has the reasons by name.
 
-        Parameters
-        ----------
-        failed : mapping of str to str
-            Why jobs have failed, by their names.
-        said : str
-            What is said of all.
+        `failed`: why jobs have failed, by their names; `said`: what is said of all.
         """
         cards = []
         for job in self.batch.jobs:
@@ -167,15 +162,7 @@ class Folder:
 def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
     """Make a batch's folder, or go on with one; nobody else may work in it meanwhile.
 
-    Parameters
-    ----------
-    path : Path
-    batch : JobSeries
-
-    Raises
-    ------
-    OutputError
-        When it holds other things, cannot be written, or another process works in it.
+    Raises OutputError when it holds other things, cannot be written, or another process works in it.
     """
     known = {
         "batch": batch.name, "digiclay": __version__, "jobs": {job.name: job.error for job in batch.jobs},
@@ -187,10 +174,7 @@ def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
 def read_batch(path: Path) -> Folder:
     """Return a batch's folder with the jobs it has, without their definitions.
 
-    Raises
-    ------
-    OutputError
-        When it is none.
+    Raises OutputError when it is none.
     """
     known = read_json(path / MARK)
     if known is None or not isinstance(known.get("batch"), str):
@@ -215,12 +199,7 @@ def _find_series(job: Path) -> Folder | None:
 def note_failure(job: Path, error: str) -> None:
     """Keep for the page why a job has failed that was started by itself, or take back what was noted.
 
-    Parameters
-    ----------
-    job : Path
-        The folder of the job's files.
-    error : str
-        One line; empty when it begins anew.
+    `job`: the folder of the job's files; `error`: one line; empty when it begins anew.
     """
     with suppress(OSError, DigiclayError):  # the job itself matters more
         series = _find_series(job)
@@ -237,10 +216,7 @@ def note_failure(job: Path, error: str) -> None:
 def refresh_page(job: Path) -> None:
     """Write the page of a job's series anew, unless another job has just done so.
 
-    Parameters
-    ----------
-    job : Path
-        The folder of the job's files.
+    `job`: the folder of the job's files.
     """
     with suppress(OSError, DigiclayError):
         series = _find_series(job)

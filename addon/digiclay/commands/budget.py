@@ -17,13 +17,7 @@ from .tables import table
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is.
 
-    Parameters
-    ----------
-    scene : Scene
-    budget : float
-        m.
-    quiet : bool
-        Print nothing.
+    `budget`, m; `quiet`: print nothing.
     """
     with Line(sys.stderr) as line:
         told = None if quiet else lambda said: line.draw(f"trying: {said}")

@@ -56,12 +56,7 @@ class Cluster(Executor):
     def submit(self, task: Callable[..., Any], /, *arguments: Any, **known: Any) -> Future[Any]:
         """Have a worker call a function, and return its result by value.
 
-        Parameters
-        ----------
-        task : callable
-            Of a module that the workers have too.
-        *arguments, **known
-            Handed on to it.
+        `task`: of a module that the workers have too; `arguments`, `known`: handed on to it.
         """
         future: Future[Any] = Future()
         self._send(future, pickle.dumps((task, arguments, known), pickle.HIGHEST_PROTOCOL))
@@ -146,12 +141,7 @@ class Cluster(Executor):
     def wait_for_workers(self, stop: Callable[[], bool], draw: Callable[[str], None]) -> None:
         """Wait for a first worker, visibly.
 
-        Parameters
-        ----------
-        stop : callable
-            Whether somebody asks to stop.
-        draw : callable
-            Told again and again what is waited for.
+        `stop`: whether somebody asks to stop; `draw`: told again and again what is waited for.
         """
         said = self.describe()
         if not self._workers:
@@ -176,10 +166,7 @@ class Cluster(Executor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Release what is left of the tasks: workers stop at the next control period.
 
-        Parameters
-        ----------
-        wait, cancel_futures : bool
-            Without effect: nobody waits, and all are cancelled.
+        `wait`, `cancel_futures`: without effect: nobody waits, and all are cancelled.
         """
         with suppress(Exception):  # the scheduler may be gone
             if self._client.status == "running" and self._remote:
@@ -233,19 +220,9 @@ def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], N
 
     At the end of the block, whatever ends it, the cluster has no task of this process any more.
 
-    Parameters
-    ----------
-    address : str
-        ``tcp://HOST:PORT``, ``tls://HOST:PORT``.
-    stop : callable
-        Whether somebody asks to stop.
-    draw : callable
-        Told again and again what is waited for.
-
-    Raises
-    ------
-    DigiclayError
-        In one line: without a scheduler there, or with other versions.
+    `address`: ``tcp://HOST:PORT``, ``tls://HOST:PORT``; `stop`: whether somebody asks to stop; `draw`: told
+    again and again what is waited for. Raises DigiclayError: in one line: without a scheduler there, or with
+    other versions.
     """
     importlib.import_module("distributed")
     if stop():

@@ -51,16 +51,8 @@ def call_on_worker(packed: bytes, wanted: Versions) -> Any:
 def evaluate_on_worker(bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
     """Evaluate a bundle in a task of a Dask worker, until nobody wants its records any more.
 
-    Parameters
-    ----------
-    bundle : sequence of Point
-    errors : bool
-        Whether their errors are estimated.
-
-    Raises
-    ------
-    Reschedule
-        When the task was taken from the worker while it ran.
+    `errors`: whether their errors are estimated. Raises Reschedule when the task was taken from the worker
+    while it ran.
     """
     from distributed import Reschedule
 

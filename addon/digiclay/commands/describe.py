@@ -48,14 +48,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def description(scene: Scene, system: System) -> Iterator[str]:
-    """Give the lines that describe a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    system : System
-        Assembled from it.
-    """
+    """Give the lines that describe a scene. `system`: assembled from it."""
     yield scene.name + (f": {scene.description.strip()}" if scene.description else "")
     yield f"\nThe line from finger to pins (preset {scene.preset})"
     for place, section in PLACES:
@@ -141,15 +134,7 @@ def _parameters(part: Parameters) -> str:
 
 
 def human(value: object, unit: str) -> str:
-    """Write a value in the unit people read.
-
-    Parameters
-    ----------
-    value : object
-        In SI.
-    unit : str
-        SI unit; empty where there is none.
-    """
+    """Write a value in the unit people read. `value`: in SI; `unit`: SI unit; empty where there is none."""
     factor, name = READ.get(unit, (1.0, unit))
     return f"{value * factor:.6g} {name}".rstrip() if isinstance(value, (int, float)) else str(value)
 

@@ -77,12 +77,7 @@ def formats(text: str) -> list[str]:
 def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
     """Return the names of the files of a kind of mesh in several formats.
 
-    Parameters
-    ----------
-    kinds : iterable of str
-        File formats.
-    kind : str
-        Of the mesh.
+    `kinds`: file formats; `kind`: of the mesh.
     """
     return [f"{STEMS[kind]}{find_suffix(one)}" for one in kinds]
 
@@ -97,17 +92,7 @@ def exported(
 ) -> list[Path]:
     """Write one row of a history in several formats, by default as the solid; return the files.
 
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping of arrays
-    row : int
-        Negative rows count from the last one.
-    kinds : iterable of str
-        File formats.
-    folder : Path
-    model : Model, optional
-        By default the solid.
+    `row`: negative rows count from the last one; `kinds`: file formats; `model`: by default the solid.
     """
     made = model or Model(cap=scene.actuator.bore / 2.0)
     parts = make_bodies(make_formed(history, row), made, Finding())

@@ -47,17 +47,8 @@ def plan_meshes(
 ) -> Extra:
     """Return the surface of one row as mesh files, in the run's folder or in one within it.
 
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping
-        Of the run.
-    kinds : sequence of str
-        Formats.
-    row : int, optional
-        Of the history; by default the last one.
-    within : str, optional
-        The name of the folder in the run's.
+    `history`: of the run; `kinds`: formats; `row`: of the history; by default the last one; `within`: the
+    name of the folder in the run's.
     """
 
     def make(folder: Path) -> None:
@@ -73,24 +64,12 @@ def plan_meshes(
 
 
 def plan_plots(scene: Scene, history: History) -> Extra:
-    """Return the plots of a session.
-
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping
-    """
+    """Return the plots of a session."""
     return Extra(PLOTS, lambda folder: plotted(scene, history, folder), lambda run: ["plot", str(run)])
 
 
 def plan_picture(scene: Scene, history: History) -> Extra:
-    """Return the picture of the last touch.
-
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping
-    """
+    """Return the picture of the last touch."""
     return Extra(
         [PICTURE],
         lambda folder: picture(scene, history, find_last_touch(history), folder / PICTURE),
@@ -103,13 +82,7 @@ def make_extras(
 ) -> tuple[list[Extra], list[DigiclayError]]:
     """Make one after the other; return those prevented by a stop, and the errors.
 
-    Parameters
-    ----------
-    extras : iterable of Extra
-    folder : Path
-        Where the run is being written.
-    stopped : callable
-        Asked before each.
+    `folder`: where the run is being written; `stopped`: asked before each.
     """
     left_out: list[Extra] = []
     wrong: list[DigiclayError] = []
@@ -127,11 +100,7 @@ def make_extras(
 def tell_left_out(left_out: Iterable[Extra], run: Path) -> None:
     """Print the files that a stop prevented, and the command that makes them.
 
-    Parameters
-    ----------
-    left_out : iterable of Extra
-    run : Path
-        The finished run's folder.
+    `run`: the finished run's folder.
     """
     for extra in left_out:
         tell_stopped_before(", ".join(extra.files), extra.later(run))
@@ -140,11 +109,7 @@ def tell_left_out(left_out: Iterable[Extra], run: Path) -> None:
 def tell_stopped_before(what: str, later: Sequence[str]) -> None:
     """Print the output that a stop prevented, and the command that makes it.
 
-    Parameters
-    ----------
-    what : str
-    later : sequence of str
-        Arguments of the command.
+    `later`: arguments of the command.
     """
     print(f"Stopped before {what}; to have it: {format_command(later)}", file=sys.stderr)
 

@@ -68,14 +68,7 @@ class Card:
 def page(title: str, summary: str, cards: Sequence[Card], refresh: int = 0) -> str:
     """Return the page of a batch.
 
-    Parameters
-    ----------
-    title : str
-    summary : str
-    cards : sequence of Card
-        One a job.
-    refresh : int, optional
-        Seconds after which a browser loads the page again; 0: never.
+    `cards`: one a job; `refresh`: seconds after which a browser loads the page again; 0: never.
     """
     body = [
         f"<p>{_safe(summary)}</p>",
@@ -89,13 +82,8 @@ def page(title: str, summary: str, cards: Sequence[Card], refresh: int = 0) -> s
 def wrap(title: str, body: Sequence[str], refresh: int = 0) -> str:
     """Return a self-contained page.
 
-    Parameters
-    ----------
-    title : str
-    body : sequence of str
-        Lines of HTML below the title.
-    refresh : int, optional
-        Seconds after which a browser loads the page again; 0: never.
+    `body`: lines of HTML below the title; `refresh`: seconds after which a browser loads the page again; 0:
+    never.
     """
     again = [f'<meta http-equiv="refresh" content="{refresh}">'] if refresh else []
     return "\n".join(

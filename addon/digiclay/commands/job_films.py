@@ -30,12 +30,7 @@ from .run_state import PATIENCE, RunState, judge_run, list_lacking, note_film
 def find_frames(run: Path, kind: str) -> Path:
     """Return the folder of a film's frames: another one for each definition, and each version of digiclay.
 
-    Parameters
-    ----------
-    run : Path
-        The folder of the job's run.
-    kind : str
-        Of `MOVING`.
+    `run`: the folder of the job's run; `kind`: of `MOVING`.
     """
     known = [__version__.encode(), *((run / name).read_bytes() for name in (SCENE, JOB))]
     return run / f"frames-{kind}-{hashlib.sha256(b'|'.join(known)).hexdigest()[:12]}"
@@ -46,29 +41,10 @@ def make_frames(
 ) -> bool:
     """Draw those frames of a range that are missing; return whether there were any.
 
-    Parameters
-    ----------
-    job : Path
-        The folder of the job's files.
-    run : Path
-        That of its finished run.
-    outputs : Outputs
-        Of the job.
-    kind : str
-        Of `MOVING`.
-    text : str
-        The range, see `read_range`.
-    stopped : callable
-        Asked before each frame.
-    tell : callable
-        Told of a step, and of how much of it is done.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        When it was stopped; frames that are drawn are kept.
-    OutputError
-        When there is no finished run, or another process draws the same range.
+    `job`: the folder of the job's files; `run`: that of its finished run; `outputs`: of the job; `kind`: of
+    `MOVING`; `text`: the range, see `read_range`; `stopped`: asked before each frame; `tell`: told of a step,
+    and of how much of it is done. Raises KeyboardInterrupt when it was stopped; frames that are drawn are
+    kept. Raises OutputError when there is no finished run, or another process draws the same range.
     """
     looks = _find_looks(job, run, outputs, kind)
     if kind not in list_lacking(run, outputs):
@@ -91,10 +67,7 @@ def make_film(
 ) -> bool:
     """Make the film of its frames, and draw those that are missing; return whether there was none yet.
 
-    Parameters
-    ----------
-    job, run, outputs, kind, stopped, tell
-        As for `make_frames`.
+    `job`, `run`, `outputs`, `kind`, `stopped`, `tell`: as for `make_frames`.
     """
     looks, out = _find_looks(job, run, outputs, kind), run / f"{kind}.mp4"
     if kind not in list_lacking(run, outputs):

@@ -29,13 +29,7 @@ Tell = Callable[[str, float], None]
 
 
 def check_outputs(scene: Scene, outputs: Outputs) -> None:
-    """Refuse, before any work, what is bound to fail after it.
-
-    Parameters
-    ----------
-    scene : Scene
-    outputs : Outputs
-    """
+    """Refuse, before any work, what is bound to fail after it."""
     if outputs.export:
         try:
             formats(",".join(outputs.export))
@@ -58,23 +52,9 @@ def make_outputs(
 ) -> None:
     """Run the session, and make all that belongs to it.
 
-    Parameters
-    ----------
-    scene : Scene
-    outputs : Outputs
-    out : Path
-        The folder.
-    timing : dict
-        Gets the seconds of each step.
-    stopped : callable
-        Whether to stop; asked all the time.
-    tell : callable
-        Told of a step, and of how much of the whole job is done.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        When it was stopped.
+    `out`: the folder; `timing`: gets the seconds of each step; `stopped`: whether to stop; asked all the
+    time; `tell`: told of a step, and of how much of the whole job is done. Raises KeyboardInterrupt when it
+    was stopped.
     """
     names = ["run", *(n for n in ("errors", "export", "still", "turntable", "film") if getattr(outputs, n))]
     told = 0.0

@@ -73,11 +73,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse unknown arguments here, where their command is known.
 
-        Parameters
-        ----------
-        args : sequence of str, optional
-            By default those of the process.
-        namespace : argparse.Namespace, optional
+        `args`: by default those of the process; `namespace` argparse.Namespace, optional.
         """
         self._given = sys.argv[1:] if args is None else args
         known, unknown = super().parse_known_args(args, namespace)

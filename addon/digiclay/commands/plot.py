@@ -33,14 +33,7 @@ def add(commands: Any) -> None:
 
 
 def plotted(scene: Scene, history: Mapping[str, NDArray[Any]], folder: Path) -> list[Path]:
-    """Draw a history into a folder; return the files.
-
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping of arrays
-    folder : Path
-    """
+    """Draw a history into a folder; return the files."""
     from ..plots.run import session, surface
 
     paths = [folder / name for name in PLOTS]

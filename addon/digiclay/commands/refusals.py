@@ -13,14 +13,7 @@ from .stop import defer_interrupt
 
 
 def refuse_what_has_no_surface(scene: Scene, option: str) -> None:
-    """Refuse to make a surface of a bed that has none.
-
-    Parameters
-    ----------
-    scene : Scene
-    option : str
-        What asks for the surface.
-    """
+    """Refuse to make a surface of a bed that has none. `option`: what asks for the surface."""
     if min(scene.layout.rows, scene.layout.columns) < 2:
         raise OutputError(
             f"{option} needs at least 2 x 2 cells (got {scene.layout.rows} x {scene.layout.columns})."
@@ -30,13 +23,7 @@ def refuse_what_has_no_surface(scene: Scene, option: str) -> None:
 def refuse_without(module: str, option: str, remedy: str) -> None:
     """Refuse what needs a library that is not installed.
 
-    Parameters
-    ----------
-    module : str
-    option : str
-        What needs it.
-    remedy : str
-        The command that installs it.
+    `option`: what needs it; `remedy`: the command that installs it.
     """
     if importlib.util.find_spec(module) is None:
         raise OutputError(f"{option} needs {module}: run '{remedy}'.")
@@ -60,11 +47,7 @@ def refuse_unwritable(folder: Path) -> None:
 def refuse_file(out: Path, ending: str) -> None:
     """Refuse a file that cannot be written, or whose name promises another format.
 
-    Parameters
-    ----------
-    out : Path
-    ending : str
-        Of its name, with the dot.
+    `ending`: of its name, with the dot.
     """
     if out.suffix.lower() != ending:
         raise OutputError(f"--out must end with {ending} (got {out}).")

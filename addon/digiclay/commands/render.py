@@ -153,19 +153,7 @@ def picture(
     height: int = 1000,
     engine: str = "cycles",
 ) -> Path:
-    """Draw one row of a history.
-
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping of arrays
-    row : int
-        Of the history.
-    out : Path
-    width, height : int
-        Pixels.
-    engine : str
-    """
+    """Draw one row of a history. `row`: of the history; `width`, `height`: pixels."""
     return draw_still(scene, history, Still(width=width, height=height, engine=engine), out, row)
 
 
@@ -174,14 +162,7 @@ def draw_still(
 ) -> Path:
     """Draw an instant, or one row of a history; Blender is imported only now.
 
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping of arrays
-    looks : Still
-    out : Path
-    row : int, optional
-        Of the history; by default the instant of `looks`.
+    `row`: of the history; by default the instant of `looks`.
     """
     from ..device.instant import Instant
     from ..pictures.still import render_still
@@ -202,18 +183,8 @@ def draw_turntable(
 ) -> Path | None:
     """Draw an instant, or one row of a history, turning once; None when it was stopped.
 
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping of arrays
-    looks : Turntable
-    out : Path
-    progress : callable, optional
-        Told of frames done, and of all.
-    stopped : callable, optional
-        Whether to stop; asked before each frame.
-    row : int, optional
-        Of the history; by default the instant of `looks`.
+    `progress`: told of frames done, and of all; `stopped`: whether to stop; asked before each frame; `row`:
+    of the history; by default the instant of `looks`.
     """
     from ..device.instant import Instant
     from ..pictures.film import render_turntable
@@ -232,16 +203,7 @@ def draw_film(
 ) -> Path | None:
     """Draw a session; None when it was stopped.
 
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping of arrays
-    looks : Film
-    out : Path
-    progress : callable, optional
-        Told of frames done, and of all.
-    stopped : callable, optional
-        Whether to stop; asked before each frame.
+    `progress`: told of frames done, and of all; `stopped`: whether to stop; asked before each frame.
     """
     from ..pictures.film import render_film
 
@@ -253,14 +215,7 @@ def draw_film(
 def stage_moving(
     scene: Scene, history: Mapping[str, NDArray[Any]], looks: Film | Turntable
 ) -> AbstractContextManager[Shots]:
-    """Set the stage for single frames of the film `draw_film` or `draw_turntable` would draw.
-
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping of arrays
-    looks : Film or Turntable
-    """
+    """Set the stage for single frames of the film `draw_film` or `draw_turntable` would draw."""
     from ..device.instant import Instant
     from ..pictures.film import stage_film, stage_turntable
 

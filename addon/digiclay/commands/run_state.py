@@ -32,15 +32,7 @@ class RunState(Enum):
 
 
 def judge_run(job: Path, run: Path) -> RunState:
-    """Return what there is of a run.
-
-    Parameters
-    ----------
-    job : Path
-        The folder of the job's files.
-    run : Path
-        The folder of its run.
-    """
+    """Return what there is of a run. `job`: the folder of the job's files; `run`: the folder of its run."""
     if not run.is_dir() or not any(run.iterdir()):
         return RunState.ABSENT
     if not all((run / name).is_file() for name in (SCENE, JOB)):
@@ -74,13 +66,7 @@ def _is_same(one: Path, other: Path, read: Callable[[Path], object]) -> bool:
 
 
 def list_lacking(run: Path, outputs: Outputs) -> list[str]:
-    """Return those of `MOVING` that are wanted and not there.
-
-    Parameters
-    ----------
-    run : Path
-    outputs : Outputs
-    """
+    """Return those of `MOVING` that are wanted and not there."""
     files = (read_json(run / TIMING) or {}).get(FILES)
     # Older runs have not noted their files.
     there = files if isinstance(files, Mapping) else {path.name for path in run.iterdir()}
@@ -88,13 +74,7 @@ def list_lacking(run: Path, outputs: Outputs) -> list[str]:
 
 
 def is_done(job: Path, run: Path) -> bool:
-    """Return whether a job is done, its films too.
-
-    Parameters
-    ----------
-    job, run
-        As for `judge_run`.
-    """
+    """Return whether a job is done, its films too. `job`, `run`: as for `judge_run`."""
     try:
         return judge_run(job, run) is RunState.WHOLE and not list_lacking(run, read_outputs(job / JOB))
     except (OSError, DigiclayError):
@@ -104,15 +84,8 @@ def is_done(job: Path, run: Path) -> bool:
 def note_film(run: Path, kind: str, seconds: float, *, encoded: bool) -> None:
     """Note in a run what was drawn for one of its films, and its file once there is one.
 
-    Parameters
-    ----------
-    run : Path
-    kind : str
-        Of `MOVING`.
-    seconds : float
-        Time it took; added to what is noted already.
-    encoded : bool
-        Whether the film is there now.
+    `kind`: of `MOVING`; `seconds`: time it took; added to what is noted already; `encoded`: whether the film
+    is there now.
     """
     with lock_name(run / TIMING, PATIENCE):
         timing: dict[str, Any] = read_json(run / TIMING) or {}

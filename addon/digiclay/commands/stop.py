@@ -73,10 +73,7 @@ def allow_interrupt() -> Iterator[None]:
 def defer_interrupt() -> Iterator[None]:
     """Let Ctrl-C wait for the end of the block: libraries take an interrupted import for a broken one.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        At the end, when somebody has asked to stop.
+    Raises KeyboardInterrupt: at the end, when somebody has asked to stop.
     """
     with Stop() as stop:
         yield

@@ -88,14 +88,7 @@ FORMATS: dict[str, Callable[[Submission], Written]] = {
 
 
 def add_options(parser: argparse.ArgumentParser, exclusive: argparse._MutuallyExclusiveGroup) -> None:
-    """Add the options of a submission.
-
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser
-    exclusive : argparse's group
-        Of options of which one may be given.
-    """
+    """Add the options of a submission. `exclusive`: of options of which one may be given."""
     exclusive.add_argument(
         "--submit", metavar="FORMAT", choices=FORMATS,
         help=f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
@@ -120,21 +113,9 @@ def refuse_alone(arguments: argparse.Namespace) -> None:
 def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int | None) -> list[str]:
     """Write the files of a farm, and return what is to be printed.
 
-    Parameters
-    ----------
-    folder : Folder
-        With the files of its jobs.
-    form : str
-        Of `FORMATS`.
-    program : str, optional
-        Path on the machines of the farm.
-    chunk : int, optional
-        Frames of a film that a task draws.
-
-    Raises
-    ------
-    DigiclayError
-        When a film cannot be made, or a path cannot be written down. No file is written then.
+    `folder`: with the files of its jobs; `form`: of `FORMATS`; `program`: path on the machines of the farm;
+    `chunk`: frames of a film that a task draws. Raises DigiclayError when a film cannot be made, or a path
+    cannot be written down. No file is written then.
     """
     tasks = plan_series(folder.batch, chunk or CHUNK)
     made = Submission(make_safe_name(folder.batch.name), find_full(folder.path), tasks, find_start(program))

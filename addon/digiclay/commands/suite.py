@@ -128,13 +128,8 @@ def list_suite_methods() -> tuple[str, ...]:
 def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequence[str]) -> int:
     """Run what is not done yet, and write tables, page and plots.
 
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-    methods : sequence of str
-        The first is the one that the others are compared with.
-    words : sequence of str
-        By which the command line names them.
+    `methods`: the first is the one that the others are compared with; `words`: by which the command line
+    names them.
     """
     if arguments.overwrite:
         raise OutputError("--overwrite is not for --suite, which continues its folder: choose another --out.")
@@ -159,15 +154,7 @@ def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequ
 def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
     """Return the plan of a suite; all that can be wrong with it is refused here.
 
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-    methods : sequence of str
-
-    Raises
-    ------
-    ParameterError, SceneError
-        In one line.
+    Raises ParameterError, SceneError: in one line.
     """
     quick, words = arguments.quick, arguments.trajectories
     asked = QUICK if quick and words is None else GROUPS
@@ -208,13 +195,7 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
 
 
 def identify(points: Sequence[Point], methods: Sequence[str]) -> str:
-    """Return a number that identifies scenes, and the code of methods of one's own.
-
-    Parameters
-    ----------
-    points : sequence of Point
-    methods : sequence of str
-    """
+    """Return a number that identifies scenes, and the code of methods of one's own."""
     rows = [find_method(name) for name in methods]
     codes = [row.source.digest for row in rows if isinstance(row, OwnRow)]
     scenes = hash_points(points)

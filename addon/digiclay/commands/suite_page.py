@@ -91,15 +91,7 @@ class Provenance:
 
 
 def format_results(source: Provenance, points: Sequence[Point], records: Mapping[int, Record]) -> str:
-    """Return all trials as CSV in SI units.
-
-    Parameters
-    ----------
-    source : Provenance
-    points : sequence of Point
-    records : mapping of int to Record
-        By the index of their point.
-    """
+    """Return all trials as CSV in SI units. `records`: by the index of their point."""
     head = ["method", "trajectory", "seed", *_name_units(OUTCOMES), "error"]
     rows = []
     for point in points:
@@ -112,14 +104,7 @@ def format_results(source: Provenance, points: Sequence[Point], records: Mapping
 
 
 def format_trajectories(source: Provenance, table: Table, methods: Sequence[str]) -> str:
-    """Return means and intervals of every trajectory as CSV in SI units.
-
-    Parameters
-    ----------
-    source : Provenance
-    table : mapping
-    methods : sequence of str
-    """
+    """Return means and intervals of every trajectory as CSV in SI units."""
     head = ["trajectory", "method", "measure", "unit", "mean", "half width", "seeds"]
     rows = []
     for name in _list_trajectories(table):
@@ -132,13 +117,7 @@ def format_trajectories(source: Provenance, table: Table, methods: Sequence[str]
 
 
 def format_league(source: Provenance, league: Sequence[Row]) -> str:
-    """Return the league as CSV in SI units.
-
-    Parameters
-    ----------
-    source : Provenance
-    league : sequence of Row
-    """
+    """Return the league as CSV in SI units."""
     head = ["rank", "method"]
     for name, _, _, _, unit in COLUMNS:
         head += [f"{name} ({unit})", f"{name}, half width ({unit})"]
@@ -154,12 +133,7 @@ def format_league(source: Provenance, league: Sequence[Row]) -> str:
 
 
 def print_league(league: Sequence[Row]) -> Iterator[str]:
-    """Give the lines of the league for a terminal.
-
-    Parameters
-    ----------
-    league : sequence of Row
-    """
+    """Give the lines of the league for a terminal."""
     columns = [column for column in COLUMNS if column[0] in PRINTED]
     head = ("method", *(f"{title} {unit}".strip() for _, title, _, unit, _ in columns), "RFD greater on")
     rows = [
@@ -176,18 +150,7 @@ def print_league(league: Sequence[Row]) -> Iterator[str]:
 def format_page(
     source: Provenance, league: Sequence[Row], table: Table, failed: Sequence[str], pictures: Sequence[str]
 ) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    source : Provenance
-    league : sequence of Row
-    table : mapping
-    failed : sequence of str
-        A line a failed trial.
-    pictures : sequence of str
-        Files beside it.
-    """
+    """Return the page. `failed`: a line a failed trial; `pictures`: files beside it."""
     heads = ["method", *(f"{title} ({unit})" if unit else title for _, title, _, unit, _ in COLUMNS)]
     rows = [
         [

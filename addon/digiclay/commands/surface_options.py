@@ -55,15 +55,7 @@ def finding_of(arguments: argparse.Namespace) -> Finding:
 
 
 def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
-    """Return what is to be made.
-
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-    scene : Scene
-    kind : str
-        Of the mesh.
-    """
+    """Return what is to be made. `kind`: of the mesh."""
     told: dict[str, Any] = {"kind": kind, "skin": arguments.skin, "resolution": arguments.resolution}
     if getattr(arguments, "base_thickness", None) is not None:
         told["base_thickness"] = arguments.base_thickness
@@ -72,25 +64,14 @@ def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
 
 
 def row_of(run: Run, time: float | None) -> int:
-    """Return the row of an instant, s; the last one where none is given.
-
-    Parameters
-    ----------
-    run : Run
-    time : float or None
-        s.
-    """
+    """Return the row of an instant, s; the last one where none is given. `time`, s."""
     return -1 if time is None else find_row(run.history, time, "--time")
 
 
 def former_of(run: Run, text: str) -> int | float:
     """Return the row of what was before, or the rest height of all pins, m.
 
-    Parameters
-    ----------
-    run : Run
-    text : str
-        Value of --former: *rest*, or a time.
+    `text`: value of --former: *rest*, or a time.
     """
     if text.strip() == "rest":
         return float(run.scene.actuator.rest_height)

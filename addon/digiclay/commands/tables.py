@@ -6,14 +6,7 @@ from collections.abc import Iterator, Sequence
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) -> Iterator[str]:
-    """Give the lines of an aligned table; the first `left` columns are texts, all others numbers.
-
-    Parameters
-    ----------
-    head : sequence of str
-    rows : sequence of sequences of str
-    left : int
-    """
+    """Give the lines of an aligned table; the first `left` columns are texts, all others numbers."""
     widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
     for line in (head, ["-" * width for width in widths], *rows):
         cells = (

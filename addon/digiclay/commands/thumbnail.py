@@ -18,14 +18,7 @@ WIDTH = 320
 
 
 def of_picture(still: Path, folder: Path) -> Path:
-    """Make one of a picture that Blender has drawn.
-
-    Parameters
-    ----------
-    still : Path
-    folder : Path
-        Of the thumbnail.
-    """
+    """Make one of a picture that Blender has drawn. `folder`: of the thumbnail."""
     from ..compat import bpy, scratch
 
     out = folder / NAMES[0]
@@ -44,14 +37,7 @@ def of_picture(still: Path, folder: Path) -> Path:
 def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Path) -> Path:
     """Make one of heights (n,), seen from above.
 
-    Parameters
-    ----------
-    height : ndarray (n,)
-        m.
-    rows, columns : int
-        Of the bed.
-    folder : Path
-        Of the thumbnail.
+    `height` (n,), m; `rows`, `columns`: of the bed; `folder`: of the thumbnail.
     """
     out = folder / NAMES[1]
     write_whole(out, encode_png(height_map(height.reshape(rows, columns))))
@@ -61,12 +47,8 @@ def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Pat
 def height_map(height: NDArray[np.float64], wide: int = WIDTH) -> NDArray[np.uint8]:
     """Return a bed seen from above as pixels (rows, columns, 3): dark is low, bright is high.
 
-    Parameters
-    ----------
-    height : ndarray (rows, columns)
-        Pin tops, the nearest row first.
-    wide : int, optional
-        About how many pixels the longer side has; large beds leave pins out.
+    `height` (rows, columns), pin tops, the nearest row first; `wide`: about how many pixels the longer side
+    has; large beds leave pins out.
     """
     every = max(1, -(-max(height.shape) // wide))
     shown = height[::every, ::every][::-1]

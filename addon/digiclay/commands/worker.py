@@ -45,10 +45,7 @@ def find_program(module: str = "") -> tuple[list[str], dict[str, str]]:
 
     Inside Blender there is no separate Python: Blender itself is started, with this extension.
 
-    Parameters
-    ----------
-    module : str, optional
-        A module of the package to be run in its place, ``.commands.evaluator``; not inside Blender.
+    `module`: a module of the package to be run in its place, ``.commands.evaluator``; not inside Blender.
     """
     bpy: Any = sys.modules.get("bpy")
     if bpy is not None and bpy.app.binary_path:

@@ -18,12 +18,7 @@ def find_modifier(bed: Any) -> Any | None:
 
 
 def require_modifier(bed: Any) -> Any:
-    """Return the modifier that draws the pins, or refuse a bed without.
-
-    Raises
-    ------
-    DigiclayError
-    """
+    """Return the modifier that draws the pins, or refuse a bed without. Raises DigiclayError."""
     found = find_modifier(bed)
     if found is None:
         rule = "must have the geometry nodes modifier that draws its pins (got none)"

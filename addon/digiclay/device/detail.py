@@ -24,12 +24,8 @@ _HANDLES: list[Any] = []
 def choose_far(pitch: float, far: bool) -> bool:
     """Return whether pins are too small to be drawn.
 
-    Parameters
-    ----------
-    pitch : float
-        In the view that shows them largest, pixels; 0 where no view shows them.
-    far : bool
-        Whether they were too small before.
+    `pitch`: in the view that shows them largest, pixels; 0 where no view shows them; `far`: whether they were
+    too small before.
     """
     return 0.0 < pitch < (LARGE if far else SMALL)
 
@@ -37,16 +33,9 @@ def choose_far(pitch: float, far: bool) -> bool:
 def measure_pitch(to_clip: Floats, to_view: Floats, pitch: float, height: float) -> float:
     """Return the size of a pitch at the middle of a bed, seen from the front, pixels; 0 behind the eye.
 
-    Parameters
-    ----------
-    to_clip : ndarray (4, 4)
-        From the bed's space to that of the picture.
-    to_view : ndarray (4, 4)
-        The window matrix: from the space of the eye to that of the picture.
-    pitch : float
-        In the world, Blender units.
-    height : float
-        Of the region, pixels.
+    `to_clip` (4, 4), from the bed's space to that of the picture; `to_view` (4, 4), the window matrix: from
+    the space of the eye to that of the picture; `pitch`: in the world, Blender units; `height`: of the
+    region, pixels.
     """
     depth = float(to_clip[3, 3])
     return pitch * float(to_view[1, 1]) * height / 2.0 / depth if depth > 0.0 else 0.0

@@ -46,15 +46,8 @@ def picked_pins(bed: Any) -> tuple[int, ...]:
 def pick_pins(bed: Any, pins: Iterable[int]) -> None:
     """Choose the pins whose heights the overlay shows.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    pins : iterable of int
-
-    Raises
-    ------
-    DigiclayError
-        On more than 6 pins, one twice, or one the bed does not have.
+    `bed` bpy.types.Object. Raises DigiclayError: on more than 6 pins, one twice, or one the bed does not
+    have.
     """
     chosen, count = tuple(pins), len(bed.data.vertices)
     if len(chosen) > PICKED or len(set(chosen)) != len(chosen):

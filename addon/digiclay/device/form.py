@@ -36,13 +36,7 @@ def read_form(bed: Any) -> str:
 
 
 def set_form(bed: Any, form: str) -> None:
-    """Show a bed as one of `FORMS`.
-
-    Raises
-    ------
-    DigiclayError
-        On another word, or for a bed without a skin.
-    """
+    """Show a bed as one of `FORMS`. Raises DigiclayError: on another word, or for a bed without a skin."""
     set_node_setting(_require_skin(bed), FORM, _index(form, FORMS, "form"))
     bed.pop(BEFORE, None)
 
@@ -55,10 +49,7 @@ def read_kind(bed: Any) -> str:
 def set_kind(bed: Any, kind: str) -> None:
     """Give a bed one of the skins `skin_lattice.KINDS`.
 
-    Raises
-    ------
-    DigiclayError
-        On another word, or for a bed without a skin.
+    Raises DigiclayError: on another word, or for a bed without a skin.
     """
     set_node_setting(_require_skin(bed), MEMBRANE, bool(_index(kind, KINDS, "skin")))
 

@@ -33,11 +33,6 @@ COLORS = (
 def level(force: NDArray[np.float64], top: float = TOP) -> NDArray[np.int64]:
     """Return the level of each force: 0 without force, 1 to 12 for `COLORS`.
 
-    Parameters
-    ----------
-    force : ndarray (n,)
-        N; below 0 counts as none.
-    top : float, optional
-        From this force on all have the last level, N, above 0.
+    `force` (n,), N; below 0 counts as none; `top`: from this force on all have the last level, N, above 0.
     """
     return np.asarray(np.clip(np.ceil(force / top * len(COLORS)), 0, len(COLORS)), np.int64)

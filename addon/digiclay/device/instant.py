@@ -81,14 +81,8 @@ class Instant:
     def of(cls, history: Mapping[str, Any], index: int = -1, **sizes: Any) -> Instant:
         """Take one row of a history.
 
-        Parameters
-        ----------
-        history : mapping of arrays
-            As in ``history.npz``.
-        index : int, optional
-            The row; negative rows count from the last one.
-        **sizes
-            `pitch`, `actuator` and `finger`, where they are not the defaults.
+        `history`: as in ``history.npz``; `index`: the row; negative rows count from the last one; `sizes`:
+        `pitch`, `actuator` and `finger`, where they are not the defaults.
         """
         missing = [name for name in ARRAYS if name not in history]
         if missing:
@@ -105,13 +99,7 @@ class Instant:
     ) -> Instant:
         """Return a bed nobody has touched yet, the fingertip above its center.
 
-        Parameters
-        ----------
-        layout : Layout
-        actuator : Actuator, optional
-            By default `Actuator()`.
-        finger : Fingertip, optional
-            By default `Fingertip()`.
+        `actuator`: by default `Actuator()`; `finger`: by default `Fingertip()`.
         """
         actuator, finger = actuator or Actuator(), finger or Fingertip()
         bed = make_grid(layout)
@@ -146,17 +134,8 @@ def pick_pose(poses: Floats) -> Floats:
 def read(path: Path, index: int = -1) -> Instant:
     """Read an instant of a finished run.
 
-    Parameters
-    ----------
-    path : Path
-        The ``history.npz`` in a run's folder; sizes come from the ``scene.toml`` beside it.
-    index : int, optional
-        The row; negative rows count from the last one.
-
-    Raises
-    ------
-    OutputError
-        When there is no readable run.
+    `path`: the ``history.npz`` in a run's folder; sizes come from the ``scene.toml`` beside it; `index`: the
+    row; negative rows count from the last one. Raises OutputError when there is no readable run.
     """
     if path.name != "history.npz":
         raise OutputError(f"{path} is not the history.npz of a run's folder.")

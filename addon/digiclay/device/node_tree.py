@@ -35,15 +35,8 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
     Stretching one mesh costs half of drawing rod and cap apart. A cap is stretched with its
     rod, from a flat one on a low pin to a round one on a high pin.
 
-    Parameters
-    ----------
-    sources : Sources
-    deck : float
-        Height the rods reach down to, Blender units.
-    length : float
-        Length of the pins in the collections, Blender units.
-    unit : float
-        Blender units of a millimeter of the device.
+    `deck`: height the rods reach down to, Blender units; `length`: length of the pins in the collections,
+    Blender units; `unit`: Blender units of a millimeter of the device.
     """
     tree = bpy.data.node_groups.new("Digital Clay Pins", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
@@ -98,13 +91,8 @@ def _add_settings(tree: Any) -> None:
 def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]:
     """Add the nodes that tell whether pins, skin, and both are drawn.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    settings : bpy.types.Node
-        The tree's input node.
-    row : float
-        Where in the tree they stand.
+    `tree` bpy.types.NodeTree; `settings` bpy.types.Node, the tree's input node; `row`: where in the tree they
+    stand.
     """
     form = settings.outputs[FORM]
     automatic, pins, skin, both = (
@@ -123,16 +111,8 @@ def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]
 def _skin(tree: Any, sources: Sources, settings: Any, both: Any, row: float) -> Any:
     """Add the nodes of the skin, clear where pins are drawn under it; return its geometry.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    sources : Sources
-    settings : bpy.types.Node
-        The tree's input node.
-    both : bpy.types.NodeSocket
-        Whether pins and skin are drawn.
-    row : float
-        Where in the tree they stand.
+    `tree` bpy.types.NodeTree; `settings` bpy.types.Node, the tree's input node; `both` bpy.types.NodeSocket,
+    whether pins and skin are drawn; `row`: where in the tree they stand.
     """
     names = []
     for step, name in enumerate(KINDS):
@@ -166,15 +146,8 @@ def _stretch(tree: Any, deck: float, length: float) -> Any:
 def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
     """Add the nodes that choose a pin by the force on it; return its place among the pins.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    top : bpy.types.NodeSocket
-        Force of the last level, N.
-    first : int
-        Place of the pin that nothing presses; the levels of `heat.level` come behind it.
-    row : float
-        Where in the tree they stand.
+    `tree` bpy.types.NodeTree; `top` bpy.types.NodeSocket, force of the last level, N; `first`: place of the
+    pin that nothing presses; the levels of `heat.level` come behind it; `row`: where in the tree they stand.
     """
     force = attribute(tree, "force", "FLOAT", 0, row + 1)
     per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLORS)), top)
@@ -188,24 +161,10 @@ def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
 def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: float, row: float) -> Any:
     """Add the nodes that draw the arrows beside the pins.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    arrow : bpy.types.Object
-        An arrow of length 1 that points down and ends at the origin.
-    settings : bpy.types.Node
-        The tree's input node.
-    pins : bpy.types.NodeSocket
-        The pins, drawn with and without arrows.
-    unit : float
-        Blender units of a millimeter of the device.
-    row : float
-        Where in the tree they stand.
-
-    Returns
-    -------
-    bpy.types.NodeSocket
-        Pins and arrows, or pins alone where arrows are off.
+    `tree` bpy.types.NodeTree; `arrow` bpy.types.Object, an arrow of length 1 that points down and ends at the
+    origin; `settings` bpy.types.Node, the tree's input node; `pins` bpy.types.NodeSocket, the pins, drawn
+    with and without arrows; `unit`: Blender units of a millimeter of the device; `row`: where in the tree
+    they stand. Returns pins and arrows, or pins alone where arrows are off.
     """
     force = attribute(tree, "force", "FLOAT", 1, row + 1)
     pressed = node(tree, "FunctionNodeCompare", 3, row - 0.4)

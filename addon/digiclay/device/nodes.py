@@ -8,13 +8,7 @@ from typing import Any
 def node(tree: Any, kind: str, column: float, row: float) -> Any:
     """Add a node at a place of a coarse grid, so that whoever opens the tree can read it.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    kind : str
-        Blender's name of the node.
-    column, row : float
-        Place in the grid.
+    `tree` bpy.types.NodeTree; `kind`: Blender's name of the node; `column`, `row`: place in the grid.
     """
     made = tree.nodes.new(kind)
     made.location = (220.0 * column, -180.0 * row)
@@ -24,13 +18,7 @@ def node(tree: Any, kind: str, column: float, row: float) -> Any:
 def socket(tree: Any, name: str, kind: str, default: Any, description: str) -> None:
     """Add a setting to a tree, which each object that uses the tree has for itself.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    name, kind : str
-        Of the setting, and Blender's name of its type.
-    default : object
-    description : str
+    `tree` bpy.types.NodeTree; `name`, `kind`: of the setting, and Blender's name of its type.
     """
     made = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind)
     made.default_value = default
@@ -40,15 +28,8 @@ def socket(tree: Any, name: str, kind: str, default: Any, description: str) -> N
 def attribute(tree: Any, name: str, kind: str, column: float, row: float) -> Any:
     """Add a node that reads an attribute of the vertices; return its output.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    name : str
-        Of the attribute.
-    kind : str
-        Its data type, as Blender names it.
-    column, row : float
-        Place in the grid.
+    `tree` bpy.types.NodeTree; `name`: of the attribute; `kind`: its data type, as Blender names it; `column`,
+    `row`: place in the grid.
     """
     made = node(tree, "GeometryNodeInputNamedAttribute", column, row)
     made.data_type = kind
@@ -59,14 +40,8 @@ def attribute(tree: Any, name: str, kind: str, column: float, row: float) -> Any
 def number(tree: Any, operation: str, column: float, row: float, *values: Any) -> Any:
     """Add a node that reckons with numbers or with outputs of other nodes; return its output.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    operation : str
-        Blender's name of the operation.
-    column, row : float
-        Place in the grid.
-    *values : float or bpy.types.NodeSocket
+    `tree` bpy.types.NodeTree; `operation`: Blender's name of the operation; `column`, `row`: place in the
+    grid; `values` float or bpy.types.NodeSocket.
     """
     made = node(tree, "ShaderNodeMath", column, row)
     made.operation = operation
@@ -83,14 +58,8 @@ def switch(tree: Any, kind: str, column: float, row: float, on: Any, off: Any, t
 
     What is not handed on is not worked out either: that is how a part that is off costs nothing.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    kind : str
-        Of what is handed on.
-    column, row : float
-        Place in the grid.
-    on, off, then : bpy.types.NodeSocket
+    `tree` bpy.types.NodeTree; `kind`: of what is handed on; `column`, `row`: place in the grid; `on`, `off`,
+    `then` bpy.types.NodeSocket.
     """
     made = node(tree, "GeometryNodeSwitch", column, row)
     made.input_type = kind

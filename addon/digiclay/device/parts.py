@@ -34,12 +34,7 @@ HEAD = 0.36
 def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None = None) -> Any:
     """Make an object of data (None: an empty), marked with its role.
 
-    Parameters
-    ----------
-    data : bpy.types.ID or None
-    name, role : str
-    collection : bpy.types.Collection
-    parent : bpy.types.Object, optional
+    `data` bpy.types.ID or None; `collection` bpy.types.Collection.
     """
     made = bpy.data.objects.new(name, data)
     made[ROLE] = role
@@ -51,13 +46,7 @@ def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None 
 def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
     """Return the material of a part, as the user may have changed it, or make it.
 
-    Parameters
-    ----------
-    name : str
-    color : (float, float, float)
-        sRGB, 0 to 1.
-    roughness, alpha : float
-        0 to 1.
+    `color` (float, float, float), sRGB, 0 to 1; `roughness`, `alpha`: 0 to 1.
     """
     found = next((m for m in bpy.data.materials if m.get(ROLE) == name), None)
     if found is not None:
@@ -99,11 +88,7 @@ class Sources(NamedTuple):
 def make_sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
     """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m.
 
-    Parameters
-    ----------
-    instant : Instant
-    length, deck, rim : float
-        Length of the pins, floor and upper edge of the housing, m.
+    `length`, `deck`, `rim`: length of the pins, floor and upper edge of the housing, m.
     """
     segments = 28 if len(instant.height) <= MANY else 12
     shape = primitives.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
@@ -154,11 +139,7 @@ def make_fingertip(collection: Any, bed: Any) -> Any:
     The empty carries the pose alone. Its scale is locked: the finger's size is a parameter
     of the device, kept in the ellipsoid's scale.
 
-    Parameters
-    ----------
-    collection : bpy.types.Collection
-    bed : bpy.types.Object
-        Its parent.
+    `collection` bpy.types.Collection; `bed` bpy.types.Object, its parent.
     """
     made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=bed)
     bed[FINGER] = made

@@ -20,15 +20,8 @@ def rebuild(bed: Any) -> Scene:
 
     The state of a session is forgotten: it is of no use to other pins.
 
-    Returns
-    -------
-    Scene
-        What the bed now is.
-
-    Raises
-    ------
-    ParameterError
-        When the settings do not go together; the bed stays as it is.
+    Returns what the bed now is. Raises ParameterError when the settings do not go together; the bed stays as
+    it is.
     """
     scene = properties.read_scene(bed)
     instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))

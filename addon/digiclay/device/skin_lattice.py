@@ -93,12 +93,7 @@ def choose_parts(count: int) -> int:
 def make_lattice(instant: Instant, parts: int) -> SkinLattice:
     """Return the points and weights of a skin over a bed, with sides down to the floor.
 
-    Parameters
-    ----------
-    instant : Instant
-        For the positions and the size of the pins.
-    parts : int
-        Points a pitch.
+    `instant`: for the positions and the size of the pins; `parts`: points a pitch.
     """
     x, y = instant.position.T
     columns = _count_columns(y)
@@ -137,18 +132,7 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
 def interpolate(lattice: SkinLattice, height: Floats, kind: str) -> Floats:
     """Return the heights of a skin, as the geometry nodes of a bed work them out, m.
 
-    Parameters
-    ----------
-    lattice : SkinLattice
-    height : ndarray (n,)
-        Of the pins, m.
-    kind : str
-        One of `KINDS`.
-
-    Returns
-    -------
-    ndarray (m,)
-        0 at the lower edge.
+    `height` (n,), of the pins, m; `kind`: one of `KINDS`. Returns (m,), 0 at the lower edge.
     """
     for step in (lattice.along, lattice.across):
         before, after = height - height[step.previous], height[step.following] - height

@@ -31,12 +31,7 @@ class SkinMeshes(NamedTuple):
 def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
     """Make the meshes of a skin.
 
-    Parameters
-    ----------
-    lattice : SkinLattice
-    deck : float
-        Height of the lower edge of its sides, m.
-    material : bpy.types.Material
+    `deck`: height of the lower edge of its sides, m; `material` bpy.types.Material.
     """
     pins = _points("Digital Clay Skin Pins", lattice.along.previous.size)
     _write_neighbors(pins, lattice.along)
@@ -60,17 +55,8 @@ def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
 def skin_nodes(tree: Any, sources: Any, pins: Any, kind: Any, row: float) -> Any:
     """Add the nodes that stretch a skin over pins; return its geometry.
 
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    sources : SkinMeshes
-        Objects of the meshes.
-    pins : bpy.types.NodeSocket
-        Points of the pins.
-    kind : bpy.types.NodeSocket
-        Name of the skin.
-    row : float
-        Where in the tree they stand.
+    `tree` bpy.types.NodeTree; `sources` SkinMeshes, objects of the meshes; `pins` bpy.types.NodeSocket,
+    points of the pins; `kind` bpy.types.NodeSocket, name of the skin; `row`: where in the tree they stand.
     """
     names = [_prefixed(tree, words, kind, row + step) for step, words in enumerate(WEIGHTS)]
     height = _separate_height(tree, row + 3)

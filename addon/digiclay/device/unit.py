@@ -68,12 +68,8 @@ def mark_parts() -> frozenset[int]:
 def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
     """Return what is to be put right.
 
-    Parameters
-    ----------
-    known : frozenset of int
-        Uids of the objects that were there before: to what a user has done to those, nothing is added.
-    mended : frozenset of int, optional
-        Uids of those of them that may be again as they had come, since undo has gone back to that.
+    `known`: uids of the objects that were there before: to what a user has done to those, nothing is added;
+    `mended`: uids of those of them that may be again as they had come, since undo has gone back to that.
     """
     bare = [
         bed for bed in _beds() if view.fingertip_of(bed) is None and _lacks_part(bed, FINGER, known, mended)
@@ -103,10 +99,7 @@ def repair(found: Faults) -> None:
 def give_fingertip(bed: Any, scene: Scene) -> str:
     """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    scene : Scene
+    `bed` bpy.types.Object.
     """
     if view.fingertip_of(bed) is not None:
         return ""

@@ -74,10 +74,7 @@ def _repeat_step(came: str) -> bool:
 def note_change(scene: Any, graph: Any = None) -> None:
     """Look soon: objects, or what is shown of them, may have come or gone.
 
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-    graph : bpy.types.Depsgraph, optional
+    `scene` bpy.types.Scene; `graph` bpy.types.Depsgraph, optional.
     """
     if graph is None or graph.id_type_updated("SCENE"):
         _repair_soon()

@@ -44,20 +44,10 @@ MODIFIER = "Pins"
 def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
     """Add a bed and its fingertip to a collection.
 
-    Parameters
-    ----------
-    instant : Instant
-        What to show at first.
-    collection : bpy.types.Collection
-        Where the objects go.
-    lowest : float, optional
-        Lowest pin top the housing must have room for, m; the instant's own when left out, so
-        that a still shows the formed surface and not the rods under it.
-
-    Returns
-    -------
-    bpy.types.Object
-        The bed; the fingertip is its child. Its origin is the center of the bed's floor.
+    `instant`: what to show at first; `collection` bpy.types.Collection, where the objects go; `lowest`:
+    lowest pin top the housing must have room for, m; the instant's own when left out, so that a still shows
+    the formed surface and not the rods under it. Returns the bed; the fingertip is its child. Its origin is
+    the center of the bed's floor.
     """
     cells = bridge.points("Digital Clay", len(instant.height))
     bed = parts.marked(cells, cells.name, BED, collection)
@@ -84,11 +74,7 @@ def _make_tree(instant: Instant, lowest: float | None = None) -> Any:
 def add_modifier(bed: Any, instant: Instant) -> None:
     """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    instant : Instant
-        For the sizes of the housing and the pins.
+    `bed` bpy.types.Object; `instant`: for the sizes of the housing and the pins.
     """
     require_modifier(bed).node_group = _make_tree(instant, 0.0)
 
@@ -105,13 +91,7 @@ def hold_parts(bed: Any) -> None:
 
 
 def show(bed: Any, instant: Instant) -> None:
-    """Show another instant of the same bed, its fingertip's pose included.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    instant : Instant
-    """
+    """Show another instant of the same bed, its fingertip's pose included. `bed` bpy.types.Object."""
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
 
@@ -121,11 +101,7 @@ def show_state(bed: Any, system: System, state: State) -> None:
 
     Forces are gathered and written only while something drawn tells them.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    system : System
-    state : State
+    `bed` bpy.types.Object.
     """
     shown: dict[str, NDArray[Any]] = {"mode": state.mode()}
     if wants_force(bed):
@@ -136,15 +112,7 @@ def show_state(bed: Any, system: System, state: State) -> None:
 def color_by(bed: Any, what: str) -> None:
     """Color the pins by what they do ("mode") or by the force on them ("force").
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    what : str
-
-    Raises
-    ------
-    DigiclayError
-        On another word, or when the bed's modifier is gone.
+    `bed` bpy.types.Object. Raises DigiclayError: on another word, or when the bed's modifier is gone.
     """
     if what not in COLORINGS:
         raise DigiclayError(f"view.color_by must be one of {', '.join(COLORINGS)} (got {what!r}).")
@@ -167,24 +135,14 @@ def shows_force(bed: Any) -> bool:
 
 
 def scale_colors(bed: Any, top: float) -> None:
-    """Set the force from which on a pin has the last color, N.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    top : float
-        N.
-    """
+    """Set the force from which on a pin has the last color, N. `bed` bpy.types.Object; `top`, N."""
     set_node_setting(require_modifier(bed), TOP_FORCE, _positive("top color", top, "N"))
 
 
 def show_arrows(bed: Any, on: bool) -> None:
     """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    on : bool
+    `bed` bpy.types.Object.
     """
     set_node_setting(require_modifier(bed), ARROWS, bool(on))
     tip = fingertip_of(bed)
@@ -204,14 +162,7 @@ def arrow_length(bed: Any) -> float:
 
 
 def scale_arrows(bed: Any, length: float) -> None:
-    """Set the length of the arrow of 1 N, m of the device.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    length : float
-        m.
-    """
+    """Set the length of the arrow of 1 N, m of the device. `bed` bpy.types.Object; `length`, m."""
     set_node_setting(require_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
 
 

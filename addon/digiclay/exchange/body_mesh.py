@@ -20,14 +20,8 @@ UPWARDS = 1e-6
 def make_object(body: Body, name: str, *, smooth: bool) -> Any:
     """Return a new object, in no collection yet, with the body in Blender units.
 
-    Parameters
-    ----------
-    body : Body
-        With values, as `export_model.make_bodies` makes it.
-    name : str
-        Of the object and its mesh.
-    smooth : bool
-        Shade its skin smooth. Walls and base stay flat, and the rim between them and the skin is sharp.
+    `body`: with values, as `export_model.make_bodies` makes it; `name`: of the object and its mesh; `smooth`:
+    shade its skin smooth. Walls and base stay flat, and the rim between them and the skin is sharp.
     """
     made = bpy.data.objects.new(name, _mesh(body, name, smooth=smooth))
     for number, group in enumerate(body.groups, 1):
@@ -68,12 +62,7 @@ def _find_skin(body: Body) -> Flags:
 def _mark_rim(mesh: Any, skin: Flags) -> None:
     """Mark the edges around flat faces as sharp, and none within the skin, however steep it is.
 
-    Parameters
-    ----------
-    mesh : bpy.types.Mesh
-        Of triangles.
-    skin : ndarray of bool (f,)
-        Which of them are shaded smooth.
+    `mesh` bpy.types.Mesh, of triangles; `skin` bool (f,), which of them are shaded smooth.
     """
     mesh.set_sharp_from_angle(angle=SHARP)
     edge = np.empty(len(mesh.loops), np.int32)

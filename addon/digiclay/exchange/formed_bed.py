@@ -28,10 +28,7 @@ SHOWN = 1e-7
 def read_formed(bed: Any) -> Formed:
     """Return the pins of a bed; before, they were as they were kept, or all at rest.
 
-    Raises
-    ------
-    DigiclayError
-        When the bed's mesh was edited so that it is no bed any more.
+    Raises DigiclayError when the bed's mesh was edited so that it is no bed any more.
     """
     if any(name not in bed.data.attributes for name in bridge.ATTRIBUTES):
         raise OutputError(
@@ -70,11 +67,7 @@ def clear_reference(bed: Any) -> None:
 def model(bed: Any, **told: Any) -> Model:
     """Return what is to be made of a bed; the flat ends of its pins are those of its device.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    **told
-        Fields of `Model`.
+    `bed` bpy.types.Object; `told`: fields of `Model`.
     """
     return Model(cap=_scene(bed).actuator.bore / 2.0, **told)
 

@@ -22,10 +22,7 @@ BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 def pixels(path: Path) -> NDArray[np.float64]:
     """Return the brightness of a picture's pixels, (rows, columns), the lowest row first.
 
-    Raises
-    ------
-    ParameterError
-        When Blender cannot read it, or it is too large.
+    Raises ParameterError when Blender cannot read it, or it is too large.
     """
     try:
         image = bpy.data.images.load(str(path.resolve()), check_existing=False)

@@ -45,16 +45,8 @@ def has_surface(thing: Any) -> bool:
 def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
     """Return the surface of an object, all modifiers included, in the space of a bed, m.
 
-    Parameters
-    ----------
-    thing : bpy.types.Object
-    bed : bpy.types.Object
-    depsgraph : bpy.types.Depsgraph
-
-    Raises
-    ------
-    DigiclayError
-        When it has no face, a vertex is not finite, or the bed is not uniformly scaled.
+    `thing` bpy.types.Object; `bed` bpy.types.Object; `depsgraph` bpy.types.Depsgraph. Raises DigiclayError
+    when it has no face, a vertex is not finite, or the bed is not uniformly scaled.
     """
     bridge.uniform(bed)
     evaluated = thing.evaluated_get(depsgraph)
@@ -79,25 +71,14 @@ def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
 def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
     """Display a shape on a bed; return how it was fitted, and what the display is off by, m.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    relief : Relief
-    shape : Shape
-        How it is fitted.
+    `bed` bpy.types.Object; `shape`: how it is fitted.
     """
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fit_relief(shape, relief, make_grid(scene.layout), scene.actuator))
 
 
 def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
-    """Display the shape a file or sample holds on a bed; see `show_relief`.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    shape : Shape
-    """
+    """Display the shape a file or sample holds on a bed; see `show_relief`. `bed` bpy.types.Object."""
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fit_shape(shape, make_grid(scene.layout), scene.actuator))
 

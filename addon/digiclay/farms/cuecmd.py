@@ -17,19 +17,8 @@ from .series_plan import Task, split_frames
 def format_lists(tasks: Sequence[Task], program: Sequence[str], series: str) -> dict[str, str]:
     """Return the lists by their names, in the order in which they are to be submitted.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-        Each after those it needs.
-    program : sequence of str
-        Path of the program, and its arguments before those of digiclay.
-    series : str
-        Folder of the series.
-
-    Raises
-    ------
-    OutputError
-        When a path cannot stand in a line.
+    `tasks`: each after those it needs; `program`: path of the program, and its arguments before those of
+    digiclay; `series`: folder of the series. Raises OutputError when a path cannot stand in a line.
     """
     depth: dict[str, int] = {}
     lists: dict[tuple[int, str], list[str]] = {}
@@ -45,16 +34,8 @@ def format_lists(tasks: Sequence[Task], program: Sequence[str], series: str) -> 
 def join_words(words: Sequence[str], *, windows: bool) -> str:
     """Return a command as one line of a shell.
 
-    Parameters
-    ----------
-    words : sequence of str
-    windows : bool
-        For cmd.exe, where double quotes protect all but themselves and percent signs.
-
-    Raises
-    ------
-    OutputError
-        When a word cannot stand in a line.
+    `windows`: for cmd.exe, where double quotes protect all but themselves and percent signs. Raises
+    OutputError when a word cannot stand in a line.
     """
     for word in words:
         if re.search(r"[\x00-\x1f\x7f]", word) or (windows and re.search('[%"]', word)):

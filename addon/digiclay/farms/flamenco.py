@@ -18,15 +18,8 @@ PLATFORMS = {"win32": "windows", "darwin": "darwin"}
 def format_job(name: str, tasks: Sequence[Task], program: Sequence[str], series: str) -> str:
     """Return a job as the Manager takes it.
 
-    Parameters
-    ----------
-    name : str
-    tasks : sequence of Task
-        Each after those it needs.
-    program : sequence of str
-        Path of the program, and its arguments before those of digiclay.
-    series : str
-        Folder of the series.
+    `tasks`: each after those it needs; `program`: path of the program, and its arguments before those of
+    digiclay; `series`: folder of the series.
     """
     parts = split_frames(tuple(tasks))
     places = {part.name: number for number, part in enumerate(parts)}

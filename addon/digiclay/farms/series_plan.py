@@ -70,16 +70,8 @@ class Task:
 def plan_series(series: JobSeries, chunk: int) -> tuple[Task, ...]:
     """Return the tasks of all jobs whose values go together, each after those it needs.
 
-    Parameters
-    ----------
-    series : JobSeries
-    chunk : int
-        Frames of a film that a task draws, at most.
-
-    Raises
-    ------
-    DigiclayError
-        When a film shows what is not in the session of its job, or there is no job.
+    `chunk`: frames of a film that a task draws, at most. Raises DigiclayError when a film shows what is not
+    in the session of its job, or there is no job.
     """
     tasks = [task for job in series.jobs for task in _plan_job(job, series.outputs, chunk)]
     if not tasks:

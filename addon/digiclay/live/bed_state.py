@@ -19,12 +19,7 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
     The tick is counted on even while nothing moves: it tells which one it was that
     undo has come back to.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    running : Running
-    before : Running, optional
-        What was written last; what has not changed since is left alone.
+    `bed` bpy.types.Object; `before`: what was written last; what has not changed since is left alone.
     """
     bed[TICK] = running.tick
     if before is not None and running.snapshot is before.snapshot:

@@ -67,22 +67,9 @@ def find(uid: int) -> Following | None:
 def begin(uid: int, address: str, token: str, *, online: bool) -> None:
     """Begin to follow a server; whatever was followed before is not any more.
 
-    Parameters
-    ----------
-    uid : int
-        `session_uid` of the bed.
-    address : str
-        Host and port of its OSC.
-    token : str
-    online : bool
-        Whether other machines may be reached.
-
-    Raises
-    ------
-    DigiclayError
-        When the address is none, or may not be reached.
-    OSError
-        When there is no way there.
+    `uid`: `session_uid` of the bed; `address`: host and port of its OSC; `online`: whether other machines may
+    be reached. Raises DigiclayError when the address is none, or may not be reached. Raises OSError when
+    there is no way there.
     """
     host, port = parse_address(address, online=online)
     door = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
@@ -106,12 +93,7 @@ def end(uid: int) -> None:
 def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     """Look for poses; return the newest one, None before the first, and what is to be told.
 
-    Parameters
-    ----------
-    uid : int
-        `session_uid` of the bed.
-    now : float
-        By a clock that never goes back, s.
+    `uid`: `session_uid` of the bed; `now`: by a clock that never goes back, s.
     """
     following = _FOLLOWED.get(uid)
     if following is None:

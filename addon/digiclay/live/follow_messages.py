@@ -29,16 +29,8 @@ OFFLINE = (
 def parse_address(text: str, *, online: bool) -> tuple[str, int]:
     """Return host and port of an address.
 
-    Parameters
-    ----------
-    text : str
-    online : bool
-        Whether other machines may be reached.
-
-    Raises
-    ------
-    DigiclayError
-        When it is no address, or that of another machine that may not be reached.
+    `online`: whether other machines may be reached. Raises DigiclayError when it is no address, or that of
+    another machine that may not be reached.
     """
     host, _, port = text.strip().rpartition(":")
     host = "127.0.0.1" if host == LOCAL else host.removeprefix("[").removesuffix("]")
@@ -54,27 +46,13 @@ def parse_address(text: str, *, online: bool) -> tuple[str, int]:
 
 
 def pack_subscription(token: str, rate: float) -> bytes:
-    """Return the request for states.
-
-    Parameters
-    ----------
-    token : str
-        Of the server.
-    rate : float
-        States a second.
-    """
+    """Return the request for states. `token`: of the server; `rate`: states a second."""
     words = b"".join(_pad(word) for word in (SUBSCRIBE, ",ssf", token, "state"))
     return words + struct.pack(">f", rate)
 
 
 def read_pose(data: bytes) -> Floats | None:
-    """Return the pose (7,) in a state; None where there is none that can be used.
-
-    Parameters
-    ----------
-    data : bytes
-        A datagram.
-    """
+    """Return the pose (7,) in a state; None where there is none that can be used. `data`: a datagram."""
     head = _pad(STATE) + _pad(",hh" + 9 * "d")
     if not data.startswith(head) or len(data) != len(head) + VALUES.size:
         return None

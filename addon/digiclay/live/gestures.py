@@ -35,11 +35,7 @@ def restore_gesture(running: Running, gesture: Gesture) -> Running:
     A finger that touched there already has to move on before it makes another gesture: else it counted at
     once, and could be taken back for ever without a way to those before it.
 
-    Parameters
-    ----------
-    running : Running
-    gesture : Gesture
-        One of the session.
+    `gesture`: one of the session.
     """
     back = restore(replace(running, recording=None), gesture.snapshot, gesture.pose)
     keep = running.recording

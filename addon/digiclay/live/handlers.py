@@ -51,15 +51,7 @@ def write_recordings(*_: Any) -> None:
 
 @bpy.app.handlers.persistent
 def finish_saving(path: str, *_: Any) -> None:
-    """Go on recording after the file was saved.
-
-    Parameters
-    ----------
-    path : str
-        Of the file.
-    *_
-        What else Blender hands over.
-    """
+    """Go on recording after the file was saved. `path`: of the file; `_`: what else Blender hands over."""
     recovery.clear_recovery(path)
 
 
@@ -85,12 +77,8 @@ def watch() -> None:
 def end(how: str, *sessions: Running) -> None:
     """End sessions at once; their beds keep the states of the last tick, and takes of what was recorded.
 
-    Parameters
-    ----------
-    how : str
-        What is told of them, after their names.
-    *sessions : Running
-        All that run if none is given. The last one takes loop and handlers along.
+    `how`: what is told of them, after their names; `sessions`: all that run if none is given. The last one
+    takes loop and handlers along.
     """
     recovery.clear_recovery()
     sessions = sessions or running.list_sessions()

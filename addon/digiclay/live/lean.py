@@ -17,12 +17,8 @@ TURN = 3.0
 def lean_finger(turn: Floats, lean: tuple[float, float]) -> Floats:
     """Return the orientation of a finger that leans over from another orientation.
 
-    Parameters
-    ----------
-    turn : ndarray (4,)
-        Unit quaternion w, x, y, z of the finger that does not lean.
-    lean : (float, float)
-        How far its top leans towards x and towards y of the bed, rad: the angle is the length.
+    `turn` (4,), unit quaternion w, x, y, z of the finger that does not lean; `lean` (float, float), how far
+    its top leans towards x and towards y of the bed, rad: the angle is the length.
     """
     angle = math.hypot(*lean)
     if angle == 0.0:
@@ -35,12 +31,7 @@ def lean_finger(turn: Floats, lean: tuple[float, float]) -> Floats:
 def mirror_turn(turn: Floats, mirror: Mirror) -> Floats:
     """Return the orientation of an ellipsoid's mirror image.
 
-    Parameters
-    ----------
-    turn : ndarray (4,)
-        Unit quaternion w, x, y, z.
-    mirror : (float, float)
-        Factors of x and y, 1 or -1.
+    `turn` (4,), unit quaternion w, x, y, z; `mirror` (float, float), factors of x and y, 1 or -1.
     """
     along, across = mirror
     # M R M for M = diag(along, across, 1): the axis of a rotation is mirrored the other way round.
@@ -50,12 +41,7 @@ def mirror_turn(turn: Floats, mirror: Mirror) -> Floats:
 def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:
     """Return an orientation turned towards another, by an angle at most.
 
-    Parameters
-    ----------
-    turn, aim : ndarray (4,)
-        Unit quaternions w, x, y, z.
-    angle : float
-        rad.
+    `turn`, `aim` (4,), unit quaternions w, x, y, z; `angle`, rad.
     """
     dot = float(turn @ aim)
     # The two quaternions of an orientation are opposite: the nearer one is meant.
@@ -71,16 +57,8 @@ def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:
 def advance_turn(stroke: Stroke, turn: Floats, clear: bool, period: float) -> Floats:
     """Return the finger's orientation after a control period on a stroke, (4,).
 
-    Parameters
-    ----------
-    stroke : Stroke
-        Begun; a finished one leaves the finger as it was before.
-    turn : ndarray (4,)
-        The finger's before.
-    clear : bool
-        Whether it is above all pins, where it turns at once.
-    period : float
-        s.
+    `stroke`: begun; a finished one leaves the finger as it was before; `turn` (4,), the finger's before;
+    `clear`: whether it is above all pins, where it turns at once; `period`, s.
     """
     assert stroke.turn is not None
     if stroke.done:

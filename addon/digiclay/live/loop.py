@@ -84,11 +84,7 @@ def end() -> None:
 def is_due(context: Any, now: float) -> bool:
     """Return whether to tick now: no more often than preferred, though other timers may run as well.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    now : float
-        Monotonic time, s.
+    `context` bpy.types.Context; `now`: monotonic time, s.
     """
     wanted = (1.0 - EARLY) / preferences.get(context).redraw_rate
     if now - float(_LOOP["ticked"]) < wanted:
@@ -100,11 +96,7 @@ def is_due(context: Any, now: float) -> bool:
 def redraw_numbers(context: Any, now: float) -> None:
     """Have the sidebars drawn anew, now and then: numbers that change too quickly cannot be read.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    now : float
-        Monotonic time, s.
+    `context` bpy.types.Context; `now`: monotonic time, s.
     """
     if now - float(_LOOP["numbers"]) < NUMBERS:
         return
@@ -126,10 +118,7 @@ def redraw_status() -> None:
 def draw(header: Any, context: Any) -> None:
     """Draw the keys of a running session in the status bar.
 
-    Parameters
-    ----------
-    header : bpy.types.Header
-    context : bpy.types.Context
+    `header` bpy.types.Header; `context` bpy.types.Context.
     """
     sessions = running.list_sessions()
     row = header.layout.row()

@@ -102,13 +102,7 @@ class Recorded:
 
 
 def read_strokes(path: Path) -> Recorded:
-    """Read a file of recorded strokes.
-
-    Raises
-    ------
-    SceneError
-        One line: file, stroke, key, rule, value.
-    """
+    """Read a file of recorded strokes. Raises SceneError: one line: file, stroke, key, rule, value."""
     table = read_table(path)
     try:
         refuse_unknown("", table, (*TEXTS, "stroke"))
@@ -137,16 +131,8 @@ def _read_text(table: Mapping[str, Any], key: str, usual: str) -> str:
 def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterator[Running]:
     """Play strokes in a session, as fast as the machine can; yield the session after each of them.
 
-    Parameters
-    ----------
-    running : Running
-        Used up. At the end its fingertip has the size that it has now.
-    strokes : tuple of PointerStroke
-
-    Raises
-    ------
-    DigiclayError
-        When a brush needs a blister that the method has not, or the session diverges.
+    `running`: used up. At the end its fingertip has the size that it has now. Raises DigiclayError when a
+    brush needs a blister that the method has not, or the session diverges.
     """
     usual = running.scene
     for number, stroke in enumerate(strokes, 1):

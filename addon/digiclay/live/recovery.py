@@ -33,10 +33,7 @@ def write_recovery() -> None:
 def clear_recovery(path: str = "") -> None:
     """Take it out of the beds again, since the recordings go on.
 
-    Parameters
-    ----------
-    path : str
-        The file that has been saved; empty when that has failed, or is not known.
+    `path`: the file that has been saved; empty when that has failed, or is not known.
     """
     while _WRITTEN:
         uid, name, number = _WRITTEN.pop()

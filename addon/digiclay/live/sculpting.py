@@ -45,30 +45,10 @@ def begin_session(
 ) -> tuple[Running, str]:
     """Begin a session, from a kept state if there is one.
 
-    Parameters
-    ----------
-    uid : int
-        `session_uid` of the bed.
-    name : str
-        Of the bed, for messages.
-    scene : Scene
-    pose : ndarray (7,)
-        Of the fingertip: lowest point, m, and quaternion.
-    kept : bytes, optional
-        A snapshot of `core.session.snapshot`; at rest when left out.
-    tick : int, optional
-        Of that snapshot.
-
-    Returns
-    -------
-    running : Running
-    said : str
-        What of the kept state could not be taken up, and why; empty when all could.
-
-    Raises
-    ------
-    DigiclayError
-        When the scene's parts do not go together.
+    `uid`: `session_uid` of the bed; `name`: of the bed, for messages; `pose` (7,), of the fingertip: lowest
+    point, m, and quaternion; `kept`: a snapshot of `core.session.snapshot`; at rest when left out; `tick`: of
+    that snapshot. Returns `running`; `said`: what of the kept state could not be taken up, and why; empty
+    when all could. Raises DigiclayError when the scene's parts do not go together.
     """
     system = assemble(scene)
     state, said = _load_state(system, kept)
@@ -101,23 +81,9 @@ def advance(
 ) -> Running:
     """Let a session follow the finger up to now; nothing is simulated while it is paused.
 
-    Parameters
-    ----------
-    running : Running
-        Used up.
-    pose : ndarray (7,)
-        Where the finger is, finite.
-    now : float
-        The wall's time by a clock that never goes back, s.
-    most : int
-        Most control periods to simulate.
-    pins : sequence of int, optional
-        The picked ones; those picked before when left out.
-
-    Raises
-    ------
-    DivergenceError
-        The session is used up then: `restore` takes it up again.
+    `running`: used up; `pose` (7,), where the finger is, finite; `now`: the wall's time by a clock that never
+    goes back, s; `most`: most control periods to simulate; `pins`: the picked ones; those picked before when
+    left out. Raises DivergenceError: the session is used up then: `restore` takes it up again.
     """
     if pins is not None:
         running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))
@@ -137,13 +103,7 @@ def request_step(running: Running) -> Running:
 def follow_finger(running: Running, pose: Floats, count: int) -> Running:
     """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advance`.
 
-    Parameters
-    ----------
-    running : Running
-    pose : ndarray (7,)
-        Where the finger is.
-    count : int
-        Most control periods.
+    `pose` (7,), where the finger is; `count`: most control periods.
     """
     system, state, monitor, smoothing = running.system, running.state, running.monitor, None
     if running.strokes:
@@ -197,15 +157,8 @@ def _count_gesture(running: Running, *, smoothed: bool) -> Running:
 def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None = None) -> Running:
     """Return the session with another state of its bed: after undo or redo, or when it diverged.
 
-    Parameters
-    ----------
-    running : Running
-    kept : bytes or None
-        None: the bed was at rest.
-    pose : ndarray (7,)
-        The finger's at that state.
-    tick : int, optional
-        When it was that state; a recording goes back to it, or ends if it did not lead there.
+    `kept`: none: the bed was at rest; `pose` (7,), the finger's at that state; `tick`: when it was that
+    state; a recording goes back to it, or ends if it did not lead there.
     """
     state, _ = _load_state(running.system, kept)
     now = snapshot.dump(running.system, state)
@@ -223,13 +176,7 @@ def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None
 
 
 def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
-    """Let the session go on with other parameters; see `begin_session` for what is returned and raised.
-
-    Parameters
-    ----------
-    running : Running
-    scene : Scene
-    """
+    """Let the session go on with other parameters; see `begin_session` for what is returned and raised."""
     if scene == running.scene:
         return running, ""
     other, said = begin_session(
@@ -253,13 +200,7 @@ def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
 
 
 def set_recording(running: Running, on: bool) -> Running:
-    """Begin to record the finger's path, or stop recording it.
-
-    Parameters
-    ----------
-    running : Running
-    on : bool
-    """
+    """Begin to record the finger's path, or stop recording it."""
     if not on:
         return replace(running, recording=None)
     begin_at = Recording.begin(running.snapshot, running.state.period, running.pose, running.tick)

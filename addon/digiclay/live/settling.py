@@ -50,31 +50,11 @@ def settle(
 ) -> tuple[Stroke, Floats, Floats]:  # fmt: skip
     """Settle the worst spike for a stretch of time; without one, wait until the pins have arrived.
 
-    Parameters
-    ----------
-    stroke : Stroke
-        In the phase SETTLING.
-    grid : Grid
-    target : ndarray (n,)
-        Heights that the pins are commanded to, m.
-    finger : Fingertip
-    blister : Blister
-    pose : ndarray (7,)
-        Where the finger is, and stays.
-    count : int
-        Most control periods to go on for.
-    period : float
-        Control period, s.
-    arrived : bool
-        Whether no pin is on its way to a height.
-
-    Returns
-    -------
-    stroke : Stroke
-    path : ndarray (k + 1, 7)
-        Poses between the periods; k is at most `count`.
-    orders : ndarray (k, 4)
-        What is smoothed in each of the periods, see `core.control.smoothing`.
+    `stroke`: in the phase SETTLING; `target` (n,), heights that the pins are commanded to, m; `pose` (7,),
+    where the finger is, and stays; `count`: most control periods to go on for; `period`: control period, s;
+    `arrived`: whether no pin is on its way to a height. Returns `stroke`; `path` (k + 1, 7), poses between
+    the periods; k is at most `count`; `orders` (k, 4), what is smoothed in each of the periods, see
+    `core.control.smoothing`.
     """
     gone = stroke.clock - stroke.left
     if gone < 0.0:
@@ -97,14 +77,7 @@ def settle(
 def find_spike(stroke: Stroke, grid: Grid, target: Floats, finger: Fingertip, blister: Blister) -> int | None:
     """Return the worst spike that a stroke has left; None when there is none.
 
-    Parameters
-    ----------
-    stroke : Stroke
-    grid : Grid
-    target : ndarray (n,)
-        Heights that the pins are commanded to, m.
-    finger : Fingertip
-    blister : Blister
+    `target` (n,), heights that the pins are commanded to, m.
     """
     assert stroke.height is not None
     excess, limit = measure_excess_heights(grid, target), LIMIT * grid.layout.pitch
@@ -126,12 +99,7 @@ def find_spike(stroke: Stroke, grid: Grid, target: Floats, finger: Fingertip, bl
 def measure_excess_heights(grid: Grid, height: Floats) -> Floats:
     """Return how far each pin is above all its neighbors, (n,), m; negative below all of them, else 0.
 
-    Parameters
-    ----------
-    grid : Grid
-        A pin of an aligned bed has eight neighbors, one of a bed with shifted rows six.
-    height : ndarray (n,)
-        m.
+    `grid`: a pin of an aligned bed has eight neighbors, one of a bed with shifted rows six; `height` (n,), m.
     """
     one = np.asarray(height)
     beside = np.append(one, np.nan)[grid.layout.find_neighbors(corners=True)]

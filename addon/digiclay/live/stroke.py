@@ -167,14 +167,7 @@ def start(
 ) -> Stroke:  # fmt: skip
     """Return the stroke of a mouse that goes down at a place, m.
 
-    Parameters
-    ----------
-    number : int
-    x, y, depth, share, lean
-        See `Sample`.
-    mirrors : tuple of (float, float), optional
-        See `SYMMETRIES`.
-    brush : Brush, optional
+    `x`, `y`, `depth`, `share`, `lean`: see `Sample`; `mirrors` (float, float), see `SYMMETRIES`.
     """
     first = Sample(0.0, x, y, _limit_depth(depth), share, lean)
     return Stroke(number, (first,), mirrors=mirrors, brush=brush)
@@ -186,13 +179,8 @@ def draw(
 ) -> Stroke:  # fmt: skip
     """Return the stroke drawn on to a place; nothing is added to one that is let go.
 
-    Parameters
-    ----------
-    stroke : Stroke
-    time : float
-        When Blender tells of the move, since the mouse went down, s; see `BURST`.
-    x, y, depth, share, lean
-        See `Sample`.
+    `time`: when Blender tells of the move, since the mouse went down, s; see `BURST`; `x`, `y`, `depth`,
+    `share`, `lean`: see `Sample`.
     """
     if not stroke.held:
         return stroke
@@ -209,16 +197,7 @@ def draw(
 
 
 def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
-    """Return the stroke with another depth where it is, m, within what is possible.
-
-    Parameters
-    ----------
-    stroke : Stroke
-    time : float
-        s.
-    by : float
-        m.
-    """
+    """Return the stroke with another depth where it is, m, within what is possible. `time`, s; `by`, m."""
     last = stroke.samples[-1]
     return draw(stroke, time, last.x, last.y, last.depth + by, last.share, last.lean)
 

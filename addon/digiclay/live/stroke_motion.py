@@ -57,30 +57,11 @@ def follow(
 ) -> tuple[Stroke, Floats]:
     """Advance the fingertip along a press stroke.
 
-    Parameters
-    ----------
-    stroke : Stroke
-        Not done yet.
-    grid : Grid
-    height : ndarray (n,)
-        Heights of the pins now, m; taken for the surface by a stroke that begins.
-    finger : Fingertip
-    pose : ndarray (7,)
-        Where the finger is.
-    count : int
-        Most control periods to go on for.
-    period : float
-        Control period, s.
-    now : float
-        Time by the wall, s, by a clock that never goes back.
-    tracking : Tracking, optional
-        How the device's blister follows; None without one. Taken by a stroke that begins.
-
-    Returns
-    -------
-    stroke : Stroke
-    path : ndarray (k + 1, 7)
-        Poses between the periods, row 0 where the finger was; k is at most `count`.
+    `stroke`: not done yet; `height` (n,), heights of the pins now, m; taken for the surface by a stroke that
+    begins; `pose` (7,), where the finger is; `count`: most control periods to go on for; `period`: control
+    period, s; `now`: time by the wall, s, by a clock that never goes back; `tracking`: how the device's
+    blister follows; None without one. Taken by a stroke that begins. Returns `stroke`; `path` (k + 1, 7),
+    poses between the periods, row 0 where the finger was; k is at most `count`.
     """
     if stroke.height is None:
         stroke = replace(_begin(stroke, height, tracking), turn=pose[3:])
@@ -171,12 +152,7 @@ def _track(
 def _find_lowest(stroke: Stroke, grid: Grid, x: float, y: float, radius: float) -> float:
     """Return how low the finger is to be at a place of its path, m.
 
-    Parameters
-    ----------
-    stroke : Stroke
-    grid : Grid
-    x, y, radius : float
-        The place, and how far about it the surface counts, m.
+    `x`, `y`, `radius`: the place, and how far about it the surface counts, m.
     """
     height, sample = stroke.height, stroke.samples[stroke.reached]
     assert height is not None
@@ -206,16 +182,8 @@ def _limit_drag(stroke: Stroke, grid: Grid, place: Place) -> float:
 def _climb(z: float, climb: float, aim: float, fastest: float, period: float) -> tuple[float, float]:
     """Return height and speed after a control period on the way to a height, m and m/s.
 
-    Parameters
-    ----------
-    z, climb : float
-        Height, m, and speed upwards, m/s.
-    aim : float
-        m.
-    fastest : float
-        m/s; it is reached in the time `SPEED_UP`.
-    period : float
-        s.
+    `z`, `climb`: height, m, and speed upwards, m/s; `aim`, m; `fastest`: m/s; it is reached in the time
+    `SPEED_UP`; `period`, s.
     """
     gain = fastest / SPEED_UP
     far = aim - z
@@ -231,14 +199,7 @@ def _find_touch(grid: Grid, height: Floats, finger: Fingertip, x: float, y: floa
 
     On a slope it touches the pins beside it first, several millimeters above the surface below it.
 
-    Parameters
-    ----------
-    grid : Grid
-    height : ndarray (n,)
-        m.
-    finger : Fingertip
-    x, y : float
-        m.
+    `height` (n,), m; `x`, `y`, m.
     """
     cells = grid.disc(x, y, finger.width)
     square = ((grid.x[cells] - x) ** 2 + (grid.y[cells] - y) ** 2) / finger.width**2

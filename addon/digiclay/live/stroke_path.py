@@ -22,12 +22,8 @@ SIDE, SMALLEST_RING = 1e-3, 0.5e-3
 def pull(place: Place, mouse: Place, radius: float) -> Place:
     """Return where a place comes that the mouse pulls behind it on a string.
 
-    Parameters
-    ----------
-    place, mouse : (float, float)
-        m.
-    radius : float
-        Length of the string, m: while the mouse is nearer the place stays.
+    `place`, `mouse` (float, float), m; `radius`: length of the string, m: while the mouse is nearer the place
+    stays.
     """
     away = math.hypot(mouse[0] - place[0], mouse[1] - place[1])
     if away <= radius:
@@ -37,23 +33,15 @@ def pull(place: Place, mouse: Place, radius: float) -> Place:
 
 
 def lay_line(start: Place, end: Place) -> Floats:
-    """Return the ends of a line, (2, 2), m.
-
-    Parameters
-    ----------
-    start, end : (float, float)
-        m.
-    """
+    """Return the ends of a line, (2, 2), m. `start`, `end` (float, float), m."""
     return np.array([start, end])
 
 
 def lay_ring(center: Place, rim: Place) -> Floats:
     """Return a closed polygon for the circle about a place through another, (k, 2), m.
 
-    Parameters
-    ----------
-    center, rim : (float, float)
-        m. It begins and ends at the rim; one without a radius is its center alone.
+    `center`, `rim` (float, float), m. It begins and ends at the rim; one without a radius is its center
+    alone.
     """
     radius = math.hypot(rim[0] - center[0], rim[1] - center[1])
     if radius < SMALLEST_RING:
@@ -67,12 +55,7 @@ def lay_ring(center: Place, rim: Place) -> Floats:
 def lay_path(stroke: Stroke, points: Sequence[Place] | Floats) -> Stroke:
     """Return a stroke whose path is drawn already, evenly, and let go.
 
-    Parameters
-    ----------
-    stroke : Stroke
-        All its places are pressed like its first.
-    points : sequence of (float, float)
-        m; at least one.
+    `stroke`: all its places are pressed like its first; `points` (float, float), m; at least one.
     """
     places = np.asarray(points, np.float64).reshape(-1, 2)
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)

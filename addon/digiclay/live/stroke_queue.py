@@ -24,14 +24,8 @@ def queue_stroke(
 ) -> tuple[Running, int]:  # fmt: skip
     """Queue the stroke of a mouse that goes down at a place, m; return its number as well.
 
-    Parameters
-    ----------
-    running : Running
-    x, y, depth, share, lean
-        See `stroke.Sample`.
-    mirrors : tuple of (float, float), optional
-        See `stroke.SYMMETRIES`.
-    brush : Brush, optional
+    `x`, `y`, `depth`, `share`, `lean`: see `stroke.Sample`; `mirrors` (float, float), see
+    `stroke.SYMMETRIES`.
     """
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
     return replace(
@@ -40,13 +34,7 @@ def queue_stroke(
 
 
 def find_stroke(running: Running, number: int) -> Stroke | None:
-    """Return the stroke of a number, or None when it is finished or was taken back.
-
-    Parameters
-    ----------
-    running : Running
-    number : int
-    """
+    """Return the stroke of a number, or None when it is finished or was taken back."""
     return next((stroke for stroke in running.strokes if stroke.number == number), None)
 
 
@@ -61,13 +49,7 @@ def last_place(running: Running) -> tuple[float, float] | None:
 def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:
     """Return the session with one of its strokes changed, if it still has it.
 
-    Parameters
-    ----------
-    running : Running
-    number : int
-        Of the stroke.
-    change : callable
-        Returns a stroke in place of another.
+    `number`: of the stroke; `change`: returns a stroke in place of another.
     """
     strokes = tuple(change(one) if one.number == number else one for one in running.strokes)
     return replace(running, strokes=strokes)
@@ -83,21 +65,10 @@ def drop_strokes(running: Running) -> Running:
 def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | None]:
     """Take from the first stroke where the finger goes in the next control periods.
 
-    Parameters
-    ----------
-    running : Running
-        With a stroke at least.
-    count : int
-        Most control periods.
-
-    Returns
-    -------
-    running : Running
-        Without the stroke when that ends here. Where it began is where a gesture began.
-    path : ndarray (k + 1, 7)
-        Poses between the periods, k at most `count`.
-    smoothing : ndarray (k, 4) or None
-        What is smoothed in each of the periods, see `core.control.smoothing`; None: nothing.
+    `running`: with a stroke at least; `count`: most control periods. Returns `running`: without the stroke
+    when that ends here. Where it began is where a gesture began; `path` (k + 1, 7), poses between the
+    periods, k at most `count`; `smoothing` (k, 4), what is smoothed in each of the periods, see
+    `core.control.smoothing`; None: nothing.
     """
     first = running.strokes[0]
     if first.height is None:

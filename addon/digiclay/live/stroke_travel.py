@@ -29,16 +29,7 @@ LATE = 0.5
 
 
 def run_clock(stroke: Stroke, period: float, now: float) -> Stroke:
-    """Return the stroke with its clock a control period on.
-
-    Parameters
-    ----------
-    stroke : Stroke
-    period : float
-        s.
-    now : float
-        Time by the wall, s.
-    """
+    """Return the stroke with its clock a control period on. `period`, s; `now`: time by the wall, s."""
     # It waits for moves that may have been made, or it would stop short and then make haste.
     if stroke.held and stroke.clock >= stroke.known:
         return stroke
@@ -48,15 +39,7 @@ def run_clock(stroke: Stroke, period: float, now: float) -> Stroke:
 def cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[Stroke, Place]:
     """Go up to a safe height, then over to the path's first place.
 
-    Parameters
-    ----------
-    stroke : Stroke
-    place : (float, float, float)
-        Of the finger, m.
-    safe : float
-        m.
-    period : float
-        s.
+    `place` (float, float, float), of the finger, m; `safe`, m; `period`, s.
     """
     x, y, z = place
     if z < safe - NEAR:
@@ -71,13 +54,7 @@ def cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[Str
 def drag(stroke: Stroke, x: float, y: float, length: float) -> tuple[Stroke, float, float]:
     """Return the stroke and the place after a length of its path, never ahead of the hand.
 
-    Parameters
-    ----------
-    stroke : Stroke
-    x, y : float
-        Where the finger is, m.
-    length : float
-        m.
+    `x`, `y`: where the finger is, m; `length`, m.
     """
     reached, samples = stroke.reached, stroke.samples
     while reached + 1 < len(samples):

@@ -24,13 +24,7 @@ PATIENCE = 2.0
 
 
 def find_radius(finger: Fingertip, layout: Layout) -> float:
-    """Return the radius of the disc that a stroke smooths, m: half the finger's width, or that of few pins.
-
-    Parameters
-    ----------
-    finger : Fingertip
-    layout : Layout
-    """
+    """Return the radius of the disc that a stroke smooths, m: half the finger's width, or that of few pins."""
     return max(finger.width, LEAST * layout.pitch)
 
 
@@ -40,32 +34,12 @@ def sweep(
 ) -> tuple[Stroke, Floats, Floats]:  # fmt: skip
     """Advance the fingertip over a press stroke that smooths.
 
-    Parameters
-    ----------
-    stroke : Stroke
-        Not done yet.
-    height : ndarray (n,)
-        How high the pins are now, or are commanded to, m: the finger stays above.
-    radius : float
-        Of the disc that is smoothed, m.
-    pose : ndarray (7,)
-        Where the finger is.
-    count : int
-        Most control periods to go on for.
-    period : float
-        Control period, s.
-    now : float
-        Time by the wall, s, by a clock that never goes back.
-    arrived : bool
-        Whether all smoothed pins are at their heights now.
-
-    Returns
-    -------
-    stroke : Stroke
-    path : ndarray (k + 1, 7)
-        Poses between the periods, row 0 where the finger was; k is at most `count`.
-    orders : ndarray (k, 4)
-        What is smoothed in each of the periods, see `core.control.smoothing`.
+    `stroke`: not done yet; `height` (n,), how high the pins are now, or are commanded to, m: the finger stays
+    above; `radius`: of the disc that is smoothed, m; `pose` (7,), where the finger is; `count`: most control
+    periods to go on for; `period`: control period, s; `now`: time by the wall, s, by a clock that never goes
+    back; `arrived`: whether all smoothed pins are at their heights now. Returns `stroke`; `path` (k + 1, 7),
+    poses between the periods, row 0 where the finger was; k is at most `count`; `orders` (k, 4), what is
+    smoothed in each of the periods, see `core.control.smoothing`.
     """
     if stroke.height is None:
         stroke = replace(stroke, height=height.copy(), phase=ABOVE)

@@ -36,15 +36,8 @@ class Note(NamedTuple):
 def start(context: Any, bed: Any) -> list[Note]:
     """Begin a session of a bed, from what the bed keeps; what was missing for it is made.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-
-    Raises
-    ------
-    DigiclayError
-        When the bed's settings, its scale or a bake do not allow it.
+    `context` bpy.types.Context; `bed` bpy.types.Object. Raises DigiclayError when the bed's settings, its
+    scale or a bake do not allow it.
     """
     if is_baked(bed):
         raise DigiclayError(f"{bed.name} plays a baked session: free the bake in the Takes panel first.")
@@ -80,10 +73,7 @@ def stop(uid: int) -> str:
 def show(bed: Any, session: Running) -> None:
     """Make a value the present one of a session, kept by its bed, and shown as soon as its mesh can be.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    session : Running
+    `bed` bpy.types.Object.
     """
     running.put(session)
     bed_state.write(bed, session)
@@ -94,11 +84,7 @@ def show(bed: Any, session: Running) -> None:
 def place_finger(context: Any, bed: Any, session: Running) -> None:
     """Put the fingertip where a session has it; one that is animated or constrained goes its own way.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    session : Running
+    `context` bpy.types.Context; `bed` bpy.types.Object.
     """
     if _move_finger(bed, session):
         _evaluate(context)
@@ -115,11 +101,7 @@ def _move_finger(bed: Any, session: Running) -> bool:
 def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
     """Take back the last unfinished stroke of one session, or of each; return whether there was one.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    uid : int, optional
-        Of one session's bed; by default all.
+    `context` bpy.types.Context; `uid`: of one session's bed; by default all.
     """
     busy = [session for session in running.list_sessions() if session.strokes and uid in (None, session.uid)]
     for session in busy:
@@ -134,11 +116,7 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
 def tick(context: Any, now: float) -> list[Note]:
     """Advance every session to the current time of a monotonic clock, s; return the messages.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    now : float
-        s.
+    `context` bpy.types.Context; `now`, s.
     """
     notes: list[Note] = []
     most = preferences.get(context).most_periods

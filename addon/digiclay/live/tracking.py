@@ -68,11 +68,7 @@ class Tracking:
 def find_tracking(scene: Scene, system: System) -> Tracking | None:
     """Return how the blister of a scene follows a fingertip; None where its method has no blister.
 
-    Parameters
-    ----------
-    scene : Scene
-    system : System
-        Of the scene.
+    `system`: of the scene.
     """
     control, touch, blister = scene.control, system.cell.touch, scene.blister
     if not isinstance(control, VirtualMaster | CellStates | Hybrid) or touch is None or blister is None:
@@ -112,15 +108,8 @@ def _sample_underside(finger: Fingertip, layout: Layout) -> tuple[Floats, float]
 def _find_sink(touch: Touch, gap: Floats, share: float, force: float) -> float:
     """Return how deep a finger lies in flat pins under a force.
 
-    Parameters
-    ----------
-    touch : Touch
-    gap : ndarray (k,)
-        Height of its underside over its lowest point at some places, m.
-    share : float
-        How many pins each of the places stands for.
-    force : float
-        N.
+    `gap` (k,), height of its underside over its lowest point at some places, m; `share`: how many pins each
+    of the places stands for; `force`, N.
     """
     pulp = touch.pulp
     kept = float(pulp.reduced(np.array(CONTACT_TIME))) if isinstance(pulp, Relaxation) else 1.0

@@ -17,11 +17,7 @@ from .running import Running
 def find_bed(uid: int, name: str) -> Any | None:
     """Return the object of a `session_uid`, or None when it was deleted: it stands in no scene any more.
 
-    Parameters
-    ----------
-    uid : int
-    name : str
-        Its name when last seen: looked up first.
+    `name`: its name when last seen: looked up first.
     """
     bed = bpy.data.objects.get(name)
     if bed is None or bed.session_uid != uid:
@@ -41,12 +37,8 @@ def _is_shown(context: Any, thing: Any) -> bool:
 def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
     """Return the reason why the session of a bed cannot continue now, or an empty text.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    pins : int, optional
-        How many the session simulates; as many as there are when left out.
+    `context` bpy.types.Context; `bed` bpy.types.Object; `pins`: how many the session simulates; as many as
+    there are when left out.
     """
     if bpy.app.is_job_running("RENDER"):
         return localize("a render is under way")

@@ -139,10 +139,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Add it by hand, at first the bed to design on, and show all of it; the redo panel leaves the view.
 
-        Parameters
-        ----------
-        context : bpy.types.Context
-        event : bpy.types.Event
+        `context` bpy.types.Context; `event` bpy.types.Event.
         """
         if not self.properties.is_property_set("bed"):
             self.bed = FIRST

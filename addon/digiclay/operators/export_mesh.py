@@ -163,11 +163,5 @@ class ExportMenu(bpy.types.Menu):
 
 
 def entry(menu: Any, context: Any) -> None:
-    """Draw the entry in File > Export.
-
-    Parameters
-    ----------
-    menu : bpy.types.Menu
-    context : bpy.types.Context
-    """
+    """Draw the entry in File > Export. `menu` bpy.types.Menu; `context` bpy.types.Context."""
     menu.layout.menu(ExportMenu.bl_idname, icon="MESH_GRID")

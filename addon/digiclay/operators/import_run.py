@@ -34,11 +34,5 @@ class ImportRun(Placed, FileAction, bpy.types.Operator):
 
 
 def entry(menu: Any, context: Any) -> None:
-    """Draw the entry in File > Import.
-
-    Parameters
-    ----------
-    menu : bpy.types.Menu
-    context : bpy.types.Context
-    """
+    """Draw the entry in File > Import. `menu` bpy.types.Menu; `context` bpy.types.Context."""
     menu.layout.operator(ImportRun.bl_idname, text="Digital Clay run (.npz)")

@@ -64,12 +64,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
 def _beside(context: Any, bed: Any, width: float) -> Any:
     """Return the first place beside a bed, a matrix, that no mesh made before stands in.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    width : float
-        Of its pins, in its own space.
+    `context` bpy.types.Context; `bed` bpy.types.Object; `width`: of its pins, in its own space.
     """
     step, half = (1.0 + GAP) * width, width / 2
     to_bed = np.array(bed.matrix_world.inverted_safe(), np.float64)

@@ -116,13 +116,7 @@ class SurfaceOptions(FindingOptions):
 
 
 def chosen_bed(context: Any) -> Any:
-    """Return the bed to work on.
-
-    Raises
-    ------
-    OutputError
-        When it has gone since the operator was called.
-    """
+    """Return the bed to work on. Raises OutputError when it has gone since the operator was called."""
     bed = bed_of(context)
     if bed is None:
         raise OutputError("There is no bed any more: select one, or its fingertip.")

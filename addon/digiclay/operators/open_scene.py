@@ -40,13 +40,7 @@ class AddSceneAction(Placed, Action):
         return edited(context, "Leave Edit Mode first: the device is an object of its own")
 
     def add_scene(self, context: Any, scene: Scene) -> None:
-        """Add the bed of a scene, its finger where its path begins.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-        scene : Scene
-        """
+        """Add the bed of a scene, its finger where its path begins. `context` bpy.types.Context."""
         scene = shape_show.embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
@@ -174,24 +168,12 @@ class SceneFiles(bpy.types.FileHandler):
 
 
 def added(menu: Any, context: Any) -> None:
-    """Draw the submenu in Add > Mesh.
-
-    Parameters
-    ----------
-    menu : bpy.types.Menu
-    context : bpy.types.Context
-    """
+    """Draw the submenu in Add > Mesh. `menu` bpy.types.Menu; `context` bpy.types.Context."""
     menu.layout.menu(Samples.bl_idname, icon="MESH_GRID")
 
 
 def imported(menu: Any, context: Any) -> None:
-    """Draw the entry in File > Import.
-
-    Parameters
-    ----------
-    menu : bpy.types.Menu
-    context : bpy.types.Context
-    """
+    """Draw the entry in File > Import. `menu` bpy.types.Menu; `context` bpy.types.Context."""
     menu.layout.operator(OpenScene.bl_idname, text="Digital Clay scene (.toml)")
 
 

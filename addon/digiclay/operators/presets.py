@@ -28,11 +28,7 @@ class ApplyPreset(Action, bpy.types.Operator):
     def description(cls, context: Any, chosen: Any) -> str:
         """Return the description of the preset.
 
-        Parameters
-        ----------
-        context : bpy.types.Context
-        chosen : bpy.types.OperatorProperties
-            The operator's settings.
+        `context` bpy.types.Context; `chosen` bpy.types.OperatorProperties, the operator's settings.
         """
         return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
 

@@ -28,11 +28,7 @@ class TakeFinger(Action, bpy.types.Operator):
     def description(cls, context: Any, chosen: Any) -> str:
         """Return measures and source of a finger.
 
-        Parameters
-        ----------
-        context : bpy.types.Context
-        chosen : bpy.types.OperatorProperties
-            The operator's settings.
+        `context` bpy.types.Context; `chosen` bpy.types.OperatorProperties, the operator's settings.
         """
         kind = FINGERS[chosen.kind]
         axes = (kind.finger.length, kind.finger.width, kind.finger.height)

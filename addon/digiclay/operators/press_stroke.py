@@ -224,10 +224,7 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
 def _ensure_session(context: Any, bed: Any) -> running.Running:
     """Return the session of a bed; one is started if there is none.
 
-    Raises
-    ------
-    DigiclayError, RuntimeError
-        When it cannot be started, with the reason.
+    Raises DigiclayError, RuntimeError when it cannot be started, with the reason.
     """
     if running.find(bed) is None:
         context.view_layer.objects.active = bed

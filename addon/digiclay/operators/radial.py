@@ -46,24 +46,12 @@ class AdjustMixin(Polled):
     def read(self, bed: Any, settings: Any) -> float:
         """Return the number now, from the bed or from the settings of the tool.
 
-        Parameters
-        ----------
-        bed : bpy.types.Object
-        settings : bpy.types.PropertyGroup
-            Of the tool.
+        `bed` bpy.types.Object; `settings` bpy.types.PropertyGroup, of the tool.
         """
         raise NotImplementedError
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Set the number.
-
-        Parameters
-        ----------
-        bed : bpy.types.Object
-        settings : bpy.types.PropertyGroup
-            Of the tool.
-        value : float
-        """
+        """Set the number. `bed` bpy.types.Object; `settings` bpy.types.PropertyGroup, of the tool."""
         raise NotImplementedError
 
     def parse(self, text: str) -> float:
@@ -73,10 +61,7 @@ class AdjustMixin(Polled):
     def rate(self, context: Any, bed: Any) -> float:
         """Return the change of the number for a pixel.
 
-        Parameters
-        ----------
-        context : bpy.types.Context
-        bed : bpy.types.Object
+        `context` bpy.types.Context; `bed` bpy.types.Object.
         """
         raise NotImplementedError
 
@@ -87,13 +72,7 @@ class AdjustMixin(Polled):
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
         """Return outlines (k, 2) about the place pointed at that show the number, m.
 
-        Parameters
-        ----------
-        finger : Fingertip
-        turn : sequence of float
-            Quaternion wxyz.
-        depth, value : float
-            m; the number.
+        `turn` sequence of float, quaternion wxyz; `depth`, `value`: m; the number.
         """
         raise NotImplementedError
 
@@ -228,11 +207,7 @@ def no_bed(context: Any) -> str:
 def find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:
     """Return the bed under the mouse and the place there, m; or the bed in use and its middle.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    xy : (float, float)
-        Pixels in the region.
+    `context` bpy.types.Context; `xy` (float, float), pixels in the region.
     """
     found = aim.find_target(context, xy)
     if found is not None and view.fingertip_of(found.bed) is not None and found.bed.library is None:

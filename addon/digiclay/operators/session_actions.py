@@ -36,14 +36,7 @@ class OfSession(Action):
         return None
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
-        """Change a session.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-        bed : bpy.types.Object
-        session : Running
-        """
+        """Change a session. `context` bpy.types.Context; `bed` bpy.types.Object."""
         raise NotImplementedError
 
 

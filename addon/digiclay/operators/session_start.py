@@ -43,10 +43,7 @@ class LeaveMode(Action, bpy.types.Operator):
 def leave_entry(menu: Any, context: Any) -> None:
     """Offer the way back after the menus of a 3D view's header, as in the Sculpting workspace.
 
-    Parameters
-    ----------
-    menu : bpy.types.Menu
-    context : bpy.types.Context
+    `menu` bpy.types.Menu; `context` bpy.types.Context.
     """
     if not LeaveMode.poll_message(context):
         menu.layout.operator(LeaveMode.bl_idname, icon="LOOP_BACK")

@@ -31,16 +31,7 @@ RELIEFS = (
 
 
 def millimeters(name: str, default: float, words: str) -> Any:
-    """Make a property of a length.
-
-    Parameters
-    ----------
-    name : str
-    default : float
-        m.
-    words : str
-        Its description.
-    """
+    """Make a property of a length. `default`, m; `words`: its description."""
     return bpy.props.FloatProperty(
         name=f"{name} (mm)", description=words, default=default * 1e3, soft_min=-100.0, soft_max=100.0,
         min=-1e5, max=1e5, precision=2, step=20,
@@ -81,10 +72,7 @@ class Shaped(Action):
     def missing(cls, context: Any, bed: Any) -> str:
         """Return what else is needed, or an empty text.
 
-        Parameters
-        ----------
-        context : bpy.types.Context
-        bed : bpy.types.Object
+        `context` bpy.types.Context; `bed` bpy.types.Object.
         """
         return ""
 
@@ -101,23 +89,15 @@ class Shaped(Action):
     def displayed(self, context: Any, bed: Any) -> Any:
         """Display the shape; return what `shape_show` does.
 
-        Parameters
-        ----------
-        context : bpy.types.Context
-        bed : bpy.types.Object
+        `context` bpy.types.Context; `bed` bpy.types.Object.
         """
         raise NotImplementedError
 
     def shape(self, file: str, bed: Any, **known: Any) -> Shape:
         """Return how the shape is laid onto the bed.
 
-        Parameters
-        ----------
-        file : str
-            Empty where the shape is none of a file.
-        bed : bpy.types.Object
-        **known
-            More fields of `Shape`.
+        `file`: empty where the shape is none of a file; `bed` bpy.types.Object; `known`: more fields of
+        `Shape`.
         """
         known |= {name: to_si(getattr(self, name), SHOWN["m"][1]) for name in ("x", "y", "rise", "foot")}
         before = bed.digiclay.shape
@@ -191,9 +171,6 @@ class ShapeSample(Shaped, bpy.types.Operator):
 def others(context: Any, bed: Any) -> list[Any]:
     """Return the selected objects with a surface that are no part of a bed.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
+    `context` bpy.types.Context; `bed` bpy.types.Object.
     """
     return [thing for thing in context.selected_objects if thing != bed and shape_show.has_surface(thing)]

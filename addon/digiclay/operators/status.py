@@ -16,10 +16,7 @@ _TOLD: dict[str, str] = {}
 def show(context: Any, words: str) -> None:
     """Write words into the status bar, in place of those written before, in whichever workspace.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    words : str
+    `context` bpy.types.Context.
     """
     name = context.workspace.name
     if _TOLD.get(name) == words:

@@ -23,14 +23,7 @@ FONT = 0
 
 
 def draw(picture: Picture, width: float, height: float) -> None:
-    """Draw a picture into a region of a size in pixels.
-
-    Parameters
-    ----------
-    picture : Picture
-    width, height : float
-        Of the region, pixels.
-    """
+    """Draw a picture into a region of a size in pixels. `width`, `height`: of the region, pixels."""
     gpu.state.blend_set("ALPHA")
     try:
         for box in picture.boxes:
@@ -46,14 +39,7 @@ def draw(picture: Picture, width: float, height: float) -> None:
 
 
 def cursor(lines: list[Line], words: Sequence[Words] = ()) -> None:
-    """Draw lines and text about the mouse.
-
-    Parameters
-    ----------
-    lines : list of Line
-    words : sequence of Words, optional
-        In pixels of the window.
-    """
+    """Draw lines and text about the mouse. `words`: in pixels of the window."""
     _, _, width, height = gpu.state.viewport_get()
     gpu.state.blend_set("ALPHA")
     try:

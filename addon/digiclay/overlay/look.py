@@ -42,12 +42,8 @@ class Look:
 def choose_colors(back: Color, ink: Color) -> Look:
     """Choose all colors to go with those of the theme.
 
-    Parameters
-    ----------
-    back : Color
-        The theme's color behind letters.
-    ink : Color
-        The theme's letters; replaced by black or white where they could not be read.
+    `back`: the theme's color behind letters; `ink`: the theme's letters; replaced by black or white where
+    they could not be read.
     """
     ink = make_legible(ink, back, INK)
     return Look(
@@ -64,10 +60,7 @@ def choose_colors(back: Color, ink: Color) -> Look:
 def contrast(one: Color, other: Color) -> float:
     """Return the contrast of two colors as the guidelines define it, 1 to 21.
 
-    Parameters
-    ----------
-    one, other : (float, float, float)
-        Colors.
+    `one`, `other` (float, float, float), colors.
     """
     low, high = sorted((_luminance(one), _luminance(other)))
     return (high + 0.05) / (low + 0.05)
@@ -76,12 +69,7 @@ def contrast(one: Color, other: Color) -> float:
 def make_legible(color: Color, back: Color, least: float) -> Color:
     """Return a color, mixed with as much black or white as it needs for a contrast to what is behind it.
 
-    Parameters
-    ----------
-    color, back : (float, float, float)
-        The color, and what is behind it.
-    least : float
-        Contrast, 1 to 21.
+    `color`, `back` (float, float, float), the color, and what is behind it; `least`: contrast, 1 to 21.
     """
     end = WHITE if contrast(WHITE, back) >= contrast(BLACK, back) else BLACK
     for share in np.linspace(0.0, 1.0, 41):

@@ -69,10 +69,6 @@ def round_axis(low: float, high: float) -> tuple[float, float]:
 
     Steps are 1, 2 or 5 times a power of ten, and at most ten of them make the axis, so that
     the ends do not jump about with every value.
-
-    Parameters
-    ----------
-    low, high : float
     """
     span = high - low
     step = 10.0 ** np.floor(np.log10(span))
@@ -85,16 +81,8 @@ def scale_curve(
 ) -> Floats:
     """Return the points (k, 2) of a curve inside a box, what lies outside the window left away.
 
-    Parameters
-    ----------
-    time, value : ndarray (t,)
-        The curve; times increase, s.
-    window : tuple of float
-        First and last time shown, s.
-    ends : tuple of float
-        Ends of the axis, in the unit of the values; values beyond are drawn at the end.
-    box : Box
-        Where the curve goes.
+    `time`, `value` (t,), the curve; times increase, s; `window`: first and last time shown, s; `ends`: ends
+    of the axis, in the unit of the values; values beyond are drawn at the end; `box`: where the curve goes.
     """
     shown = (time >= window[0]) & (time <= window[1]) & np.isfinite(value)
     x = (time[shown] - window[0]) / (window[1] - window[0])

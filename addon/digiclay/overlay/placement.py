@@ -34,12 +34,8 @@ Room = tuple[float, float, float, float]
 def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
     """Return the part of a view that no panel covers.
 
-    Parameters
-    ----------
-    width, height : float
-        Of the view, pixels.
-    covered : list of tuple
-        Side on which a panel lies over the view (LEFT, RIGHT, TOP or BOTTOM), and how deep it is.
+    `width`, `height`: of the view, pixels; `covered`: side on which a panel lies over the view (LEFT, RIGHT,
+    TOP or BOTTOM), and how deep it is.
     """
     deep = {"LEFT": 0.0, "RIGHT": 0.0, "TOP": 0.0, "BOTTOM": 0.0}
     for side, depth in covered:
@@ -59,16 +55,7 @@ def lay_out(
 
     Where the view is low, sections there is no room for are left away; where it is narrow, all.
 
-    Parameters
-    ----------
-    told : Told
-    look : Look
-    room : Room
-    scale : float
-        The UI scale: pixels for each of the sizes.
-    content : Content, optional
-    corner : str, optional
-        A key of `CORNERS`.
+    `scale`: the UI scale: pixels for each of the sizes; `corner`: a key of `CORNERS`.
     """
     left, bottom, right, top = room
     at_top, at_left = corner.startswith("top"), corner.endswith("left")

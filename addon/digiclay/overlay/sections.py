@@ -100,13 +100,7 @@ class Pen:
     def row(self, top: float, left: str, right: str = "", small: bool = False) -> float:
         """Write a row, one text to the left and one to the right; return where the next one begins.
 
-        Parameters
-        ----------
-        top : float
-            Pixels.
-        left, right : str
-        small : bool
-            In small letters.
+        `top`: pixels; `small`: in small letters.
         """
         size = (SMALL if small else LETTERS) * self.scale
         color = self.look.faint if small else self.look.ink
@@ -119,12 +113,7 @@ class Pen:
     def frame(self, top: float, low: str, high: str) -> Box:
         """Draw the frame of a plot with the ends of its axis; return the box the curves go into.
 
-        Parameters
-        ----------
-        top : float
-            Pixels.
-        low, high : str
-            Ends of the axis.
+        `top`: pixels; `low`, `high`: ends of the axis.
         """
         box = Box(self.x, top - PLOT * self.scale, self.width, PLOT * self.scale, self.look.back)
         step, size = 3.0 * self.scale, SMALL * self.scale
@@ -139,16 +128,8 @@ class Pen:
     ) -> None:
         """Draw a curve into the frame of a plot: that of a pin, or the force.
 
-        Parameters
-        ----------
-        told : Told
-        value : ndarray (t,)
-        ends : (float, float)
-            Of the axis, in the unit of the values.
-        box : Box
-            From `frame`.
-        pin : int
-            Which pin of the plot; below 0: the force.
+        `value` (t,); `ends` (float, float), of the axis, in the unit of the values; `box`: from `frame`;
+        `pin`: which pin of the plot; below 0: the force.
         """
         color = self.look.force if pin < 0 else self.look.pins[pin]
         points = scale_curve(told.time, value, told.window, ends, box)

@@ -73,11 +73,7 @@ def read_session(
 ) -> Readings:
     """Return the content of the overlay for a bed and its session.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    session : Running
-    colors : dict of Mode to (float, float, float)
+    `bed` bpy.types.Object; `colors` (float, float, float).
     """
     trace, scene = session.trace, session.scene
     wanted = float(trace.set_point[-1] if len(trace.rows) else find_set_point(scene.set_point, 0))

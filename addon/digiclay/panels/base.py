@@ -32,15 +32,7 @@ class Panel:
 
 
 def draw_lines(layout: Any, words: str, icon: str) -> None:
-    """Draw words on as many lines as they need.
-
-    Parameters
-    ----------
-    layout : bpy.types.UILayout
-    words : str
-    icon : str
-        Of the first line.
-    """
+    """Draw words on as many lines as they need. `layout` bpy.types.UILayout; `icon`: of the first line."""
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(words, LINE)):
@@ -50,12 +42,7 @@ def draw_lines(layout: Any, words: str, icon: str) -> None:
 def draw_number(layout: Any, owner: Any, name: str) -> None:
     """Draw a number with its label in the field: beside it the sidebar would cut off the unit.
 
-    Parameters
-    ----------
-    layout : bpy.types.UILayout
-    owner : bpy.types.bpy_struct
-    name : str
-        Of its property.
+    `layout` bpy.types.UILayout; `owner` bpy.types.bpy_struct; `name`: of its property.
     """
     place = layout.row(align=True)
     place.use_property_split = False

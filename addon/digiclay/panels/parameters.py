@@ -120,18 +120,9 @@ class Control(Panel, bpy.types.Panel):
 def section_panel(section: str, parent: str, order: int, words: str = "", closed: bool = True) -> type:
     """Make the sub-panel of a part.
 
-    Parameters
-    ----------
-    section : str
-        Of `core.scene.schema.SECTIONS`. A part a scene may leave out has a switch in the header.
-    parent : str
-        `bl_idname` of the panel it stands in.
-    order : int
-        Place among the others.
-    words : str, optional
-        Its heading, where that is not the section's name.
-    closed : bool, optional
-        Whether it is closed until somebody opens it.
+    `section`: of `core.scene.schema.SECTIONS`. A part a scene may leave out has a switch in the header;
+    `parent`: `bl_idname` of the panel it stands in; `order`: place among the others; `words`: its heading,
+    where that is not the section's name; `closed`: whether it is closed until somebody opens it.
     """
 
     class Section(Panel, bpy.types.Panel):
@@ -175,11 +166,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
 def in_use(settings: Any, section: str) -> bool:
     """Return whether a part is simulated: neither it nor the one it belongs to is switched off.
 
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    section : str
-        Of the scene file.
+    `settings` bpy.types.PropertyGroup; `section`: of the scene file.
     """
     needed = NEEDS.get(section)
     switches = [name for name in (section, needed) if name in OPTIONAL]

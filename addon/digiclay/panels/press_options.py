@@ -33,11 +33,7 @@ class Popover:
     def draw_settings(self, column: Any, settings: Any) -> None:
         """Draw the tool's settings that it holds.
 
-        Parameters
-        ----------
-        column : bpy.types.UILayout
-        settings : bpy.types.OperatorProperties
-            Settings of the Press tool.
+        `column` bpy.types.UILayout; `settings` bpy.types.OperatorProperties, settings of the Press tool.
         """
         raise NotImplementedError
 
@@ -51,11 +47,7 @@ class StrokeOptions(Popover, bpy.types.Panel):
     def draw_settings(self, column: Any, settings: Any) -> None:
         """Draw them.
 
-        Parameters
-        ----------
-        column : bpy.types.UILayout
-        settings : bpy.types.OperatorProperties
-            Settings of the Press tool.
+        `column` bpy.types.UILayout; `settings` bpy.types.OperatorProperties, settings of the Press tool.
         """
         draw_presets(column)  # a narrow header has them here alone
         column.prop(settings, "path")
@@ -74,11 +66,7 @@ class PenOptions(Popover, bpy.types.Panel):
     def draw_settings(self, column: Any, settings: Any) -> None:
         """Draw them.
 
-        Parameters
-        ----------
-        column : bpy.types.UILayout
-        settings : bpy.types.OperatorProperties
-            Settings of the Press tool.
+        `column` bpy.types.UILayout; `settings` bpy.types.OperatorProperties, settings of the Press tool.
         """
         column.prop(settings, "use_pressure")
         row = column.column()

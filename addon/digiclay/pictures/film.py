@@ -67,33 +67,12 @@ def render_film(
 ) -> Path | None:
     """Draw a session, or a part of it, into an MP4 file.
 
-    Parameters
-    ----------
-    history : mapping of arrays
-        As in ``history.npz``.
-    out : Path
-        The file; it appears whole or not at all.
-    looks : Film
-    set_point : float, optional
-        Total force that is asked for, N; drawn into the strip.
-    progress : callable, optional
-        Told after each frame how many are drawn, and of how many.
-    stopped : callable, optional
-        Asked before each frame; when it says True, no film is made.
-    **sizes
-        `pitch`, `actuator` and `finger`, as for `Instant.of`.
-
-    Returns
-    -------
-    Path or None
-        `out`; None when it was stopped.
-
-    Raises
-    ------
-    ParameterError
-        When the part asked for is not in the session.
-    OutputError
-        When the file cannot be written.
+    `history`: as in ``history.npz``; `out`: the file; it appears whole or not at all; `set_point`: total
+    force that is asked for, N; drawn into the strip; `progress`: told after each frame how many are drawn,
+    and of how many; `stopped`: asked before each frame; when it says True, no film is made; `sizes`: `pitch`,
+    `actuator` and `finger`, as for `Instant.of`. Returns `out`; None when it was stopped. Raises
+    ParameterError when the part asked for is not in the session. Raises OutputError when the file cannot be
+    written.
     """
     return _render_whole(
         stage_film(history, looks, set_point=set_point, **sizes), out, looks, progress, stopped
@@ -106,10 +85,7 @@ def stage_film(
 ) -> Iterator[Shots]:
     """Set the stage for the frames of a film.
 
-    Parameters
-    ----------
-    history, looks, set_point, **sizes
-        As for `render_film`.
+    `history`, `looks`, `set_point`, `sizes`: as for `render_film`.
     """
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
@@ -149,30 +125,15 @@ def render_turntable(
 ) -> Path | None:
     """Draw a bed that turns once about itself into an MP4 file.
 
-    Parameters
-    ----------
-    instant : Instant
-        What the bed shows.
-    out, looks, progress, stopped
-        As for `render_film`.
-
-    Returns
-    -------
-    Path or None
-        `out`; None when it was stopped.
+    `instant`: what the bed shows; `out`, `looks`, `progress`, `stopped`: as for `render_film`. Returns `out`;
+    None when it was stopped.
     """
     return _render_whole(stage_turntable(instant, looks), out, looks, progress, stopped)
 
 
 @contextmanager
 def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
-    """Set the stage for the frames of a turntable.
-
-    Parameters
-    ----------
-    instant, looks
-        As for `render_turntable`.
-    """
+    """Set the stage for the frames of a turntable. `instant`, `looks`: as for `render_turntable`."""
     with scratch():
         scene = add_picture_scene("Digital Clay Turntable", looks)
         use_fast_settings(scene)
@@ -247,24 +208,9 @@ def draw_frames(
 ) -> bool:
     """Draw frames, each into a file of its own, which appears whole or not at all.
 
-    Parameters
-    ----------
-    shots : Shots
-    frames : sequence of int
-        Their numbers, from 0.
-    folder : Path
-        Of the files, see `frame_files.name_frame`.
-    out : Path
-        What the user knows of it; messages name this.
-    progress : callable, optional
-        Told after each frame how many are drawn, and of how many.
-    stopped : callable, optional
-        Asked before each frame.
-
-    Returns
-    -------
-    bool
-        Whether all were drawn: nobody asked to stop.
+    `frames`: their numbers, from 0; `folder`: of the files, see `frame_files.name_frame`; `out`: what the
+    user knows of it; messages name this; `progress`: told after each frame how many are drawn, and of how
+    many; `stopped`: asked before each frame. Returns whether all were drawn: nobody asked to stop.
     """
     for count, frame in enumerate(frames):
         if stopped and stopped():

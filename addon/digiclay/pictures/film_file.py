@@ -30,15 +30,7 @@ def frame_folder(out: Path) -> Iterator[Path]:
 
 
 def encode_film(frames: list[Path], out: Path, looks: Moving) -> Path:
-    """Make a film of pictures that lie in one folder.
-
-    Parameters
-    ----------
-    frames : list of Path
-        Pictures, in their order.
-    out : Path
-    looks : Moving
-    """
+    """Make a film of pictures that lie in one folder. `frames`: pictures, in their order."""
     scene = bpy.data.scenes.new("Digital Clay Frames")
     scene.view_settings.view_transform = "Standard"
     scene.frame_start, scene.frame_end = 1, len(frames)

@@ -48,15 +48,7 @@ class ForcePlot:
     per_second: float
 
     def show(self, time: float, force: float) -> None:
-        """Show an instant: its time, s, and the total force then, N.
-
-        Parameters
-        ----------
-        time : float
-            s.
-        force : float
-            N.
-        """
+        """Show an instant: its time, s, and the total force then, N. `time`, s; `force`, N."""
         now = (time - self.first) * self.per_second
         place = np.minimum(self.place, now)
         # Columns still to come are drawn together at the cursor, as a face of no width.
@@ -72,13 +64,8 @@ class ForcePlot:
 def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float | None) -> ForcePlot:
     """Draw the strip of a session.
 
-    Parameters
-    ----------
-    front : Front
-    time, force : ndarray (t,)
-        Times, s, and total forces, N, of the rows the film is made of.
-    set_point : float or None
-        Total force that is asked for, N.
+    `time`, `force` (t,), times, s, and total forces, N, of the rows the film is made of; `set_point`: total
+    force that is asked for, N.
     """
     left, right = LEFT * front.width, -LEFT * front.width
     bottom = -0.95 * front.height
@@ -111,14 +98,7 @@ def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float 
 def reduce_columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:
     """Return times and forces of at most so many columns: rows that share one give it their largest force.
 
-    Parameters
-    ----------
-    time : ndarray (t,)
-        s.
-    force : ndarray (t,)
-        N.
-    most : int
-        Columns.
+    `time` (t,), s; `force` (t,), N; `most`: columns.
     """
     count = len(time)
     starts = np.unique(np.linspace(0, count, min(count, most), endpoint=False).astype(np.intp))

@@ -56,12 +56,8 @@ class Front:
     def before(cls, scene: Any, camera: Any, half: tuple[float, float]) -> Front:
         """Return the plane of a camera; `half` of the frame's width and height at depth 1.
 
-        Parameters
-        ----------
-        scene : bpy.types.Scene
-        camera : bpy.types.Object
-        half : (float, float)
-            Half of the frame's width and height at depth 1.
+        `scene` bpy.types.Scene; `camera` bpy.types.Object; `half` (float, float), half of the frame's width
+        and height at depth 1.
         """
         depth = camera.data.clip_start * 20.0
         return cls(scene, camera, depth, half[0] * depth, half[1] * depth)
@@ -94,14 +90,8 @@ class Front:
     def put(self, part: Any, x: float, y: float, color: Color, layer: int = 0) -> Any:
         """Hang an object at a place of the plane; layers with a higher number lie behind.
 
-        Parameters
-        ----------
-        part : bpy.types.Object
-        x, y : float
-            Place in the plane.
-        color : (float, float, float)
-        layer : int
-            Higher numbers lie behind.
+        `part` bpy.types.Object; `x`, `y`: place in the plane; `color` (float, float, float); `layer`: higher
+        numbers lie behind.
         """
         behind = 1.0 + LAYER * layer
         part.parent = self.camera
@@ -116,14 +106,8 @@ class Front:
     def write(self, body: str, size: float, x: float, y: float, color: Color, align: str = "LEFT") -> Any:
         """Write a text; return the object, whose `data.body` may be changed.
 
-        Parameters
-        ----------
-        body : str
-        size, x, y : float
-            Size of the letters and place, in the plane.
-        color : (float, float, float)
-        align : str
-            Blender's word for the side that stands at x.
+        `size`, `x`, `y`: size of the letters and place, in the plane; `color` (float, float, float); `align`:
+        Blender's word for the side that stands at x.
         """
         text = bpy.data.curves.new(body, "FONT")
         text.body, text.size, text.align_x = body, size, align
@@ -134,14 +118,8 @@ class Front:
     ) -> Any:
         """Fill a rectangle from its lower left to its upper right corner; it is placed by the lower left.
 
-        Parameters
-        ----------
-        name : str
-        low, high : (float, float)
-            Lower left and upper right corner.
-        color : (float, float, float)
-        layer : int
-            Higher numbers lie behind.
+        `low`, `high` (float, float), lower left and upper right corner; `color` (float, float, float);
+        `layer`: higher numbers lie behind.
         """
         width, height = high[0] - low[0], high[1] - low[1]
         corners = np.array([[0.0, 0.0, 0.0], [width, 0, 0], [width, height, 0], [0, height, 0]])
@@ -150,13 +128,7 @@ class Front:
 
 
 def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
-    """List modes down the picture's left side, each with a dot of its color; small pictures explain none.
-
-    Parameters
-    ----------
-    front : Front
-    modes : sequence of Mode
-    """
+    """List modes down the picture's left side, each with a dot of its color; small pictures explain none."""
     size, small = front.letter, front.note
     turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
     disc = primitives.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
@@ -197,13 +169,7 @@ def write_force_legend(front: Front) -> None:
 
 
 def flat(name: str, color: Color) -> Any:
-    """Make a material of one color that no light changes.
-
-    Parameters
-    ----------
-    name : str
-    color : (float, float, float)
-    """
+    """Make a material of one color that no light changes. `color` (float, float, float)."""
     material = bpy.data.materials.new(name)
     *light, alpha = linear(color)
     # What Workbench shows. It lights everything, so what it takes is given first, as far as the hue allows.

@@ -37,24 +37,10 @@ def set_up(
 ) -> Front:
     """Put camera, lights, floor and legend about a bed that stands at the origin of `scene`.
 
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-        Engine and size of the picture are set.
-    bed : bpy.types.Object
-    instant : Instant
-        What the bed shows.
-    points : ndarray (k, 3), optional
-        What must be seen, Blender units; the bed's outline as it stands when left out.
-    modes : sequence of Mode, optional
-        What the legend explains; the modes present when left out.
-    margins : tuple of float, optional
-        As `MARGINS`.
-
-    Returns
-    -------
-    Front
-        The plane before the camera, for whatever else is to be written there.
+    `scene` bpy.types.Scene, engine and size of the picture are set; `bed` bpy.types.Object; `instant`: what
+    the bed shows; `points` (k, 3), what must be seen, Blender units; the bed's outline as it stands when left
+    out; `modes`: what the legend explains; the modes present when left out; `margins`: as `MARGINS`. Returns
+    the plane before the camera, for whatever else is to be written there.
     """
     points = outline(bed) if points is None else points
     floor = float(points[:, 2].min())
@@ -74,20 +60,8 @@ def set_up(
 def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Floats:
     """Return the nearest place from which all points fall inside the frame.
 
-    Parameters
-    ----------
-    points : ndarray (k, 3)
-        What must be seen.
-    axes : ndarray (3, 3)
-        The camera's right, up and backward directions as rows.
-    low, high : ndarray (2,)
-        Slopes (sideways and upwards, over depth) of the frame's edges, low < high.
-
-    Notes
-    -----
-    A point at camera coordinates (u, v, -d) is inside when low d <= (u, v) <= high d. In
-    each direction the two extreme points give a depth and an offset in closed form; the
-    larger depth counts, and the other direction is centered in what is then free.
+    `points` (k, 3), what must be seen; `axes` (3, 3), the camera's right, up and backward directions as rows;
+    `low`, `high` (2,), slopes (sideways and upwards, over depth) of the frame's edges, low < high.
     """
     seen = points @ axes.T
     across, back = seen[:, :2], seen[:, 2:]

@@ -35,37 +35,13 @@ def render_still(
 ) -> Path:
     """Draw an instant into a PNG file.
 
-    Parameters
-    ----------
-    instant : Instant
-        What to draw.
-    out : Path
-        The file; it is written under a temporary name and renamed.
-    width, height : int, optional
-        Size of the picture, pixels.
-    engine : {"cycles", "workbench"}, optional
-        Cycles gives soft shadows and runs anywhere; Workbench is quicker and plainer, and
-        wants OpenGL.
-    samples : int, optional
-        Samples per pixel of Cycles; more is smoother and slower in proportion.
-    denoise : bool, optional
-        Smooth what few samples leave, where Blender was built with Cycles' denoiser.
-    color : {"mode", "force"}, optional
-        What the color of a pin tells.
-    arrows : bool, optional
-        Draw the force on each pin as an arrow.
-
-    Returns
-    -------
-    Path
-        `out`.
-
-    Raises
-    ------
-    ParameterError
-        On an unknown engine, or a size that makes no picture.
-    OutputError
-        When the file cannot be written.
+    `instant`: what to draw; `out`: the file; it is written under a temporary name and renamed; `width`,
+    `height`: size of the picture, pixels; `engine`: Cycles gives soft shadows and runs anywhere; Workbench is
+    quicker and plainer, and wants OpenGL; `samples`: samples per pixel of Cycles; more is smoother and slower
+    in proportion; `denoise`: smooth what few samples leave, where Blender was built with Cycles' denoiser;
+    `color`: what the color of a pin tells; `arrows`: draw the force on each pin as an arrow. Returns `out`.
+    Raises ParameterError: on an unknown engine, or a size that makes no picture. Raises OutputError when the
+    file cannot be written.
     """
     looks = Still(width=width, height=height, engine=engine, samples=samples, color=color, arrows=arrows)
     partial = out.with_name(f".{out.name}.{os.getpid()}.partial.png")
@@ -86,13 +62,7 @@ def render_still(
 
 
 def apply_style(bed: Any, looks: Picture) -> None:
-    """Color the pins as asked, and show arrows or not.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    looks : Picture
-    """
+    """Color the pins as asked, and show arrows or not. `bed` bpy.types.Object."""
     view.color_by(bed, looks.color)
     view.show_arrows(bed, looks.arrows)
 
@@ -100,18 +70,8 @@ def apply_style(bed: Any, looks: Picture) -> None:
 def render_picture(scene: Any, path: Path, out: Path) -> None:
     """Draw a scene into a PNG file.
 
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-    path : Path
-        The file.
-    out : Path
-        What the user knows of it; messages name this.
-
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
+    `scene` bpy.types.Scene; `path`: the file; `out`: what the user knows of it; messages name this. Raises
+    OutputError when the file cannot be written.
     """
     scene.render.filepath = str(path)
     try:
@@ -133,15 +93,7 @@ def failure_reason(path: Path) -> str:
 
 
 def add_picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
-    """Add a scene with all that decides a picture besides the scene's contents.
-
-    Parameters
-    ----------
-    name : str
-    looks : Picture
-    denoise : bool
-        Of Cycles.
-    """
+    """Add a scene with all that decides a picture besides the scene's contents. `denoise`: of Cycles."""
     scene = bpy.data.scenes.new(name)
     render, engine = scene.render, looks.engine
     render.engine = ENGINES[engine]

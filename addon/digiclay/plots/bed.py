@@ -29,12 +29,7 @@ RESOLVED = 100
 def draw_map(axes: Any, history: History, title: str) -> None:
     """Draw the final heights from above, with a color bar.
 
-    Parameters
-    ----------
-    axes : Axes
-    history : mapping of str to array_like
-        Needs `position` and `height`.
-    title : str
+    `axes` Axes; `history`: needs `position` and `height`.
     """
     from mpl_toolkits.axes_grid1 import make_axes_locatable
 
@@ -62,12 +57,7 @@ def draw_map(axes: Any, history: History, title: str) -> None:
 def draw_path(axes: Axes, history: History) -> None:
     """Draw where the fingertip went: a line in contact, dots while lifted.
 
-    Parameters
-    ----------
-    axes : Axes
-        Of `draw_map`, in mm.
-    history : mapping of str to array_like
-        Needs `fingertip` and `total_force`.
+    `axes`: of `draw_map`, in mm; `history`: needs `fingertip` and `total_force`.
     """
     from matplotlib.patheffects import withStroke
 
@@ -85,13 +75,8 @@ def draw_path(axes: Axes, history: History) -> None:
 def draw_relief(axes: Any, history: History, room: Room = ROOM) -> None:
     """Draw the final surface in three dimensions, lit from the left, equal scale on all axes.
 
-    Parameters
-    ----------
-    axes : Axes3D
-    history : mapping of str to array_like
-        Needs `position` and `height`.
-    room : tuple of float, optional
-        Left, bottom, right and top of the part of the figure that it fills, as shares of the figure.
+    `axes` Axes3D; `history`: needs `position` and `height`; `room`: left, bottom, right and top of the part
+    of the figure that it fills, as shares of the figure.
     """
     from matplotlib import colormaps
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -144,24 +129,12 @@ def _thinned(history: History) -> tuple[Floats, Floats, int, int]:
 def ends(values: Floats, least: float) -> tuple[float, float]:
     """Return the ends of a scale, `least` apart at least: what does not vary still gets one.
 
-    Parameters
-    ----------
-    values : ndarray
-        Any shape, in the unit of the scale.
-    least : float
-        In the same unit.
+    `values`: any shape, in the unit of the scale; `least`: in the same unit.
     """
     spare = max(0.0, 0.5 * (least - float(np.ptp(values))))
     return float(values.min()) - spare, float(values.max()) + spare
 
 
 def array(history: History, name: str) -> Floats:
-    """Return one array of the history as float64.
-
-    Parameters
-    ----------
-    history : mapping of str to array_like
-    name : str
-        Its key in the history.
-    """
+    """Return one array of the history as float64. `name`: its key in the history."""
     return np.asarray(history[name], dtype=np.float64)

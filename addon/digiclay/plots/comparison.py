@@ -29,14 +29,8 @@ def comparison(
 ) -> Any:
     """Draw the total force over time, and a bar a method for each metric.
 
-    Parameters
-    ----------
-    found : mapping
-        Metrics by method.
-    forces : mapping
-        Time, s, total force, N, and the total force asked for, NaN where none is, by method.
-    name : str
-        Of the scene.
+    `found`: metrics by method; `forces`: time, s, total force, N, and the total force asked for, NaN where
+    none is, by method; `name`: of the scene.
     """
     colors = {method: LINES[i % len(LINES)] for i, method in enumerate(found)}
     bar = 0.3

@@ -37,14 +37,8 @@ STYLE: dict[str, Any] = {
 def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **known: Any) -> Iterator[Figure]:
     """Give an empty figure, its size in inches, in a style that also holds for what is drawn on it.
 
-    Parameters
-    ----------
-    width, height : float
-        Inches.
-    style : mapping
-        Matplotlib's rc parameters.
-    **known
-        More arguments of `matplotlib.figure.Figure`.
+    `width`, `height`: inches; `style`: Matplotlib's rc parameters; `known`: more arguments of
+    `matplotlib.figure.Figure`.
     """
     try:
         from matplotlib import rc_context
@@ -63,12 +57,7 @@ def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **known
 def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figure, Any]]:
     """Give an empty figure, and what places axes on it (label, then a box in inches).
 
-    Parameters
-    ----------
-    width, height : float
-        Inches.
-    title : str
-        Upper left; none when empty.
+    `width`, `height`: inches; `title`: upper left; none when empty.
     """
     with empty(width, height) as figure:
         if title:
@@ -82,14 +71,7 @@ def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figur
 
 
 def legend_above(axes: Axes, columns: int = 6) -> None:
-    """Put the legend on the line of the title, where it hides nothing.
-
-    Parameters
-    ----------
-    axes : Axes
-    columns : int
-        Of the legend.
-    """
+    """Put the legend on the line of the title, where it hides nothing. `columns`: of the legend."""
     close = {"handlelength": 1.4, "columnspacing": 1.2, "handletextpad": 0.5, "borderaxespad": 0.0}
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=columns, **close)
 
@@ -100,11 +82,7 @@ def save(figure: Figure, out: str | Path) -> Path:
     As an SVG if its name ends so, with its letters as outlines and the same bytes every time; else as
     a PNG. What an artist marks as rasterized is pixels in an SVG.
 
-    Parameters
-    ----------
-    figure : Figure
-    out : str or Path
-        Ends with .svg, or with anything else for a PNG.
+    `out`: ends with .svg, or with anything else for a PNG.
     """
     content, path = io.BytesIO(), Path(out)
     if path.suffix == ".svg":

@@ -34,11 +34,7 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
 
     The shaded band holds the just noticeable differences of the first method's set point.
 
-    Parameters
-    ----------
-    table : mapping
-        Measured values by method, trajectory and seed.
-    methods : sequence of str
+    `table`: measured values by method, trajectory and seed.
     """
     names = list(dict.fromkeys(name for (_, name, _), found in table.items() if found.get("rfd") is not None))
     high = 0.27 * max(len(names), 1)
@@ -90,11 +86,7 @@ def _mark_method(axes: Any, table: Table, method: str, number: int, names: Seque
 def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
     """Draw a panel a measure of the league: a mark a method, with its interval.
 
-    Parameters
-    ----------
-    league : sequence of Row
-    methods : sequence of str
-        In the order of their colors.
+    `methods`: in the order of their colors.
     """
     panels = [one for one in PANELS if any(row.measures.get(one[0]) for row in league)]
     lines = -(-len(panels) // 2)

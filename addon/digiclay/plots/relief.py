@@ -22,15 +22,9 @@ NUMBERS, OFF = 5, (4, 12, 20, 28, 36, 46, 56, 70)
 def fit_relief(axes: Any, size: Any, limits: Sequence[tuple[float, float]], room: Room = ROOM) -> None:
     """Choose numbers on the axes and places of their names so that they are apart, and fill the room.
 
-    Parameters
-    ----------
-    axes : Axes3D
-        Still empty, with its limits and names.
-    size : array_like (3,)
-        Of what is shown, in the same unit on all axes.
-    limits : three pairs of float
-    room : tuple of float, optional
-        Left, bottom, right and top of the part of the figure that it fills, as shares of the figure.
+    `axes` Axes3D, still empty, with its limits and names; `size` (3,), of what is shown, in the same unit on
+    all axes; `room`: left, bottom, right and top of the part of the figure that it fills, as shares of the
+    figure.
     """
     with _alone(axes):
         _fit(axes, size, limits, room)

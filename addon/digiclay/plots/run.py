@@ -33,13 +33,7 @@ FIGURES = (
 def session(history: History, out: str | Path, set_point: SetPoint | None) -> Path:
     """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written.
 
-    Parameters
-    ----------
-    history : mapping of str to array_like
-    out : str or Path
-        The PNG.
-    set_point : SetPoint or None
-        Force asked for; None where none is.
+    `out`: the PNG; `set_point`: force asked for; None where none is.
     """
     return save(session_figure(history, set_point), out)
 
@@ -47,11 +41,7 @@ def session(history: History, out: str | Path, set_point: SetPoint | None) -> Pa
 def surface(history: History, out: str | Path) -> Path:
     """Write `surface_figure` as a PNG and return its path; OutputError when it cannot be written.
 
-    Parameters
-    ----------
-    history : mapping of str to array_like
-    out : str or Path
-        The PNG.
+    `out`: the PNG.
     """
     return save(surface_figure(history), out)
 
@@ -81,17 +71,9 @@ def session_cells(history: History) -> list[int]:
 def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     """Draw heights of chosen cells and the total force over time, as the paper's Fig. 8 does.
 
-    Parameters
-    ----------
-    history : mapping
-        The arrays of ``history.npz``.
-    set_point : SetPoint or None
-        Force asked for; None where none is: then neither it nor a deviation from it is shown.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Its axes, by label: ``heights``, ``force``, ``map`` with its ``scale``, and ``figures``.
+    `history`: the arrays of ``history.npz``; `set_point`: force asked for; None where none is: then neither
+    it nor a deviation from it is shown. Returns its axes, by label: ``heights``, ``force``, ``map`` with its
+    ``scale``, and ``figures``.
     """
     time, total, height = (array(history, name) for name in ("time", "total_force", "height"))
     with canvas(12.5, 6.3) as (figure, place):

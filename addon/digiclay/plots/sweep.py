@@ -31,16 +31,8 @@ LABELS = 12
 def picture(columns: Sequence[Column], name: str, values: Floats, out: str | Path) -> Path:
     """Write `sweep_figure` as a PNG and return its path; OutputError when it cannot be written.
 
-    Parameters
-    ----------
-    columns : sequence of Column
-        The varied parameters.
-    name : str
-        Of the metric.
-    values : ndarray
-        One dimension a column; NaN where a point failed or has no such figure.
-    out : str or Path
-        The PNG.
+    `columns`: the varied parameters; `name`: of the metric; `values`: one dimension a column; NaN where a
+    point failed or has no such figure; `out`: the PNG.
     """
     return save(sweep_figure(columns, name, values), out)
 
@@ -48,19 +40,9 @@ def picture(columns: Sequence[Column], name: str, values: Floats, out: str | Pat
 def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure:
     """Draw a figure over the one or two axes of a sweep.
 
-    Parameters
-    ----------
-    columns : sequence of Column
-        One or two.
-    name : str
-        A key of `evaluation.FIGURES`.
-    values : ndarray
-        One dimension a column; NaN where a point failed or has no such figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Its axes, by label: ``sweep``; with two columns also ``scale``.
+    `columns`: one or two; `name`: a key of `evaluation.FIGURES`; `values`: one dimension a column; NaN where
+    a point failed or has no such figure. Returns its axes, by label: ``sweep``; with two columns also
+    ``scale``.
     """
     unit, meaning = FIGURES[name]
     factor, read = read_unit(unit, values)
@@ -79,12 +61,7 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
 def read_unit(unit: str, values: Any) -> tuple[float, str]:
     """Return factor and name of the unit people read; times below half a second are read in ms.
 
-    Parameters
-    ----------
-    unit : str
-        SI; empty or 1 for none.
-    values : array_like
-        In SI.
+    `unit`: SI; empty or 1 for none; `values` array_like, in SI.
     """
     if unit == "s":
         known = [abs(value) for value in np.ravel(values) if np.isfinite(value)]

@@ -29,13 +29,7 @@ def describe_origin(scene: Scene) -> dict[str, str]:
 
 
 def write_code(scene: Scene, folder: Path) -> None:
-    """Write the code of a scene's method, where it is a file of one's own; else remove a former one.
-
-    Parameters
-    ----------
-    scene : Scene
-    folder : Path
-    """
+    """Write the code of a scene's method, where it is a file of one's own; else remove a former one."""
     source = find_code(scene)
     if source is not None and not source.module:
         write_whole(folder / CODE, source.text.encode())
@@ -57,10 +51,6 @@ def find_word(scene: Scene) -> str:
 def resolve_word(word: str, folder: Path) -> str:
     """Return a word of --method from the working folder, where it names a file of another folder.
 
-    Parameters
-    ----------
-    word : str
-    folder : Path
-        Where the file may be.
+    `folder`: where the file may be.
     """
     return str(folder / word) if (folder / word.rpartition(":")[0]).is_file() else word

@@ -28,12 +28,7 @@ class FolderMethods(NamedTuple):
 
 
 def load_folder(folder: Path) -> FolderMethods:
-    """Run the files of a folder, in the order of their names, and add their control methods.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Run the files of a folder, in the order of their names, and add their control methods."""
     if not folder.is_dir():
         return FolderMethods(refused=(f"{folder} must be a folder.",))
     names: list[str] = []

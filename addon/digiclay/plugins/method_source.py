@@ -55,15 +55,8 @@ def is_file_word(word: str) -> bool:
 def read_source(word: str) -> MethodSource | None:
     """Return the code that a word of the command line names; None where no package offers such a method.
 
-    Parameters
-    ----------
-    word : str
-        ``path/to/mine.py:Mine``, or the name of an installed method.
-
-    Raises
-    ------
-    MethodError
-        In one line: file and rule.
+    `word`: ``path/to/mine.py:Mine``, or the name of an installed method. Raises MethodError: in one line:
+    file and rule.
     """
     return _read_file_word(word) if is_file_word(word) else find_installed(word)
 
@@ -78,18 +71,7 @@ def _read_file_word(word: str) -> MethodSource:
 
 
 def read_file(path: Path, attribute: str) -> MethodSource:
-    """Return the code of a file.
-
-    Parameters
-    ----------
-    path : Path
-    attribute : str
-        Class in it.
-
-    Raises
-    ------
-    MethodError
-    """
+    """Return the code of a file. `attribute`: class in it. Raises MethodError."""
     try:
         data = path.read_bytes()
     except (OSError, ValueError) as error:
@@ -110,15 +92,7 @@ def read_file(path: Path, attribute: str) -> MethodSource:
 def find_installed(name: str) -> MethodSource | None:
     """Return the code of an installed method, without importing it; None where no package offers it.
 
-    Parameters
-    ----------
-    name : str
-        Of the entry point.
-
-    Raises
-    ------
-    MethodError
-        When several packages offer it.
+    `name`: of the entry point. Raises MethodError when several packages offer it.
     """
     found: dict[str, EntryPoint] = {point.value: point for point in entry_points(group=GROUP, name=name)}
     if not found:

@@ -80,10 +80,7 @@ def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any |
 def read_surface(bed: Any) -> tuple[Grid, Floats]:
     """Return where a bed's pins stand and how high: from its session, or as they are drawn.
 
-    Raises
-    ------
-    DigiclayError
-        When the bed's settings do not describe it.
+    Raises DigiclayError when the bed's settings do not describe it.
     """
     session = running.find(bed)
     if session is not None:
@@ -94,10 +91,7 @@ def read_surface(bed: Any) -> tuple[Grid, Floats]:
 def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
     """Return where the ray through a region's pixel meets pins of a height (n,), m, or None.
 
-    Raises
-    ------
-    DigiclayError
-        When the bed is not uniformly scaled.
+    Raises DigiclayError when the bed is not uniformly scaled.
     """
     origin, direction = _ray(context, bed, xy)
     first, last = shown_stretch(context, _place(bed, origin), _place(bed, origin + direction))

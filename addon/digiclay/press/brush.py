@@ -55,10 +55,7 @@ def tool_settings(context: Any) -> Any | None:
 def find_bed(context: Any, uid: int) -> Any | None:
     """Return the bed of a `session_uid` in the scene, fetched anew since undo invalidates what is kept.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    uid : int
+    `context` bpy.types.Context.
     """
     return next((thing for thing in context.scene.objects if thing.session_uid == uid), None)
 
@@ -76,12 +73,7 @@ def bed_in_use(context: Any) -> Any | None:
 def choose_brush(name: str, event: Any) -> Brush:
     """Return the brush of a stroke that begins: Shift smooths, Ctrl inverts the tool's brush.
 
-    Parameters
-    ----------
-    name : str
-        Of the tool's brush.
-    event : bpy.types.Event
-        By which the stroke begins.
+    `name`: of the tool's brush; `event` bpy.types.Event, by which the stroke begins.
     """
     brush = Brush.SMOOTH if event.shift else Brush(name)
     return brush.inverse if event.ctrl else brush
@@ -90,11 +82,7 @@ def choose_brush(name: str, event: Any) -> Brush:
 def find_press(context: Any, event: Any) -> tuple[int, int]:
     """Return where the mouse went down, pixels of the region; a drag is told after a move on from there.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    event : bpy.types.Event
-        By which the stroke begins.
+    `context` bpy.types.Context; `event` bpy.types.Event, by which the stroke begins.
     """
     if event.value != "CLICK_DRAG":
         return event.mouse_region_x, event.mouse_region_y
@@ -109,29 +97,13 @@ def amount_name(brush: Brush) -> str:
 def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: float = 1.0) -> str:
     """Return size, brush, and depth or height in mm, as shown beside the cursor.
 
-    Parameters
-    ----------
-    finger : Fingertip
-    brush : Brush
-    depth : float
-        Depth or height, m.
-    strength : float, optional
-        Share of it.
+    `depth`: depth or height, m; `strength`: share of it.
     """
     return localize("Size {:.3g} mm   {}", 2e3 * finger.width, describe_stroke(brush, depth, strength))
 
 
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
-    """Return a brush, and its depth or height in mm.
-
-    Parameters
-    ----------
-    brush : Brush
-    depth : float
-        Depth or height, m.
-    strength : float, optional
-        Share of it.
-    """
+    """Return a brush, and its depth or height in mm. `depth`: depth or height, m; `strength`: share of it."""
     if not brush.has_amount:
         return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""

@@ -18,13 +18,7 @@ def drape(cells: Grid, height: Floats, places: Floats) -> Floats:
     The height is the mean of the pins about a place, with normal weights. Beyond the edge it is that of the
     outermost pins.
 
-    Parameters
-    ----------
-    cells : Grid
-    height : ndarray (n,)
-        Heights of the pins, m.
-    places : ndarray (k, 2)
-        m.
+    `height` (n,), heights of the pins, m; `places` (k, 2), m.
     """
     plan = cells.layout
     row, column = np.divmod(cells.at(places[:, 0], places[:, 1]), plan.columns)

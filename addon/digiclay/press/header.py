@@ -19,11 +19,7 @@ BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 5.8, 6.6, 6.0
 def draw_header(context: Any, layout: Any, settings: Any) -> None:
     """Draw the tool's settings into the header.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    layout : bpy.types.UILayout
-    settings : bpy.types.OperatorProperties
+    `context` bpy.types.Context; `layout` bpy.types.UILayout; `settings` bpy.types.OperatorProperties.
     """
     wide = context.region.width >= WIDE * context.preferences.system.ui_scale
     row = layout.row(align=True)
@@ -52,12 +48,7 @@ def draw_header(context: Any, layout: Any, settings: Any) -> None:
 
 
 def draw_presets(layout: Any) -> None:
-    """Draw the menu of brush presets, and what keeps and removes one.
-
-    Parameters
-    ----------
-    layout : bpy.types.UILayout
-    """
+    """Draw the menu of brush presets, and what keeps and removes one. `layout` bpy.types.UILayout."""
     row = layout.row(align=True)
     row.menu("DIGICLAY_MT_brushes", text=bpy.types.DIGICLAY_MT_brushes.bl_label)
     row.operator("digiclay.press_brush_save", text="", icon="ADD")

@@ -22,14 +22,7 @@ SMOOTHING = COLORS[Mode.BLISTER]
 def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> list[Line]:
     """Return light lines on dark ones.
 
-    Parameters
-    ----------
-    paths : sequence of ndarray (k, 2)
-        Pixels.
-    width : float
-        Of a thin line, pixels.
-    color : (float, float, float), optional
-        Of the light ones.
+    `paths` (k, 2), pixels; `width`: of a thin line, pixels; `color` (float, float, float), of the light ones.
     """
     return [Line(path, *look) for look in ((DARK, 4.0 * width), (color, 2.0 * width)) for path in paths]
 
@@ -37,13 +30,7 @@ def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> l
 def make_label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
     """Return text beside a place, light on a dark edge.
 
-    Parameters
-    ----------
-    text : str
-    xy : (float, float)
-        Pixels.
-    scale : float
-        Of Blender's interface.
+    `xy` (float, float), pixels; `scale`: of Blender's interface.
     """
     x, y, size = xy[0] + 22.0 * scale, xy[1] - 26.0 * scale, 12.0 * scale
     edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]

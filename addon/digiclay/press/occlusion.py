@@ -21,17 +21,9 @@ NEAR = 1e-6
 def shown_stretch(context: Any, start: Floats, end: Floats) -> tuple[float, float]:
     """Return from where to where a view shows a ray: its clipping distances, and its clipping region.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-        Of a 3D view's region.
-    start, end : ndarray (3,)
-        Two places on the ray, in the world.
-
-    Returns
-    -------
-    first, last : float
-        0 is the start, 1 the end; the first is the greater where nothing of the ray is shown.
+    `context` bpy.types.Context, of a 3D view's region; `start`, `end` (3,), two places on the ray, in the
+    world. Returns `first`, `last`: 0 is the start, 1 the end; the first is the greater where nothing of the
+    ray is shown.
     """
     looking = context.region_data
     clip = np.array(looking.perspective_matrix, np.float64)

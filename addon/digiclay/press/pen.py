@@ -23,12 +23,7 @@ CURVE_ITEMS = (
 def find_share(pressure: float, curve: str) -> float:
     """Return the share that a pressure asks for, 0 to 1; all of it where the pressure is no number.
 
-    Parameters
-    ----------
-    pressure : float
-        From the window system, 0 to 1.
-    curve : str
-        First word of an item of `CURVE_ITEMS`.
+    `pressure`: from the window system, 0 to 1; `curve`: first word of an item of `CURVE_ITEMS`.
     """
     if math.isnan(pressure):
         return 1.0
@@ -41,12 +36,8 @@ def find_lean(tilt: tuple[float, float], seen: Floats) -> tuple[float, float]:
     The pen leans over the bed as it does over the tablet, whose right is the right of the view and whose far
     side is what lies farther up in the view.
 
-    Parameters
-    ----------
-    tilt : (float, float)
-        From the window system, to the right and towards the user, each -1 to 1.
-    seen : ndarray (3, 3)
-        Columns: right, up and towards the eye of the view, in the space of the bed.
+    `tilt` (float, float), from the window system, to the right and towards the user, each -1 to 1; `seen` (3,
+    3), columns: right, up and towards the eye of the view, in the space of the bed.
     """
     right, up = float(tilt[0]), -float(tilt[1])
     size = math.hypot(right, up)

@@ -39,12 +39,8 @@ class Button:
 def begin_button(value: str, named: Named) -> Button:
     """Return the button at the event by which a stroke begins.
 
-    Parameters
-    ----------
-    value : str
-        Value of that event. A drag is a move: it does not name what was before the press.
-    named : (str, str)
-        Type and value of the event before, as that event names it.
+    `value`: value of that event. A drag is a move: it does not name what was before the press; `named` (str,
+    str), type and value of the event before, as that event names it.
     """
     return Button(None if value == "CLICK_DRAG" else named)
 
@@ -52,13 +48,7 @@ def begin_button(value: str, named: Named) -> Button:
 def read_event(button: Button, kind: str, named: Named) -> Button:
     """Return the button after another event of the stroke, the button's own release apart.
 
-    Parameters
-    ----------
-    button : Button
-    kind : str
-        Type of the event.
-    named : (str, str)
-        Type and value of the event before, as that event names it.
+    `kind`: type of the event; `named` (str, str), type and value of the event before, as that event names it.
     """
     if button.before is None:
         return replace(button, before=named) if kind.startswith("TIMER") else button

@@ -30,19 +30,9 @@ def touch_outline(
 ) -> Floats:
     """Return the rim of what a brush would form at a place, lying on the pins, (k, 3), m.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-        With a fingertip.
-    cells : Grid
-    height : ndarray (n,)
-        Heights of the pins, m.
-    place : ndarray (3,)
-        Where the mouse points, m.
-    depth : float
-        How deep the finger would be pressed, m.
-    kind : Brush, optional
-        The rim of Smooth is a circle, that of the others where the finger would touch.
+    `bed` bpy.types.Object, with a fingertip; `height` (n,), heights of the pins, m; `place` (3,), where the
+    mouse points, m; `depth`: how deep the finger would be pressed, m; `kind`: the rim of Smooth is a circle,
+    that of the others where the finger would touch.
     """
     tip = view.fingertip_of(bed)
     outline = find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, kind, cells.layout)
@@ -52,16 +42,8 @@ def touch_outline(
 def find_outline(finger: Fingertip, turn: Floats, depth: float, kind: Brush, layout: Layout) -> Floats:
     """Return the rim of what a brush would form about the origin, (k, 2), m.
 
-    Parameters
-    ----------
-    finger : Fingertip
-    turn : ndarray (4,)
-        Its orientation, quaternion w, x, y, z.
-    depth : float
-        How deep it would be pressed, m.
-    kind : Brush
-    layout : Layout
-        Of the bed.
+    `turn` (4,), its orientation, quaternion w, x, y, z; `depth`: how deep it would be pressed, m; `layout`:
+    of the bed.
     """
     if kind is Brush.SMOOTH:
         radius = find_radius(finger, layout)
@@ -164,11 +146,7 @@ class PressTool(bpy.types.WorkSpaceTool):
     def draw_settings(context: Any, layout: Any, tool: Any) -> None:
         """Draw the tool's settings into the header.
 
-        Parameters
-        ----------
-        context : bpy.types.Context
-        layout : bpy.types.UILayout
-        tool : bpy.types.WorkSpaceTool
+        `context` bpy.types.Context; `layout` bpy.types.UILayout; `tool` bpy.types.WorkSpaceTool.
         """
         header.draw_header(context, layout, tool.operator_properties(OPERATOR))
 

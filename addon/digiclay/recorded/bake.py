@@ -57,11 +57,7 @@ class BakedFrames:
 def frame_periods(take: Take, rate: float) -> NDArray[np.intp]:
     """Return the control period, 0 to t, that each frame of a take shows: the nearest one.
 
-    Parameters
-    ----------
-    take : Take
-    rate : float
-        Frames a second.
+    `rate`: frames a second.
     """
     period = take.scene.simulation.control_period
     count = int(np.floor(take.duration * rate + 1e-6)) + 1
@@ -71,16 +67,8 @@ def frame_periods(take: Take, rate: float) -> NDArray[np.intp]:
 def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
     """Simulate a take and keep what each frame shows.
 
-    Parameters
-    ----------
-    take : Take
-    rate : float
-        Frames a second.
-
-    Yields
-    ------
-    float
-        The share that is done, after each control period; last of all the `BakedFrames`.
+    `rate`: frames a second. Yields the share that is done, after each control period; last of all the
+    `BakedFrames`.
     """
     wanted = frame_periods(take, rate)
     system = assemble(take.scene)
@@ -101,15 +89,8 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
 def apply(bed: Any, moments: BakedFrames, first: int, finger: Fingertip, *, keyframe_finger: bool) -> None:
     """Give a bed a bake, in place of an older one.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    moments : Moments
-    first : int
-        Frame of the first moment.
-    finger : Fingertip
-    keyframe_finger : bool
-        Whether the fingertip gets keyframes as well, in place of those it has.
+    `bed` bpy.types.Object; `first`: frame of the first moment; `keyframe_finger`: whether the fingertip gets
+    keyframes as well, in place of those it has.
     """
     free(bed)
     count = len(moments.height)
@@ -165,25 +146,10 @@ def free(bed: Any) -> bool:
 def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
     """Read the path of an animated fingertip, frame by frame and in between.
 
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-        Its current frame is put back in the end.
-    bed : bpy.types.Object
-    first, last : int
-        Frames.
-    period : float
-        Control period, s: a pose is read at the end of each.
-
-    Yields
-    ------
-    float
-        The share that is done, after each pose; last of all the poses (t + 1, 1, 7).
-
-    Raises
-    ------
-    DigiclayError
-        When the range has no frame, or more than an hour of them, or the bed has no fingertip.
+    `scene` bpy.types.Scene, its current frame is put back in the end; `bed` bpy.types.Object; `first`,
+    `last`: frames; `period`: control period, s: a pose is read at the end of each. Yields the share that is
+    done, after each pose; last of all the poses (t + 1, 1, 7). Raises DigiclayError when the range has no
+    frame, or more than an hour of them, or the bed has no fingertip.
     """
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"

@@ -19,12 +19,8 @@ MOMENT = "Moment"
 def playback_nodes(bake: Any, moments: int) -> Any:
     """Make the node group that moves the pins of a bed to where they were at a moment.
 
-    Parameters
-    ----------
-    bake : bpy.types.Object
-        Its mesh holds the pins moment after moment, in the bed's space.
-    moments : int
-        How many there are.
+    `bake` bpy.types.Object, its mesh holds the pins moment after moment, in the bed's space; `moments`: how
+    many there are.
     """
     tree = bpy.data.node_groups.new("Digital Clay Bake", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")

@@ -54,16 +54,8 @@ def list_takes(bed: Any) -> list[Entry]:
 def find(bed: Any, number: str = "") -> Entry:
     """Return what a list shows of one take of a bed.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    number : str, optional
-        The last one when left out.
-
-    Raises
-    ------
-    DigiclayError
-        When the bed has none, or none of that number.
+    `bed` bpy.types.Object; `number`: the last one when left out. Raises DigiclayError when the bed has none,
+    or none of that number.
     """
     known = list_takes(bed)
     if not known and not number:
@@ -82,14 +74,7 @@ def read_recording(session: Running) -> Take | None:
 
 
 def add(bed: Any, take: Take, name: str = "") -> Entry:
-    """Add a take to a bed; without a name it gets its number.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    take : Take
-    name : str
-    """
+    """Add a take to a bed; without a name it gets its number. `bed` bpy.types.Object."""
     if PROPERTY not in bed:
         bed[PROPERTY] = {}
     held = bed[PROPERTY]
@@ -101,10 +86,7 @@ def add(bed: Any, take: Take, name: str = "") -> Entry:
 def keep_recording(bed: Any, session: Running) -> str:
     """Keep what a session has recorded before its recording ends; return words about it, empty without.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    session : Running
+    `bed` bpy.types.Object.
     """
     take = read_recording(session)
     if take is None:
@@ -116,16 +98,8 @@ def keep_recording(bed: Any, session: Running) -> str:
 def read(bed: Any, number: str = "") -> Take:
     """Return a take of a bed; see `find`.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    number : str
-        As `find` takes it.
-
-    Raises
-    ------
-    DigiclayError
-        When there is no such take, or it is damaged.
+    `bed` bpy.types.Object; `number`: as `find` takes it. Raises DigiclayError when there is no such take, or
+    it is damaged.
     """
     number = find(bed, number).number  # first: a bed without takes has no such property
     return from_bytes(bytes(bed[PROPERTY][number]["data"]))
@@ -134,15 +108,7 @@ def read(bed: Any, number: str = "") -> Take:
 def remove(bed: Any, number: str) -> None:
     """Take a take away for good.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    number : str
-
-    Raises
-    ------
-    DigiclayError
-        When there is none of that number.
+    `bed` bpy.types.Object. Raises DigiclayError when there is none of that number.
     """
     number = find(bed, number).number
     del bed[PROPERTY][number]

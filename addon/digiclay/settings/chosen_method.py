@@ -15,9 +15,7 @@ OFFERED: list[tuple[str, str, str, int]] = []
 def method_of(settings: Any) -> str:
     """Return the name of a bed's control method, whether or not it is known here.
 
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
+    `settings` bpy.types.PropertyGroup.
     """
     name: str = settings.own_method or settings.method
     return name
@@ -41,10 +39,7 @@ def method_property(settings: Any) -> str:
 def list_offered(settings: Any, context: Any) -> list[tuple[str, str, str, int]]:
     """Return the methods to choose from, and the bed's own where that is not known here.
 
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    context : bpy.types.Context
+    `settings` bpy.types.PropertyGroup; `context` bpy.types.Context.
     """
     added = list_added()
     offered = [(name, localize(title(name)), "") for name in METHODS]
@@ -63,13 +58,7 @@ def place_of(settings: Any) -> int:
 
 
 def choose(settings: Any, place: int) -> None:
-    """Set the method by its place among those offered.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    place : int
-    """
+    """Set the method by its place among those offered. `settings` bpy.types.PropertyGroup."""
     name = list_offered(settings, None)[place][0]
     if name in METHODS:
         settings.method = name

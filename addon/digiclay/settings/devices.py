@@ -28,20 +28,9 @@ def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> 
     In Method I the blister rises from each cell's own height: the paper's strokes do not cross, those of a
     sculptor do.
 
-    Parameters
-    ----------
-    preset : str
-        One of the core's presets, or the name of the user's own.
-    layout : Layout
-    method : str
-        A preset of the user's own keeps its gains when it is of this method.
-    share : float, optional
-        Size of fingertip and blister, as a share of the preset's.
-
-    Raises
-    ------
-    DigiclayError
-        When the preset cannot be read, or does not go together with the layout.
+    `preset`: one of the core's presets, or the name of the user's own; `method`: a preset of the user's own
+    keeps its gains when it is of this method; `share`: size of fingertip and blister, as a share of the
+    preset's. Raises DigiclayError when the preset cannot be read, or does not go together with the layout.
     """
     control = {"layout": {"arrangement": layout.arrangement}, "control": {"method": method}}
     if preset in PRESETS:
@@ -57,13 +46,7 @@ def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> 
 
 
 def change_layout(scene: Scene, layout: Layout) -> Scene:
-    """Return a scene with another plan of the bed; a blister too wide, or cylinders, are made to fit.
-
-    Parameters
-    ----------
-    scene : Scene
-    layout : Layout
-    """
+    """Return a scene with another plan of the bed; a blister too wide, or cylinders, are made to fit."""
     actuator = scene.actuator
     if actuator.bore > layout.pitch:
         actuator = replace(actuator, bore=BORE * layout.pitch)
@@ -74,12 +57,7 @@ def change_layout(scene: Scene, layout: Layout) -> Scene:
 def change_finger(scene: Scene, before: Fingertip, finger: Fingertip) -> Scene:
     """Return a scene with another fingertip, and with a blister in proportion to its width.
 
-    Parameters
-    ----------
-    scene : Scene
-    before : Fingertip
-        Its present one.
-    finger : Fingertip
+    `before`: its present one.
     """
     blister = scene.blister
     if blister is not None:
@@ -128,13 +106,7 @@ def _scale_control(control: ControlParameters, share: float) -> ControlParameter
 
 
 def fit_blister(blister: Blister, layout: Layout) -> Blister:
-    """Return a blister that is at most as wide as the longer side of a bed, in the same proportions.
-
-    Parameters
-    ----------
-    blister : Blister or None
-    layout : Layout
-    """
+    """Return a blister that is at most as wide as the longer side of a bed, in the same proportions."""
     widest = max(layout.columns * layout.pitch, layout.rows * layout.row_spacing) / 2
     if blister.radius <= widest:
         return blister

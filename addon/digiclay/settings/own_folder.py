@@ -40,10 +40,7 @@ def find_full_path(folder: str) -> str:
 def load(folder: str) -> None:
     """Run the files of a folder, in place of those that were loaded before.
 
-    Parameters
-    ----------
-    folder : str
-        A full path; empty: none.
+    `folder`: a full path; empty: none.
     """
     clear()
     if not folder:

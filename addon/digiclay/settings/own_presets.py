@@ -30,13 +30,7 @@ def names() -> list[str]:
 
 
 def path(name: str) -> Path:
-    """Return the file of a preset.
-
-    Raises
-    ------
-    OutputError
-        When a preset cannot have that name.
-    """
+    """Return the file of a preset. Raises OutputError when a preset cannot have that name."""
     plain = name.strip()
     if not plain or len(plain) > LONGEST or plain.startswith("."):
         rule = f"must be a name of 1 to {LONGEST} letters that does not start with a dot"
@@ -52,15 +46,7 @@ def path(name: str) -> Path:
 def save(name: str, scene: Scene) -> Path:
     """Save a scene as a preset, in place of one of the same name.
 
-    Parameters
-    ----------
-    name : str
-    scene : Scene
-
-    Raises
-    ------
-    OutputError
-        When a preset cannot have that name, or its file cannot be written.
+    Raises OutputError when a preset cannot have that name, or its file cannot be written.
     """
     file = path(name)
     partial = file.with_suffix(".partial")
@@ -74,13 +60,7 @@ def save(name: str, scene: Scene) -> Path:
 
 
 def remove(name: str) -> None:
-    """Remove a preset.
-
-    Raises
-    ------
-    OutputError
-        When there is none, or its file cannot be removed.
-    """
+    """Remove a preset. Raises OutputError when there is none, or its file cannot be removed."""
     file = path(name)
     try:
         file.unlink()

@@ -53,14 +53,7 @@ def read_stored_settings(bed: Any) -> StoredSettings:
 def scene_of(bed: Any) -> Scene:
     """Return the scene a bed's settings describe; the finger's path is one press in the middle.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-
-    Raises
-    ------
-    ParameterError
-        Its owner and field are those of the panels.
+    `bed` bpy.types.Object. Raises ParameterError: its owner and field are those of the panels.
     """
     scene = read_scene(bed)
     reason = find_layout_mismatch(bed, scene.layout)
@@ -82,10 +75,7 @@ def read_scene(bed: Any) -> Scene:
 def table_of(bed: Any) -> dict[str, Any]:
     """Return a bed's settings as the tables of a scene file.
 
-    Raises
-    ------
-    ParameterError
-        On a list that cannot be read; its owner is the section.
+    Raises ParameterError: on a list that cannot be read; its owner is the section.
     """
     settings = bed.digiclay
     method, notes = method_of(settings), _notes(settings)
@@ -109,11 +99,7 @@ def table_of(bed: Any) -> dict[str, Any]:
 def write_scene(bed: Any, scene: Scene) -> None:
     """Write a scene's values into a bed's settings; a part it leaves out keeps its own, unused.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    scene : Scene
-        Its name, description and path are not settings of a bed.
+    `bed` bpy.types.Object; `scene`: its name, description and path are not settings of a bed.
     """
     settings = bed.digiclay
     # These two first: choosing them by hand sets others along with them.
@@ -140,11 +126,7 @@ def rebuild_reason(bed: Any) -> str:
 def part_group(settings: Any, section: str) -> Any:
     """Return the property group of a section; that of the control is its method's.
 
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    section : str
-        Of the scene file.
+    `settings` bpy.types.PropertyGroup; `section`: of the scene file.
     """
     if section == "control":
         return find_group(settings)  # None: the method is not known here
@@ -187,13 +169,7 @@ def _printable(name: str) -> str:
 
 
 def find_layout_mismatch(bed: Any, layout: Layout) -> str:
-    """Return why a bed is not the one a layout describes, or an empty text.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    layout : Layout
-    """
+    """Return why a bed is not the one a layout describes, or an empty text. `bed` bpy.types.Object."""
     pins, wanted = len(bed.data.vertices), layout.rows * layout.columns
     if pins != wanted:
         return f"The bed has {pins} pins, not {wanted}"

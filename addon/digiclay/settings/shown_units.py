@@ -29,12 +29,8 @@ _MEASURED = re.compile(r"(?<![\w.])([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?) (m/s|m2/s|
 def unit_of(unit: str, default: object) -> tuple[str, int]:
     """Return the unit a parameter is shown in, and its power of ten per SI unit.
 
-    Parameters
-    ----------
-    unit : str
-        The SI unit of its declaration, empty for a plain number.
-    default : object
-        Its default: a time of a second or more, or of zero, is shown in s.
+    `unit`: the SI unit of its declaration, empty for a plain number; `default`: its default: a time of a
+    second or more, or of zero, is shown in s.
     """
     if unit == "s" and isinstance(default, float) and (default == 0.0 or default >= LONG):
         return "s", 0
@@ -44,12 +40,7 @@ def unit_of(unit: str, default: object) -> tuple[str, int]:
 def to_shown(value: float, power: int) -> float:
     """Return an SI value in the unit it is shown in, free of the noise of a product: 0.003 m is 3 mm.
 
-    Parameters
-    ----------
-    value : float
-        SI.
-    power : int
-        Of ten, shown units per SI unit.
+    `value`: SI; `power`: of ten, shown units per SI unit.
     """
     return float(Decimal(repr(value)).scaleb(power))
 
@@ -60,12 +51,7 @@ def to_si(value: float, power: int) -> float:
     The number is taken at the seven digits it was meant with: 0.3 mm, kept as 0.300000012, is 0.0003 m.
     Whatever is not finite is handed on, for the part's own rules to refuse.
 
-    Parameters
-    ----------
-    value : float
-        In the shown unit.
-    power : int
-        Of ten, shown units per SI unit.
+    `value`: in the shown unit; `power`: of ten, shown units per SI unit.
     """
     if not math.isfinite(value):
         return value

@@ -22,10 +22,7 @@ Notes = dict[str, tuple[Any, Any]]
 def write(group: Any, part: Parameters) -> Notes:
     """Write a part's parameters into its property group; return what the properties cannot hold.
 
-    Parameters
-    ----------
-    group : bpy.types.PropertyGroup
-    part : Parameters
+    `group` bpy.types.PropertyGroup.
     """
     notes: Notes = {}
     for name, field in _fields(type(part)).items():
@@ -40,15 +37,7 @@ def write(group: Any, part: Parameters) -> Notes:
 def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
     """Write one parameter, in SI, into its property.
 
-    Parameters
-    ----------
-    group : bpy.types.PropertyGroup
-    kind : type
-        Class of the part.
-    name : str
-        Of the parameter.
-    value : object
-        SI.
+    `group` bpy.types.PropertyGroup; `kind`: class of the part; `name`: of the parameter; `value`: SI.
     """
     power = _power(_fields(kind)[name])
     if isinstance(value, tuple):
@@ -63,13 +52,7 @@ def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
 def reset(group: Any, kind: type[Parameters], name: str) -> None:
     """Write one parameter's default into its property.
 
-    Parameters
-    ----------
-    group : bpy.types.PropertyGroup
-    kind : type
-        Class of the part.
-    name : str
-        Of the parameter.
+    `group` bpy.types.PropertyGroup; `kind`: class of the part; `name`: of the parameter.
     """
     assign(group, kind, name, _fields(kind)[name].default)
 
@@ -77,20 +60,8 @@ def reset(group: Any, kind: type[Parameters], name: str) -> None:
 def read(group: Any, kind: type[Parameters], notes: Notes, section: str) -> dict[str, Any]:
     """Return a part's parameters in SI, as a scene file's section would give them.
 
-    Parameters
-    ----------
-    group : bpy.types.PropertyGroup
-    kind : type
-        The part's parameters.
-    notes : dict
-        From `write`.
-    section : str
-        What messages call the part.
-
-    Raises
-    ------
-    ParameterError
-        On a list that cannot be read as numbers.
+    `group` bpy.types.PropertyGroup; `kind`: the part's parameters; `notes`: from `write`; `section`: what
+    messages call the part. Raises ParameterError: on a list that cannot be read as numbers.
     """
     values = {}
     for name, field in _fields(kind).items():

@@ -40,11 +40,7 @@ def translate(text: str, language: str) -> str | None:
 
     A unit in brackets, and what a tooltip adds of a parameter, stay what they are.
 
-    Parameters
-    ----------
-    text : str
-    language : str
-        One of `LANGUAGES`.
+    `language`: one of `LANGUAGES`.
     """
     known = _catalog(language)
     for section in ("labels", "tooltips", "parameters", "messages"):
@@ -103,14 +99,7 @@ def _property_strings(owner: Any) -> Iterator[str]:
 
 
 def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], str]:
-    """Return the entries that Blender takes, by context and text.
-
-    Parameters
-    ----------
-    texts : iterable of str
-    language : str
-        One of `LANGUAGES`.
-    """
+    """Return the entries that Blender takes, by context and text. `language`: one of `LANGUAGES`."""
     found = {text: translate(text, language) for text in texts}
     brushes = {(BRUSH, text): said for text, said in _catalog(language)["brushes"].items() if text in found}
     return brushes | {(context, text): said for text, said in found.items() if said for context in CONTEXTS}

@@ -67,11 +67,7 @@ def count_true(test: NDArray[np.bool_]) -> Any:
 def per_row(values: Floats, dimensions: int) -> Floats:
     """Return numbers of each row so that rows (r, n) or (r, n, b) can be calculated with them.
 
-    Parameters
-    ----------
-    values : ndarray (r,), (r, 1) or (r, b)
-    dimensions : {2, 3}
-        Of the rows.
+    `values` (r,) or (r, 1) or (r, b); `dimensions`: of the rows.
     """
     return values.reshape(len(values), *(1,) * (dimensions - 2), -1)
 
@@ -79,14 +75,7 @@ def per_row(values: Floats, dimensions: int) -> Floats:
 def apply_map(linear: Floats, rows: Floats) -> Floats:
     """Return what a linear map makes of rows.
 
-    Parameters
-    ----------
-    linear : ndarray (o, i) or (o, i, b)
-    rows : ndarray (i, n) or (i, n, b)
-
-    Returns
-    -------
-    ndarray (o, n) or (o, n, b)
+    `linear` (o, i) or (o, i, b); `rows` (i, n) or (i, n, b). Returns (o, n) or (o, n, b).
     """
     made: Floats = np.empty((len(linear), *rows.shape[1:]))
     prepare_map(linear, rows, made)()
@@ -96,12 +85,7 @@ def apply_map(linear: Floats, rows: Floats) -> Floats:
 def prepare_map(linear: Floats, rows: Floats, out: Floats) -> Callable[[], Any]:
     """Return a function that works out a linear map of rows, as they are when it is called, into an array.
 
-    Parameters
-    ----------
-    linear, rows : ndarray
-        See `apply_map`.
-    out : ndarray (o, n) or (o, n, b)
-        Contiguous.
+    `linear`, `rows`: see `apply_map`; `out` (o, n) or (o, n, b), contiguous.
     """
     if linear.ndim == 3:
         return partial(_by_run, linear, rows, out)

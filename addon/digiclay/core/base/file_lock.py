@@ -38,20 +38,9 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
     The system's own lock is taken, which no crash leaves behind; where a drive has none, a record of
     the process. Processes that are started meanwhile do not inherit it.
 
-    Parameters
-    ----------
-    path : Path
-    refusal : str
-        What is said when another process holds it; it may hold ``{lock}``.
-    patience : float, optional
-        Seconds to wait for the other process.
-
-    Raises
-    ------
-    BusyError
-        When another process holds it.
-    OSError
-        When the file cannot be made.
+    `refusal`: what is said when another process holds it; it may hold ``{lock}``; `patience`: seconds to wait
+    for the other process. Raises BusyError when another process holds it. Raises OSError when the file cannot
+    be made.
     """
     try:
         taken = _wait_for(lambda: _take(path), patience)
@@ -136,13 +125,7 @@ def hold_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[Non
 
     What another machine holds has to be removed by hand when that one has crashed: the refusal says so.
 
-    Parameters
-    ----------
-    path : Path
-    refusal : str
-        What is said when another process holds it.
-    patience : float
-        How long to wait for it, s.
+    `refusal`: what is said when another process holds it; `patience`: how long to wait for it, s.
     """
     if _wait_for(lambda: _record(path), patience) is None:
         owner = _read_owner(path)

@@ -14,16 +14,7 @@ Part = TypeVar("Part", bound=Parameters)
 
 
 def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
-    """Refuse keys that mean nothing.
-
-    Parameters
-    ----------
-    section : str
-        What the message calls it.
-    table : mapping
-    names : sequence of str
-        Known keys.
-    """
+    """Refuse keys that mean nothing. `section`: what the message calls it; `names`: known keys."""
     for key, value in table.items():
         if key in names:
             continue
@@ -37,16 +28,8 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
 def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
     """Build a part from its section.
 
-    Parameters
-    ----------
-    section : str
-        What messages call it.
-    kind : type
-        Class of the part.
-    defaults : mapping
-        Values that differ from the class's own.
-    own : mapping
-        What the section says.
+    `section`: what messages call it; `kind`: class of the part; `defaults`: values that differ from the
+    class's own; `own`: what the section says.
     """
     known = list_quantities(kind)
     refuse_unknown(section, own, (*known, "method") if section == "control" else tuple(known))
@@ -72,25 +55,14 @@ class ReadParts:
     def read(self, section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
         """Build a part from its section, or return the one that was built of the same.
 
-        Parameters
-        ----------
-        section, kind, defaults, own
-            As `read_part` has them.
+        `section`, `kind`, `defaults`, `own`: as `read_part` has them.
         """
         key = section, kind, repr(defaults), repr(own)
         part: Part = self.keep(key, read_part, section, kind, defaults, own)
         return part
 
     def keep(self, key: tuple[Any, ...], make: Callable[..., Any], *given: Any) -> Any:
-        """Return what was made for a key, or make it.
-
-        Parameters
-        ----------
-        key : tuple
-        make : callable
-        *given
-            Its arguments.
-        """
+        """Return what was made for a key, or make it. `given`: its arguments."""
         if key not in self._parts:
             self._parts[key] = make(*given)
         return self._parts[key]

@@ -17,10 +17,7 @@ def read_size(path: Path) -> tuple[int, int] | None:
 
     PNG, JPEG, BMP, TIFF, EXR and HDR are known, by what they begin with.
 
-    Raises
-    ------
-    OSError
-        When the file cannot be read.
+    Raises OSError when the file cannot be read.
     """
     with path.open("rb") as file:
         head = file.read(HEAD)

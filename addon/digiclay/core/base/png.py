@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 def encode_png(pixels: NDArray[np.uint8]) -> bytes:
     """Return the file of a picture.
 
-    Parameters
-    ----------
-    pixels : ndarray of uint8 (rows, columns, 3)
-        Red, green and blue in sRGB, the upper row first.
+    `pixels` (rows, columns, 3), red, green and blue in sRGB, the upper row first.
     """
     rows, columns, _ = pixels.shape
     plain = np.zeros((rows, 1 + 3 * columns), np.uint8)  # each row starts with its filter: none

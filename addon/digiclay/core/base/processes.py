@@ -28,12 +28,7 @@ def may_have_made(pid: int, changed: float) -> bool:
 
     Numbers of processes are used again: one that was started after the last change is another one.
 
-    Parameters
-    ----------
-    pid : int
-        The number of the process that made it.
-    changed : float
-        When it was changed last, s since 1970.
+    `pid`: the number of the process that made it; `changed`: when it was changed last, s since 1970.
     """
     since = find_start(pid)
     return since is not None and since <= changed + CLOCKS_DIFFER

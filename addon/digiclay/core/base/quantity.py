@@ -101,15 +101,7 @@ class Quantity:
 
 
 def quantity(default: Any, doc: str, **known: Any) -> Any:
-    """Declare a dataclass field together with its `Quantity`.
-
-    Parameters
-    ----------
-    default : object
-    doc : str
-    **known
-        The other fields of `Quantity`.
-    """
+    """Declare a dataclass field together with its `Quantity`. `known`: the other fields of `Quantity`."""
     return dataclasses.field(default=default, metadata={"quantity": Quantity(doc, **known)})
 
 
@@ -196,17 +188,8 @@ def _finite(value: float) -> bool:
 def parse(text: str, unit: str) -> float:
     """Read a quantity written with a unit, such as ``"3 mm"`` or ``"20um"``, into SI.
 
-    Parameters
-    ----------
-    text : str
-        A number, and a unit from `UNITS`.
-    unit : str
-        The SI unit the parameter is declared in.
-
-    Raises
-    ------
-    ValueError
-        When the number or the unit cannot be read, or the unit measures something else.
+    `text`: a number, and a unit from `UNITS`; `unit`: the SI unit the parameter is declared in. Raises
+    ValueError when the number or the unit cannot be read, or the unit measures something else.
     """
     read = WRITTEN.fullmatch(text.strip())
     if not read:
@@ -225,11 +208,6 @@ def parse(text: str, unit: str) -> float:
 def find_nearest_name(name: str, known: list[str], alike: float = 0.5) -> str:
     """Return the known name a misspelt one is nearest to, or ``""``; `alike` is the least share in common.
 
-    Parameters
-    ----------
-    name : str
-    known : list of str
-    alike : float
-        0 to 1.
+    `alike`: 0 to 1.
     """
     return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=alike)), "")

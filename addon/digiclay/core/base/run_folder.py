@@ -60,15 +60,7 @@ def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
 def resolve_inside(folder: Path, *parts: str) -> Path:
     """Return a path in a folder, and refuse one that leads out of it, by its name or by a link.
 
-    Parameters
-    ----------
-    folder : Path
-    parts : str
-        Names on the way from there.
-
-    Raises
-    ------
-    OutputError
+    `parts`: names on the way from there. Raises OutputError.
     """
     path = folder.joinpath(*parts)
     end = path.resolve()
@@ -86,11 +78,7 @@ def find_lock(path: Path) -> Path:
 def lock_name(path: Path, patience: float = 0.0) -> AbstractContextManager[None]:
     """Hold the lock of whoever makes a file or folder of this name.
 
-    Parameters
-    ----------
-    path : Path
-    patience : float, optional
-        Time to wait for another process that is about to end, s.
+    `patience`: time to wait for another process that is about to end, s.
     """
     return hold_lock(find_lock(path), describe_claim(path, "being written"), patience)
 
@@ -98,11 +86,7 @@ def lock_name(path: Path, patience: float = 0.0) -> AbstractContextManager[None]
 def describe_claim(path: Path, how: str) -> str:
     """Return the error for a path that another process has locked.
 
-    Parameters
-    ----------
-    path : Path
-    how : str
-        What the other process does, *being written*.
+    `how`: what the other process does, *being written*.
     """
     return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
 
@@ -177,16 +161,8 @@ def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
 
     What killed processes have left unfinished of them is taken away.
 
-    Parameters
-    ----------
-    files : sequence of Path
-    patience : float, optional
-        Seconds to wait for somebody else who looks at the same folder.
-
-    Raises
-    ------
-    OutputError
-        When one is claimed already, its folder is being written anew, or it cannot be made.
+    `patience`: seconds to wait for somebody else who looks at the same folder. Raises OutputError when one is
+    claimed already, its folder is being written anew, or it cannot be made.
     """
     with ExitStack() as until_the_end:
         try:
@@ -208,10 +184,7 @@ def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
 def write_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Path]:
     """Claim a folder and give one to write into, which becomes it: see `Claim.write`.
 
-    Parameters
-    ----------
-    out, overwrite, patience
-        As `claim_folder` has them.
+    `out`, `overwrite`, `patience`: as `claim_folder` has them.
     """
     with claim_folder(out, overwrite=overwrite, patience=patience) as claim, claim.write() as folder:
         yield folder

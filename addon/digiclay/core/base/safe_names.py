@@ -34,12 +34,8 @@ def make_safe_name(text: str) -> str:
 def find_name(path: Path, general: str = "scene.toml") -> str:
     """Return the name of a file's content: its stem, or its folder's name for a generic stem.
 
-    Parameters
-    ----------
-    path : Path
-        However it leads to the file: its own name and its folder's real one count.
-    general : str
-        The name of a file that says nothing.
+    `path`: however it leads to the file: its own name and its folder's real one count; `general`: the name of
+    a file that says nothing.
     """
     full = Path(os.path.abspath(path))
     name = full.parent.name if full.name == general else full.stem

@@ -13,11 +13,7 @@ from .quantity import find_nearest_name
 def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
     """Return the samples of a folder by their names: its files that end with one of `kinds`.
 
-    Parameters
-    ----------
-    folder : Path
-    *kinds : str
-        Endings of names, with the dot.
+    `kinds`: endings of names, with the dot.
     """
     return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in kinds}
 
@@ -25,18 +21,8 @@ def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
 def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
     """Return the file a word stands for.
 
-    Parameters
-    ----------
-    word : str
-        A sample's name, or a path.
-    samples : mapping of str to Path
-    kind : str
-        What messages call a sample.
-
-    Raises
-    ------
-    SceneError
-        When there is no such file, or sample.
+    `word`: a sample's name, or a path; `kind`: what messages call a sample. Raises SceneError when there is
+    no such file, or sample.
     """
     if word in samples:
         return samples[word]

@@ -15,19 +15,9 @@ from .arrays import Floats
 def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
     """Return monotone cubic splines through some knots at some places.
 
-    Parameters
-    ----------
-    knot : ndarray (k,)
-        Rising or falling; two of them give straight lines.
-    value : ndarray (k, s)
-        A column a spline.
-    at : ndarray (m,)
-        Beyond the outer knots the splines go on straight.
-
-    Returns
-    -------
-    ndarray (m, s)
-        Between two knots never beyond their values.
+    `knot` (k,), rising or falling; two of them give straight lines; `value` (k, s), a column a spline; `at`
+    (m,), beyond the outer knots the splines go on straight. Returns (m, s), between two knots never beyond
+    their values.
     """
     if knot[0] > knot[-1]:
         knot, value = knot[::-1], value[::-1]
@@ -49,11 +39,7 @@ def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
 def compute_inner_slopes(width: Floats, value: Floats) -> Floats:
     """Return the slopes at the inner knots, and 0 at both ends, shape of `value`.
 
-    Parameters
-    ----------
-    width : ndarray (k - 1,)
-        Between the knots.
-    value : ndarray (k, s)
+    `width` (k - 1,), between the knots; `value` (k, s).
     """
     width = width[:, None]
     secant = np.diff(value, axis=0) / width

@@ -25,12 +25,8 @@ _PIECES = re.compile(
 def parse_tables(text: str) -> dict[str, Any]:
     """Return the tables of a TOML text.
 
-    Raises
-    ------
-    ValueError
-        When it is no TOML, or too long; the message ends with ``(at line ...)`` where that is known.
-    RecursionError
-        When lists or tables are nested too deeply.
+    Raises ValueError when it is no TOML, or too long; the message ends with ``(at line ...)`` where that is
+    known. Raises RecursionError when lists or tables are nested too deeply.
     """
     if len(text) > LARGEST:
         raise ValueError(f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)")

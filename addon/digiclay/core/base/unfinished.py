@@ -17,11 +17,7 @@ UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))
 def name_unfinished(target: Path, kind: str = "part") -> Path:
     """Return the name under which this process prepares a file or folder, beside it.
 
-    Parameters
-    ----------
-    target : Path
-    kind : {"part", "old", "frames"}
-        What becomes the target; what the target was; the frames of a film.
+    `kind`: what becomes the target; what the target was; the frames of a film.
     """
     return target.with_name(f".{target.name}.{os.getpid()}@{find_host()}.{kind}")
 
@@ -37,12 +33,7 @@ def remove_abandoned(folder: Path, name: str = "") -> None:
     What was moved aside to be replaced is put back when nothing has come in its place. What other
     machines prepare on a shared drive stays: nothing here tells whether they are at it.
 
-    Parameters
-    ----------
-    folder : Path
-        Nothing happens when there is none.
-    name : str, optional
-        Of what it was to become; by default anything.
+    `folder`: nothing happens when there is none; `name`: of what it was to become; by default anything.
     """
     try:
         found = sorted(folder.iterdir())

@@ -15,15 +15,7 @@ from .unfinished import name_unfinished
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file whole or not at all: to a temporary name beside it, then renamed.
 
-    Parameters
-    ----------
-    path : Path
-    content : bytes
-
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
+    Raises OutputError when the file cannot be written.
     """
     with open_whole(path) as file:
         file.write(content)
@@ -33,10 +25,7 @@ def write_whole(path: Path, content: bytes) -> None:
 def open_whole(path: Path) -> Iterator[BinaryIO]:
     """Open a file under a temporary name to write into; it becomes `path` when the block ends without error.
 
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
+    Raises OutputError when the file cannot be written.
     """
     part = name_unfinished(path)
     try:

@@ -40,12 +40,7 @@ def begin(batch: Batch) -> State:
 def advance(batch: Batch, state: State, coming: Fingers | None) -> State:
     """Simulate one control period of all runs in the arrays of `state`, which is used up.
 
-    Parameters
-    ----------
-    batch : Batch
-    state : State
-    coming : Fingers or None
-        How the fingers come in some periods, this one among them.
+    `coming`: how the fingers come in some periods, this one among them.
     """
     return simulate_period(batch, state, coming and coming.at(state.period))
 
@@ -63,13 +58,7 @@ def find_diverged(state: State) -> NDArray[np.bool_]:
 def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceError:
     """Return the error that a run with a number that is not finite ends in.
 
-    Parameters
-    ----------
-    batch : Batch
-    state : State
-        After the control period.
-    run : int
-        Its index on the last axis.
+    `state`: after the control period; `run`: its index on the last axis.
     """
     held = state.active
     error = find_divergence(batch.systems[run], held.cells[:, run], held.block[..., run], state.period - 1)
@@ -78,14 +67,7 @@ def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceErr
 
 
 def select_runs(state: State, runs: Sequence[int]) -> State:
-    """Return the state of some of the runs.
-
-    Parameters
-    ----------
-    state : State
-    runs : sequence of int
-        Their indices on the last axis.
-    """
+    """Return the state of some of the runs. `runs`: their indices on the last axis."""
     chosen, held = np.array(runs, np.intp), state.active
     # The discs are not worth keeping: the set is made anew.
     active = replace(

@@ -17,10 +17,7 @@ Part = TypeVar("Part")
 def classify(value: Any) -> Any:
     """Return all of a part but its numbers: parts of one kind can be merged.
 
-    Parameters
-    ----------
-    value : object
-        A dataclass, and in its fields dataclasses, numbers, tuples, texts or None.
+    `value`: a dataclass, and in its fields dataclasses, numbers, tuples, texts or None.
     """
     if is_dataclass(value) and not isinstance(value, type):
         return type(value), *(classify(getattr(value, field.name)) for field in fields(value))
@@ -32,12 +29,9 @@ def classify(value: Any) -> Any:
 def merge_parts(parts: Sequence[Part]) -> Part:
     """Return a part that stands for those of all runs; the first one itself where all are alike.
 
-    Parameters
-    ----------
-    parts : sequence of dataclass
-        Of one `classify`. What is the same in all of them stays as it is; a number that is not becomes an
-        array (b,), and arrays get one axis more, the last; parts within the parts likewise. The rules of
-        parameters are not checked again.
+    `parts`: of one `classify`. What is the same in all of them stays as it is; a number that is not becomes
+    an array (b,), and arrays get one axis more, the last; parts within the parts likewise. The rules of
+    parameters are not checked again.
     """
     first: Any = parts[0]
     own = {field.name: _one([getattr(one, field.name) for one in parts]) for field in fields(first)}

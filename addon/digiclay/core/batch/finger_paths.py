@@ -65,14 +65,7 @@ class FingersPeriod(NamedTuple):
 def make_fingers(systems: Sequence[System], paths: Sequence[Trajectory], first: int, count: int) -> Fingers:
     """Work out how the fingers come.
 
-    Parameters
-    ----------
-    systems : sequence of System
-        With a fingertip.
-    paths : sequence of Trajectory
-        Each run's.
-    first, count : int
-        Control periods.
+    `systems`: with a fingertip; `paths`: each run's; `first`, `count`: control periods.
     """
     runs = list(zip(systems, paths, strict=True))
     alike = all(_same(run, runs[0]) for run in runs)
@@ -85,13 +78,7 @@ def extend_fingers(
 ) -> Fingers | None:
     """Return how the fingers come in a period and some more: what is known, or worked out anew.
 
-    Parameters
-    ----------
-    coming : Fingers or None
-        What is known.
-    systems : sequence of System
-    paths : sequence of Trajectory
-    period : int
+    `coming`: what is known.
     """
     if systems[0].cell.touch is None or (coming and period < coming.first + len(coming.forms)):
         return coming
@@ -127,12 +114,7 @@ def _trace_finger(system: System, path: Trajectory, first: int, count: int) -> t
 def compute_undersides(coming: Fingers, period: int, basis: Floats) -> Floats:
     """Return the undersides over some cells, shape (p, k, b), m; see `fingertip.compute_underside`.
 
-    Parameters
-    ----------
-    coming : Fingers
-    period : int
-        One of these.
-    basis : ndarray (6, k, b)
+    `period`: one of these; `basis` (6, k, b).
     """
     forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
     rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, basis)
@@ -159,15 +141,7 @@ class SampledPath:
 
 
 def make_path(grid: Grid, trajectory: Trajectory, time: Floats) -> SampledPath:
-    """Compute a fingertip path at times (t,), s.
-
-    Parameters
-    ----------
-    grid : Grid
-    trajectory : Trajectory
-    time : ndarray (t,)
-        s.
-    """
+    """Compute a fingertip path at times (t,), s. `time` (t,), s."""
     tip = trajectory.poses(time)
     places = np.unique(tip[:, :2], axis=0)
     nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]

@@ -38,14 +38,7 @@ class Findings:
     def find(self, most: int, key: Any, make: Callable[..., Any], *given: Any) -> Any:
         """Return what was made for an equal key, or make it; the first one goes when there are too many.
 
-        Parameters
-        ----------
-        most : int
-            `KINDS`, `MOTIONS` or `BEDS`.
-        key : hashable
-        make : callable
-        *given
-            Its arguments.
+        `most`: `KINDS`, `MOTIONS` or `BEDS`; `key` hashable; `given`: its arguments.
         """
         known = self._known[most]
         if key not in known:
@@ -61,16 +54,8 @@ def describe_structure(scene: Scene, known: Findings | None = None) -> Any:
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
     The other steppers know no runs, so for them all cells must be alike.
 
-    Parameters
-    ----------
-    scene : Scene
-    known : Findings, optional
-        Of scenes before, with which this one has parts in common.
-
-    Raises
-    ------
-    ParameterError
-        When the scene's parts do not go together.
+    `known`: of scenes before, with which this one has parts in common. Raises ParameterError when the scene's
+    parts do not go together.
     """
     known = known or Findings()
     physics = tuple(scene.section(name) for name in PHYSICS)

@@ -26,12 +26,8 @@ MARGIN = 0.5
 def compute_reach(window: Floats, peak: Floats) -> Disc:
     """Return the discs beyond which no finger touches a pin.
 
-    Parameters
-    ----------
-    window : ndarray (6, b) or (6, 1)
-        See `touch.Window`.
-    peak : ndarray (b,)
-        No pin top is higher than this, m; see `fingertip.compute_reach`.
+    `window` (6, b) or (6, 1), see `touch.Window`; `peak` (b,), no pin top is higher than this, m; see
+    `fingertip.compute_reach`.
     """
     x, y, spread, base, tilt, bend = window
     square = tilt * tilt + 2.0 * bend * (peak - base)
@@ -49,13 +45,8 @@ class PaddedSelection(Selection):
     def update(self, state: State, finger: Any, control: Any) -> State:
         """Return a state whose active cells are all that can change in the coming period.
 
-        Parameters
-        ----------
-        state : State
-            Its arrays are used up.
-        finger : fingers.FingersPeriod or None
-        control : list of (float, float, float) or None, or None
-            Disc x, y, radius that each controller will command, m.
+        `state`: its arrays are used up; `finger` fingers.FingersPeriod or None; `control` (float, float,
+        float), disc x, y, radius that each controller will command, m.
         """
         held, grid, discs = state.active, self.grid, join_discs(control)
         near = NO_DISC if finger is None else compute_reach(finger.window, held.peak)

@@ -46,14 +46,7 @@ class Play:
 
 
 def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Play:
-    """Return sessions before their first control period.
-
-    Parameters
-    ----------
-    scenes : mapping of int to Scene
-        By the numbers of their runs.
-    systems : mapping of int to System
-    """
+    """Return sessions before their first control period. `scenes`: by the numbers of their runs."""
     batch = make_batch([systems[run] for run in scenes])
     ways = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
     return Play(systems, ways, tuple(scenes), batch, begin(batch))
@@ -66,14 +59,7 @@ def locate_fingers(play: Play) -> Play:
 
 
 def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
-    """Return some of the sessions.
-
-    Parameters
-    ----------
-    play : Play
-    runs : tuple of int
-        Those that go on.
-    """
+    """Return some of the sessions. `runs`: those that go on."""
     state = select_runs(play.state, [play.runs.index(run) for run in runs])
     batch = make_batch([play.systems[run] for run in runs])
     return replace(play, runs=runs, batch=batch, state=state, coming=None)
@@ -106,18 +92,8 @@ class Instant:
 def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:
     """Play all sessions to their ends; what is over leaves the batch before the next control period.
 
-    Parameters
-    ----------
-    play : Play
-    ends : mapping of int to int
-        Each run's last control period.
-    stopped : callable or None
-        Asked after each control period; when it says True, the sessions are given up.
-
-    Yields
-    ------
-    Instant
-        After each control period.
+    `ends`: each run's last control period; `stopped`: asked after each control period; when it says True, the
+    sessions are given up. Yields after each control period.
     """
     share = 0.0
     while play.runs:

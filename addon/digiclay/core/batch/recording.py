@@ -64,12 +64,7 @@ class Histories:
 
         New memory for every run would take longer than all that is written into it.
 
-        Parameters
-        ----------
-        now : Instant
-            In which it has come to its end.
-        index : int
-            Where on the last axis the run is.
+        `now`: in which it has come to its end; `index`: where on the last axis the run is.
         """
         run = now.play.runs[index]
         rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
@@ -124,12 +119,7 @@ class Sums:
     def finish(self, now: Instant, index: int) -> Result:
         """Return the result of a run, without a history.
 
-        Parameters
-        ----------
-        now : Instant
-            In which it has come to its end.
-        index : int
-            Where on the last axis the run is.
+        `now`: in which it has come to its end; `index`: where on the last axis the run is.
         """
         play, run, period = now.play, now.play.runs[index], now.play.state.period
         scene, column, held = self._scenes[run], self._runs.index(run), play.state.active

@@ -55,11 +55,7 @@ class RunByRun:
 def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any:
     """Return one controller for all runs: the method's own where its formulas hold for many at once.
 
-    Parameters
-    ----------
-    controllers : sequence of Controller
-    by_set : bool
-        See `System.by_set`.
+    `by_set`: see `System.by_set`.
     """
     first = controllers[0]
     if isinstance(first, BatchControl) and not by_set:

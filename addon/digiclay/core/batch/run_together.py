@@ -112,20 +112,10 @@ def run_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes from rest to their ends, all at once.
 
-    Parameters
-    ----------
-    scenes : sequence of Scene
-        Of one `packing.describe_structure`.
-    stopped : callable, optional
-        Asked after each control period; when it says True, the runs that are not done are given up.
-
-    Yields
-    ------
-    number : int
-        Which of the scenes has come to its end.
-    result : Result or DigiclayError
-        As `run_scene.run` would return or raise it. Its history is valid until the next result is
-        asked for. Its run time is a share, see `play.Instant`.
+    `scenes`: of one `packing.describe_structure`; `stopped`: asked after each control period; when it says
+    True, the runs that are not done are given up. Yields `number`: which of the scenes has come to its end;
+    `result`: as `run_scene.run` would return or raise it. Its history is valid until the next result is asked
+    for. Its run time is a share, see `play.Instant`.
     """
     return _run(scenes, Histories, stopped)
 
@@ -135,20 +125,9 @@ def measure_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes as `run_together` does, and measure them without ever having their histories.
 
-    Parameters
-    ----------
-    scenes : sequence of Scene
-        Of one `packing.describe_structure`, with a recorder.
-    errors : bool, optional
-        Estimate their errors too, where `accuracy.has_every_command`; their references, see
-        `accuracy.make_reference`, must be of one structure as well.
-    stopped : callable, optional
-        See `run_together`.
-
-    Yields
-    ------
-    number : int
-    result : Result or DigiclayError
-        Without a history; its metrics are those it would have with one.
+    `scenes`: of one `packing.describe_structure`, with a recorder; `errors`: estimate their errors too, where
+    `accuracy.has_every_command`; their references, see `accuracy.make_reference`, must be of one structure as
+    well; `stopped`: see `run_together`. Yields `number`; `result`: without a history; its metrics are those
+    it would have with one.
     """
     return _run(scenes, Sums, stopped, errors=errors)

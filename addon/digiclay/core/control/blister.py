@@ -47,12 +47,8 @@ class Blister(Parameters):
     def interpolate(self, distance: Floats, edge: Any, top: Any) -> Floats:
         """Return heights ``edge + p(r) (top - edge)``, m.
 
-        Parameters
-        ----------
-        distance : ndarray (m,) or (m, b)
-            From the middle, m.
-        edge, top : float or ndarray (m,) or (b,)
-            Heights of the surface around the blister and of its top, m.
+        `distance` (m,) or (m, b), from the middle, m; `edge`, `top` (m,) or (b,), heights of the surface
+        around the blister and of its top, m.
         """
         if self.profile == "gaussian":
             height: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))

@@ -66,12 +66,8 @@ class BlisterRule:
     def divide(self, pose: tuple[Any, Any, Any, Any], basis: Floats) -> BlisterCells:
         """Return the cells about the middle of a blister.
 
-        Parameters
-        ----------
-        pose : tuple of float or of ndarray (b,)
-            x, y of the middle, m, and the direction of travel, a unit vector.
-        basis : ndarray (6, m) or (6, m, b)
-            Rows 1, x, y, x², x y, y² of the cells.
+        `pose` (b,), x, y of the middle, m, and the direction of travel, a unit vector; `basis` (6, m) or (6,
+        m, b), rows 1, x, y, x², x y, y² of the cells.
         """
         distance, ahead = measure_offsets(*pose, basis)
         _, radius, edge_radius, *_ = self._limits[distance.shape]
@@ -92,14 +88,9 @@ class BlisterRule:
     def find_frozen(self, cells: BlisterCells, seen: Measurement, uneven: Any = False) -> Flags:
         """Return which cells are left behind, and which of those left before stay so: none that is pressed.
 
-        Parameters
-        ----------
-        cells : BlisterCells
-        seen : Measurement
-            Gives the modes of the last period, and the forces.
-        uneven : bool or ndarray of bool (m,) or (m, b), optional
-            Cells that sink into uneven ground: they freeze nearer to the fingertip, and are freed when they
-            lie ahead of it again.
+        `seen`: gives the modes of the last period, and the forces; `uneven` bool (m,) or (m, b), cells that
+        sink into uneven ground: they freeze nearer to the fingertip, and are freed when they lie ahead of it
+        again.
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
         limit = behind * cells.distance
@@ -119,15 +110,8 @@ class BlisterRule:
     ) -> None:
         """Set the modes of the blister's cells, in place.
 
-        Parameters
-        ----------
-        mode : ndarray of int8 (m,) or (m, b)
-        cells : BlisterCells
-        force : ndarray (m,) or (m, b)
-            N.
-        touched_mode : int or ndarray (b,)
-            Mode of touched cells.
-        frozen : ndarray of bool (m,) or (m, b)
+        `mode` int (m,) or (m, b); `force` (m,) or (m, b), N; `touched_mode` (b,), mode of touched cells;
+        `frozen` bool (m,) or (m, b).
         """
         edge, formed, froze = CODES[mode.shape]
         touched = force > self._limits[force.shape][-1]

@@ -258,13 +258,7 @@ def _under_finger(mode: Modes) -> NDArray[np.bool_]:
 
 
 def build(parameters: CellStates, device: DeviceInfo) -> CellStatesControl:
-    """Put Method II together for a device; the device has a blister.
-
-    Parameters
-    ----------
-    parameters : CellStates
-    device : DeviceInfo
-    """
+    """Put Method II together for a device; the device has a blister."""
     assert device.blister is not None
     asked, floor = parameters.force_setpoint, device.force_floor
     check_floor(asked, "force_setpoint", asked, floor)

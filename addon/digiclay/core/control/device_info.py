@@ -59,35 +59,15 @@ class DeviceInfo:
 
 
 def suppress_noise(force: Floats, floor: Any) -> Floats:
-    """Return forces, but 0 where they may be noise.
-
-    Parameters
-    ----------
-    force : ndarray (m,) or (m, b)
-        N.
-    floor : float or ndarray (b,)
-        N.
-    """
+    """Return forces, but 0 where they may be noise. `force` (m,) or (m, b), N; `floor` (b,), N."""
     return np.where(force >= floor, force, 0.0)
 
 
 def check_floor(carried: float, field: str, asked: float, floor: float) -> None:
     """Refuse noise above the set point, since contact would not be detected.
 
-    Parameters
-    ----------
-    carried : float
-        Force on a cell when all is as asked, N.
-    field : str
-        Of the control, for the message.
-    asked : float
-        Its value, N.
-    floor : float
-        N.
-
-    Raises
-    ------
-    ParameterError
+    `carried`: force on a cell when all is as asked, N; `field`: of the control, for the message; `asked`: its
+    value, N; `floor`, N. Raises ParameterError.
     """
     if floor >= carried:
         rule = f"must keep five standard deviations below {carried:.3g} N, what a cell carries at most"

@@ -55,11 +55,7 @@ Touch = TypeVar("Touch", bound=TouchParameters)
 def raise_felt_force(floor: float, parameters: Touch) -> Touch:
     """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0.
 
-    Parameters
-    ----------
-    floor : float
-        N.
-    parameters : Touch
+    `floor`, N.
     """
     return replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
 
@@ -89,12 +85,7 @@ class Drive:
     def command(self, speed: Floats, force: Floats) -> Floats:
         """Return valve commands for some speeds; a pin pressed harder than can be lifted is locked.
 
-        Parameters
-        ----------
-        speed : ndarray (m,) or (m, b)
-            As in `open_for`, m/s.
-        force : ndarray (m,) or (m, b)
-            N.
+        `speed` (m,) or (m, b), as in `open_for`, m/s; `force` (m,) or (m, b), N.
         """
         return lock_overloaded(self.open_for(speed), force, self.lift)
 
@@ -140,12 +131,8 @@ class CellwiseControl(BatchControl):
 def _look_up(speed: Floats, speeds: Floats) -> Floats:
     """Return the openings that give some speeds.
 
-    Parameters
-    ----------
-    speed : ndarray (m,) or (m, b)
-        m/s.
-    speeds : ndarray (129,) or (129, b)
-        At `OPENINGS`, m/s; a table a run where they differ.
+    `speed` (m,) or (m, b), m/s; `speeds` (129,) or (129, b), at `OPENINGS`, m/s; a table a run where they
+    differ.
     """
     if speeds.ndim == 1:
         openings: Floats = np.interp(speed, speeds, OPENINGS)
@@ -159,11 +146,7 @@ def find_free_speeds(cell: Cell, pressure: float) -> Floats:
 
     A reservoir that cannot move a pin gets the valve wide open.
 
-    Parameters
-    ----------
-    cell : Cell
-    pressure : float
-        Of the reservoir, towards it, Pa.
+    `pressure`: of the reservoir, towards it, Pa.
     """
     free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / cell.actuator.area
     rising: Floats = np.maximum(free, 0.0) + 1e-12 * OPENINGS
@@ -173,17 +156,8 @@ def find_free_speeds(cell: Cell, pressure: float) -> Floats:
 def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
     """Make the drive for a device.
 
-    Parameters
-    ----------
-    parameters : DriveParameters
-    cell : Cell
-    period : float
-        Control period, s.
-
-    Raises
-    ------
-    ParameterError
-        When the height control would be faster than it is asked.
+    `period`: control period, s. Raises ParameterError when the height control would be faster than it is
+    asked.
     """
     if parameters.settling_time < 2.0 * period:
         rule = f"must be at least two control periods, {2.0 * period:g} s"
@@ -206,19 +180,7 @@ def check_damping(damping: float, cell: Cell, period: float, stiffness: float = 
     2 on, so 1 is allowed. The pulp is stiffest at the largest force a pin can lift,
     ``k = f_d b exp(m (x - x0)) = f_d b + m F``; a spring under the pin, `stiffness` in N/m, adds to it.
 
-    Parameters
-    ----------
-    damping : float
-        c, N s/m.
-    cell : Cell
-    period : float
-        T_c, s.
-    stiffness : float
-        Of a spring under the pin, N/m.
-
-    Raises
-    ------
-    ParameterError
+    `damping`: c, N s/m; `period`: T_c, s; `stiffness`: of a spring under the pin, N/m. Raises ParameterError.
     """
     if cell.touch is None:
         return

@@ -49,13 +49,7 @@ class ElasticControl(CellwiseControl):
 
 
 def build(parameters: Elastic, device: DeviceInfo) -> ElasticControl:
-    """Put the elastic behavior together for a device.
-
-    Parameters
-    ----------
-    parameters : Elastic
-    device : DeviceInfo
-    """
+    """Put the elastic behavior together for a device."""
     check_damping(parameters.damping, device.cell, device.period, parameters.stiffness)
     parameters = raise_felt_force(device.force_floor, parameters)
     return ElasticControl(

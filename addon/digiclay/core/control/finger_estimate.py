@@ -86,10 +86,7 @@ class FingerFilter:
     def begin(self, x: float, y: float, z: float) -> Estimate:
         """Return the estimate of a fingertip that has just touched, at rest.
 
-        Parameters
-        ----------
-        x, y, z : float
-            Lowest point, m.
+        `x`, `y`, `z`: lowest point, m.
         """
         return Estimate(np.array([x, y, z, *(0.0,) * (STATES - 3)]), np.diag(np.square(FIRST)))
 
@@ -117,15 +114,7 @@ class FingerFilter:
     def correct(self, guess: Estimate, at: Slopes, seen: Floats, variance: Floats) -> tuple[Estimate, Floats]:
         """Return an estimate corrected by measured undersides, and what it leaves of their errors, m.
 
-        Parameters
-        ----------
-        guess : Estimate
-        at : Slopes
-            Undersides of `guess`.
-        seen : ndarray (m,)
-            Measured, m.
-        variance : ndarray (m,)
-            m².
+        `at`: undersides of `guess`; `seen` (m,), measured, m; `variance` (m,), m².
         """
         slopes = at.slopes
         error = seen - at.under
@@ -149,12 +138,7 @@ class FingerFilter:
     def measure(self, mean: Floats, basis: Floats) -> Slopes:
         """Return the undersides of an estimated fingertip over cells, with their slopes.
 
-        Parameters
-        ----------
-        mean : ndarray (9,)
-            State.
-        basis : ndarray (6, m)
-            Rows 1, x, y, ... of the cells.
+        `mean` (9,), state; `basis` (6, m), rows 1, x, y, ... of the cells.
         """
         x, y, z, _, _, _, *shape = mean.tolist()
         return self._level.measure(Place(x, y, z, *shape), basis)
@@ -162,14 +146,8 @@ class FingerFilter:
     def find_underside(self, place: tuple[float, float, float], known: Estimate, basis: Floats) -> Floats:
         """Return the underside over cells, (m,), m, of the estimated fingertip at another place.
 
-        Parameters
-        ----------
-        place : tuple of float
-            x, y, z of the lowest point, m.
-        known : Estimate
-            Gives size and elongation.
-        basis : ndarray (6, m)
-            Rows 1, x, y, ... of the cells.
+        `place`: x, y, z of the lowest point, m; `known`: gives size and elongation; `basis` (6, m), rows 1,
+        x, y, ... of the cells.
         """
         return self._level.find_underside(Place(*place, *known.mean[6:].tolist()), basis)
 
@@ -184,9 +162,7 @@ def invert_six(matrix: Floats) -> Floats:
 
     LAPACK wakes threads, which takes milliseconds on a busy machine.
 
-    Parameters
-    ----------
-    matrix : ndarray (6, 6)
+    `matrix` (6, 6).
     """
     rows: list[tuple[float, ...]] = list(map(tuple, matrix.tolist()))
     swaps = []

@@ -84,12 +84,7 @@ class FlowServo:
     def coast(self, height: Floats, speeds: Floats) -> Floats:
         """Return the heights at which commands that still act will leave pins, (m,), m.
 
-        Parameters
-        ----------
-        height : ndarray (m,)
-            Measured, m.
-        speeds : ndarray (q, m)
-            Asked for earlier, the newest first, m/s.
+        `height` (m,), measured, m; `speeds` (q, m), asked for earlier, the newest first, m/s.
         """
         coasted: Floats = self._times.dot(speeds)
         coasted += height
@@ -108,16 +103,8 @@ class FlowServo:
     def serve(self, error: Floats, limits: Floats, force: Floats, speeds: Floats) -> Floats:
         """Return the valve commands (m,); the speeds asked for are put before the earlier ones, in place.
 
-        Parameters
-        ----------
-        error : ndarray (m,)
-            Commanded heights less those of `coast`, m.
-        limits : ndarray (2, m)
-            From `find_limits`, m/s.
-        force : ndarray (m,)
-            N.
-        speeds : ndarray (q, m)
-            Asked for earlier, the newest first, m/s.
+        `error` (m,), commanded heights less those of `coast`, m; `limits` (2, m), from `find_limits`, m/s;
+        `force` (m,), N; `speeds` (q, m), asked for earlier, the newest first, m/s.
         """
         fall, rise = limits
         per_span, band, slowest, none = self._numbers[error.shape]
@@ -138,13 +125,7 @@ class FlowServo:
     def _refine(self, command: Floats, speed: Floats, force: Floats) -> Floats:
         """Return commands at which the flow law gives the speeds: one step from those of a load that scales.
 
-        Parameters
-        ----------
-        command : ndarray (m,)
-        speed : ndarray (m,)
-            m/s.
-        force : ndarray (m,)
-            N.
+        `command` (m,); `speed` (m,), m/s; `force` (m,), N.
         """
         moving = np.flatnonzero(command)
         opening, wanted = command[moving], speed[moving]
@@ -159,15 +140,7 @@ class FlowServo:
 def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: float) -> FlowServo:
     """Make the servo of a device; it aims two control periods ahead, plus the whole periods of the dead time.
 
-    Parameters
-    ----------
-    cell : Cell
-    period : float
-        Control period, s.
-    dead_time : float
-        Of the valve's commands, s.
-    dead_band : float
-        m.
+    `period`: control period, s; `dead_time`: of the valve's commands, s; `dead_band`, m.
     """
     area, supply = cell.actuator.area, cell.supply
     up, down = find_free_speeds(cell, supply.high), find_free_speeds(cell, -supply.low)

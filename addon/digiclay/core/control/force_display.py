@@ -84,15 +84,8 @@ class ForceDisplayControl(CellwiseControl):
 def build(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
     """Put force display together for a device.
 
-    Parameters
-    ----------
-    parameters : ForceDisplay
-    device : DeviceInfo
-
-    Raises
-    ------
-    ParameterError
-        When the field asks for more than a pin can press or less than it feels, or its file cannot be used.
+    Raises ParameterError when the field asks for more than a pin can press or less than it feels, or its file
+    cannot be used.
     """
     check_damping(parameters.damping, device.cell, device.period)
     check_floor(parameters.force, "force", parameters.force, device.force_floor)

@@ -38,16 +38,8 @@ class Reach(NamedTuple):
 def form_heights(top: Floats | float, edge: float, part: Floats, drop: Floats, *, raised: bool) -> Floats:
     """Return heights of cells for a top: the blister's, or nearer to the top where they are led, m.
 
-    Parameters
-    ----------
-    top : float or ndarray (t, 1)
-        m.
-    edge : float
-        Height of the surface around, m.
-    part, drop : ndarray (m,)
-        See `Reach`.
-    raised : bool
-        Whether the top is above the surface around it.
+    `top` (t, 1), m; `edge`: height of the surface around, m; `part`, `drop` (m,), see `Reach`; `raised`:
+    whether the top is above the surface around it.
     """
     heights: Floats = (top - edge) * part
     heights += edge
@@ -57,16 +49,8 @@ def form_heights(top: Floats | float, edge: float, part: Floats, drop: Floats, *
 def lead_heights(heights: Floats, top: Floats | float, drop: Floats, *, raised: bool) -> Floats:
     """Return heights, but no farther from the top than cells may stand that are led, m.
 
-    Parameters
-    ----------
-    heights : ndarray (m,) or (t, m)
-        m.
-    top : float or ndarray (t, 1)
-        m.
-    drop : ndarray (m,)
-        See `Reach`.
-    raised : bool
-        Whether the top is above the surface around it.
+    `heights` (m,) or (t, m), m; `top` (t, 1), m; `drop` (m,), see `Reach`; `raised`: whether the top is above
+    the surface around it.
     """
     return np.maximum(heights, top - drop) if raised else np.minimum(heights, top + drop)
 
@@ -86,22 +70,9 @@ def find_top(
 
     Where none does, it is the end of the range nearest to it.
 
-    Parameters
-    ----------
-    wanted : float
-        N.
-    guess : float
-        Where it is looked for most closely, m.
-    edge : float
-        Height of the surface around, m.
-    reach : Reach
-    under : ndarray (m,)
-        Predicted undersides of the finger, m.
-    lost : ndarray (m,)
-        From `PulpEstimate.predict_loss`, N.
-    pulp : PulpEstimate
-    raised : bool
-        Whether the top is above the surface around it.
+    `wanted`, N; `guess`: where it is looked for most closely, m; `edge`: height of the surface around, m;
+    `under` (m,), predicted undersides of the finger, m; `lost` (m,), from `PulpEstimate.predict_loss`, N;
+    `raised`: whether the top is above the surface around it.
     """
     (level,) = (reach.part >= reach.part.max()).nonzero()
     lowest, highest = reach.ends.take(level, 1).tolist()

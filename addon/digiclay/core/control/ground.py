@@ -50,14 +50,7 @@ class EdgeGround:
     turning = 0.0
 
     def find(self, seen: Measurement, edge: Any) -> Any:
-        """Return the ground, m.
-
-        Parameters
-        ----------
-        seen : Measurement
-        edge : float or ndarray (b,)
-            Height of the surface around the blister, m.
-        """
+        """Return the ground, m. `edge` (b,), height of the surface around the blister, m."""
         return edge
 
     def find_profile(
@@ -67,29 +60,16 @@ class EdgeGround:
 
         See `OwnGround`.
 
-        Parameters
-        ----------
-        blister : Blister
-        distance : ndarray (m,) or (m, b)
-        inside : ndarray of bool (m,) or (m, b)
-        ground, top : float or ndarray (b,)
-        seen : Measurement
+        `distance` (m,) or (m, b); `inside` bool (m,) or (m, b); `ground`, `top` (b,).
         """
         return blister.interpolate(distance, ground, top), False
 
     def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
         """Tell which frozen cells keep their command: those farther off the ground than the profile.
 
-        Parameters
-        ----------
-        target, profile : ndarray (m,) or (m, b)
-            Commanded heights, and those of the blister, m.
-        ground : float or ndarray (b,)
-            See `find`, m.
-        top : float or ndarray (b,)
-            Height of the blister's top, m.
-        uneven : bool or ndarray of bool (m,) or (m, b), optional
-            See `find_profile`.
+        `target`, `profile` (m,) or (m, b), commanded heights, and those of the blister, m; `ground` (b,), see
+        `find`, m; `top` (b,), height of the blister's top, m; `uneven` bool (m,) or (m, b), see
+        `find_profile`.
         """
         kept: Flags = target > profile
         kept ^= top < ground
@@ -104,13 +84,7 @@ class OwnGround:
     turning = 1.0
 
     def find(self, seen: Measurement, edge: Any) -> Any:
-        """Return the ground of each cell, m; see `EdgeGround.find`.
-
-        Parameters
-        ----------
-        seen : Measurement
-        edge : float or ndarray (b,)
-        """
+        """Return the ground of each cell, m; see `EdgeGround.find`. `edge` (b,)."""
         own: Floats = seen.own[0]
         # Their modes are those of the last period: these cells were outside the blister then.
         np.copyto(own, seen.target, where=seen.mode <= Mode.EDGE)
@@ -121,27 +95,11 @@ class OwnGround:
     ) -> tuple[Floats, Any]:
         """Return the height of the blister at each cell, m, and which cells sink into uneven ground.
 
-        Parameters
-        ----------
-        blister : Blister
-        distance : ndarray (m,) or (m, b)
-            From the middle of the blister, m.
-        inside : ndarray of bool (m,) or (m, b)
-            Cells of the blister.
-        ground : ndarray (m,) or (m, b)
-            m.
-        top : float or ndarray (b,)
-            Height of the top, m.
-        seen : Measurement
-            Gives the forces, N: the ground under the finger is its mean and standard deviation, weighted
-            with them; and the commanded heights, m.
-
-        Returns
-        -------
-        profile : ndarray (m,) or (m, b)
-            m.
-        uneven : bool or ndarray of bool (m,) or (m, b)
-            Cells that are not above their ground, where the blister sinks into uneven ground.
+        `distance` (m,) or (m, b), from the middle of the blister, m; `inside` bool (m,) or (m, b), cells of
+        the blister; `ground` (m,) or (m, b), m; `top` (b,), height of the top, m; `seen`: gives the forces,
+        N: the ground under the finger is its mean and standard deviation, weighted with them; and the
+        commanded heights, m. Returns `profile` (m,) or (m, b), m; `uneven` bool (m,) or (m, b), cells that
+        are not above their ground, where the blister sinks into uneven ground.
         """
         level = blister.interpolate(distance, ground, top)
         weight = np.maximum(seen.force, UNTOUCHED)
@@ -167,13 +125,7 @@ class OwnGround:
     def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
         """Tell which frozen cells keep their command; see `EdgeGround.find_kept`.
 
-        Parameters
-        ----------
-        target, profile, ground : ndarray (m,) or (m, b)
-            m.
-        top : float or ndarray (b,)
-            m.
-        uneven : bool or ndarray of bool (m,) or (m, b), optional
+        `target`, `profile`, `ground` (m,) or (m, b), m; `top` (b,), m; `uneven` bool (m,) or (m, b).
         """
         kept: Flags = target > profile
         # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one

@@ -94,15 +94,8 @@ class Handover:
 def make_handover(shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool) -> Handover:
     """Put a shape's display in front of a method.
 
-    Parameters
-    ----------
-    shape : Shape
-        Says how the surface gets there.
-    device : DeviceInfo
-        With the heights to display.
-    method : Controller or None
-    recovers : bool
-        Whether the method's cells go back to rest.
+    `shape`: says how the surface gets there; `device`: with the heights to display; `recovers`: whether the
+    method's cells go back to rest.
     """
     assert device.heights is not None
     # As quick as a display is by itself, and never quicker than its control period allows.

@@ -36,13 +36,7 @@ STEADY = 5e-4
 
 
 def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
-    """Put Method III together for a device; the device has a blister.
-
-    Parameters
-    ----------
-    parameters : Hybrid
-    device : DeviceInfo
-    """
+    """Put Method III together for a device; the device has a blister."""
     assert device.blister is not None
     asked = parameters.force_setpoint
     check_floor(HEAVIEST * asked, "force_setpoint", asked, device.force_floor)

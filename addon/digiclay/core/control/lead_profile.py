@@ -40,12 +40,8 @@ class LeadProfile:
     def find_reach(self, height: float, speed: float) -> float:
         """Return the radius within which pins may be led, m.
 
-        Parameters
-        ----------
-        height : float
-            Of the top over the surface around, m; negative below.
-        speed : float
-            Of the finger in the plane, m/s.
+        `height`: of the top over the surface around, m; negative below; `speed`: of the finger in the plane,
+        m/s.
         """
         quickest = max(speed, self.skirt)
         return self.level + abs(height) * quickest / (self.rise if height > 0.0 else self.fall)
@@ -53,16 +49,8 @@ class LeadProfile:
     def find_drop(self, distance: Floats, ahead: Floats, speed: float, *, raised: bool) -> Floats:
         """Return how far below the top (above it, in a valley) pins may stand at most, (m,), m.
 
-        Parameters
-        ----------
-        distance : ndarray (m,)
-            From the finger, m.
-        ahead : ndarray (m,)
-            How far ahead of it, m.
-        speed : float
-            Of the finger in the plane, m/s.
-        raised : bool
-            Whether the top is above the surface around it.
+        `distance` (m,), from the finger, m; `ahead` (m,), how far ahead of it, m; `speed`: of the finger in
+        the plane, m/s; `raised`: whether the top is above the surface around it.
         """
         free = self.rise if raised else self.fall
         around = free / self.skirt if self.skirt else STEEP

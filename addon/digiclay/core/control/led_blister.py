@@ -80,13 +80,8 @@ class LedBlister:
     def survey(self, memory: Follower, basis: Floats, left: Floats) -> tuple[float, Region]:
         """Return the height of the surface ahead, m, and the cells about the predicted finger.
 
-        Parameters
-        ----------
-        memory : Follower
-        basis : ndarray (6, m)
-            Rows 1, x, y, x², x y, y² of the cells.
-        left : ndarray (m,)
-            Heights at which pins were left so far, m.
+        `basis` (6, m), rows 1, x, y, x², x y, y² of the cells; `left` (m,), heights at which pins were left
+        so far, m.
         """
         x, y, z, vx, vy, vz, *_ = memory.estimate.mean.tolist()
         time, speed = self.ahead, math.hypot(vx, vy)
@@ -103,14 +98,7 @@ class LedBlister:
     ) -> Floats:
         """Return the heights at which pins are left by the finger, m; modes are set in place.
 
-        Parameters
-        ----------
-        memory : Follower
-        seen : Measurement
-        left : ndarray (m,)
-            Those heights so far, m.
-        cells : BlisterCells
-        mode : ndarray of int8 (m,)
+        `left` (m,), those heights so far, m; `mode` int (m,).
         """
         top, edge = memory.top, memory.edge
         heights = self.blister.interpolate(cells.distance, edge, top)

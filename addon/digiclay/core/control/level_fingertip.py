@@ -118,11 +118,7 @@ class LevelFingertip:
     def find_underside(self, place: Place, basis: Floats) -> Floats:
         """Return the underside over cells, (m,), m.
 
-        Parameters
-        ----------
-        place : Place
-        basis : ndarray (6, m)
-            Rows 1, x, y, x², x y, y² of the cells.
+        `basis` (6, m), rows 1, x, y, x², x y, y² of the cells.
         """
         known = self._profile.resize(place.size)
         inner, tangent = np.array(_list_surfaces(known, place, _find_radius(known, place))).dot(basis)
@@ -131,11 +127,7 @@ class LevelFingertip:
     def measure(self, place: Place, basis: Floats) -> Slopes:
         """Return the underside over cells, with its slopes.
 
-        Parameters
-        ----------
-        place : Place
-        basis : ndarray (6, m)
-            Rows 1, x, y, x², x y, y² of the cells.
+        `basis` (6, m), rows 1, x, y, x², x y, y² of the cells.
         """
         known = self._profile.resize(place.size)
         radius = _find_radius(known, place)

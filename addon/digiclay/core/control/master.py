@@ -106,18 +106,9 @@ class MasterControl(BatchControl):
     ) -> Master:
         """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
 
-        Parameters
-        ----------
-        master : Master
-        total, x, y : float
-            Sum of the forces on all cells, N, and their moments with x and y, N m.
-        near, near_x, near_y : float
-            Those of the cells near the master.
-
-        Returns
-        -------
-        Master
-            Where it has found a finger, `is_new`: to be put into the surface by `set_surface`.
+        `total`, `x`, `y`: sum of the forces on all cells, N, and their moments with x and y, N m; `near`,
+        `near_x`, `near_y`: those of the cells near the master. Returns where it has found a finger, `is_new`:
+        to be put into the surface by `set_surface`.
         """
         known = self.parameters
         if total < known.felt_force:
@@ -140,13 +131,7 @@ class MasterControl(BatchControl):
     def set_surface(self, master: Master, total: float, surface: float) -> Master:
         """Put a master that has found a finger into the surface; others stay where they are.
 
-        Parameters
-        ----------
-        master : Master
-        total : float
-            Sum of the forces on all cells, N.
-        surface : float
-            Sum of force times height, N m.
+        `total`: sum of the forces on all cells, N; `surface`: sum of force times height, N m.
         """
         if not self.is_new(master):
             return master
@@ -162,11 +147,7 @@ class MasterControl(BatchControl):
     def lead(self, master: Master, force: float) -> Master:
         """VM Control and VM Model: the effort, and the height a real cell would make of it.
 
-        Parameters
-        ----------
-        master : Master
-        force : float
-            Total force on the bed, N.
+        `force`: total force on the bed, N.
         """
         known, phase = self.parameters, master.phase
         if phase is Phase.IDLE:
@@ -186,11 +167,7 @@ class MasterControl(BatchControl):
     def add_noise(self, master: Master, felt: float, noise: float) -> float:
         """Return the controlled force with what noise hides, N, once there is a master to be near to.
 
-        Parameters
-        ----------
-        master : Master
-        felt, noise : float
-            N.
+        `felt`, `noise`, N.
         """
         return felt if master.phase is Phase.IDLE else felt + noise
 
@@ -216,27 +193,15 @@ class MasterControl(BatchControl):
     def set_edge(self, master: Master, level: float, count: int) -> Master:
         """Put a master into a surface whose height is the mean of some cells'; `level` is their sum, m.
 
-        Parameters
-        ----------
-        master : Master
-        level : float
-            Sum of the heights, m.
-        count : int
-            Cells in the sum.
+        `level`: sum of the heights, m; `count`: cells in the sum.
         """
         return master.with_edge(min(max(level / count, 0.0), self.actuator.stroke)) if count else master
 
     def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
         """Return what the blister is made of.
 
-        Returns
-        -------
-        edge, top : float
-            Heights of the surface around a master and of itself, m.
-        kind : int
-            Mode of felt cells.
-        beyond : bool
-            Whether it has risen farther in search of the finger than what is frozen goes along.
+        Returns `edge`, `top`: heights of the surface around a master and of itself, m; `kind`: mode of felt
+        cells; `beyond`: whether it has risen farther in search of the finger than what is frozen goes along.
         """
         kind = FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING
         beyond = master.alone > 0 and master.height - master.felt > CARRIED * self.blister.radius

@@ -44,14 +44,7 @@ class MasterCell:
     period: float
 
     def advance(self, height: float, opening: float, command: float) -> tuple[float, float]:
-        """Return height, m, and opening after one period of a held command.
-
-        Parameters
-        ----------
-        height : float
-            m.
-        opening, command : float
-        """
+        """Return height, m, and opening after one period of a held command. `height`, m."""
         (a, b), (c, d), (e, f) = self.openings
         first, second = a * opening + b * command, c * opening + d * command
         speed = 0.5 * (self.speed(first) + self.speed(second))
@@ -67,14 +60,7 @@ class MasterCell:
 
 
 def make_master_cell(cell: Cell, period: float) -> MasterCell:
-    """Make the master's cylinder and valve like those of the real cells.
-
-    Parameters
-    ----------
-    cell : Cell
-    period : float
-        Control period, s.
-    """
+    """Make the master's cylinder and valve like those of the real cells. `period`: control period, s."""
     nodes = cell.lag.response(Queue(), [node * period for node in GAUSS] + [period])
     # Without a lag there is no column for the opening at the start.
     openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())

@@ -85,27 +85,14 @@ class Master(NamedTuple):
     # What changes every period is written out: `_replace` takes nearly twice as long.
 
     def move_to(self, x: float, y: float, heading: Heading) -> Master:
-        """Return the master where it has felt the finger.
-
-        Parameters
-        ----------
-        x, y : float
-            m.
-        heading : Heading
-        """
+        """Return the master where it has felt the finger. `x`, `y`, m."""
         phase, _, _, height, opening, reference, edge, _, felt, _, losses = self
         return Master(phase, x, y, height, opening, reference, edge, heading, felt, 0, losses)
 
     def lead(self, phase: Phase, height: float, opening: float) -> Master:
         """Return the master after a period, with its valve's opening.
 
-        Parameters
-        ----------
-        phase : Phase
-        height : float
-            m.
-        opening : float
-            Of its valve.
+        `height`, m; `opening`: of its valve.
         """
         _, x, y, _, _, reference, edge, heading, felt, alone, losses = self
         felt = height if alone == 0 else felt

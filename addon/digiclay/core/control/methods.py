@@ -61,15 +61,8 @@ class Method:
     def build(self, parameters: Any, device: Any) -> Any:
         """Return its controller for a device.
 
-        Parameters
-        ----------
-        parameters : ControlParameters
-        device : DeviceInfo
-
-        Raises
-        ------
-        ParameterError
-            When the parameters do not go together with the device.
+        `parameters` ControlParameters; `device` DeviceInfo. Raises ParameterError when the parameters do not
+        go together with the device.
         """
         return self._import().build(parameters, device)
 
@@ -106,16 +99,7 @@ HINT = "A method of your own must be loaded: by --method path/to/mine.py:Mine, i
 def add_method(name: str, method: Method) -> None:
     """Make a method known to this process, or exchange it for another one.
 
-    Parameters
-    ----------
-    name : str
-        As scene files have it.
-    method : Method
-
-    Raises
-    ------
-    ParameterError
-        When a built-in method has this name.
+    `name`: as scene files have it. Raises ParameterError when a built-in method has this name.
     """
     if name in METHODS:
         raise ParameterError("control", "method", "must not have the name of a built-in method", repr(name))
@@ -140,17 +124,8 @@ def list_methods() -> dict[str, Method]:
 def find_method(name: Any, field: str = "control.method") -> Method:
     """Return a method by its name.
 
-    Parameters
-    ----------
-    name : object
-        As a scene file has it.
-    field : str, optional
-        What messages call it.
-
-    Raises
-    ------
-    ParameterError
-        When there is none, with the remedy.
+    `name`: as a scene file has it; `field`: what messages call it. Raises ParameterError when there is none,
+    with the remedy.
     """
     found = METHODS.get(name) or _ADDED.get(name) if isinstance(name, str) else None
     if found is not None:

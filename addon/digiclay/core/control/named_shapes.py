@@ -20,47 +20,26 @@ FILE = ".npy"
 def dome(x: Floats, y: Floats) -> Floats:
     """Return a paraboloid, 1 in the middle, 0 on the unit circle and beyond.
 
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
+    `x`, `y` (n,), -1 to 1 over the bed.
     """
     bump: Floats = np.maximum(1.0 - x * x - y * y, 0.0)
     return bump
 
 
 def saddle(x: Floats, y: Floats) -> Floats:
-    """Return a saddle, 1 at x = ±1, -1 at y = ±1.
-
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
-    """
+    """Return a saddle, 1 at x = ±1, -1 at y = ±1. `x`, `y` (n,), -1 to 1 over the bed."""
     seat: Floats = x * x - y * y
     return seat
 
 
 def wave(x: Floats, y: Floats) -> Floats:
-    """Return two waves along x.
-
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
-    """
+    """Return two waves along x. `x`, `y` (n,), -1 to 1 over the bed."""
     waves: Floats = np.sin(2.0 * math.pi * x)
     return waves
 
 
 def ripple(x: Floats, y: Floats) -> Floats:
-    """Return waves around the middle.
-
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
-    """
+    """Return waves around the middle. `x`, `y` (n,), -1 to 1 over the bed."""
     waves: Floats = np.cos(3.0 * math.pi * np.hypot(x, y))
     return waves
 
@@ -68,10 +47,7 @@ def ripple(x: Floats, y: Floats) -> Floats:
 def crater(x: Floats, y: Floats) -> Floats:
     """Return a ring wall, 1 high at radius 0.6, around a hollow of depth 0.6.
 
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
+    `x`, `y` (n,), -1 to 1 over the bed.
     """
     r = np.hypot(x, y)
     ring: Floats = np.exp(-(((r - 0.6) / 0.18) ** 2)) - 0.6 * np.exp(-((r / 0.3) ** 2))
@@ -79,36 +55,18 @@ def crater(x: Floats, y: Floats) -> Floats:
 
 
 def pyramid(x: Floats, y: Floats) -> Floats:
-    """Return a four-sided pyramid, 1 in the middle.
-
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
-    """
+    """Return a four-sided pyramid, 1 in the middle. `x`, `y` (n,), -1 to 1 over the bed."""
     sides: Floats = 1.0 - np.maximum(np.abs(x), np.abs(y))
     return sides
 
 
 def ramp(x: Floats, y: Floats) -> Floats:
-    """Return a plane that rises along x, from -1 to 1.
-
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
-    """
+    """Return a plane that rises along x, from -1 to 1. `x`, `y` (n,), -1 to 1 over the bed."""
     return x
 
 
 def flat(x: Floats, y: Floats) -> Floats:
-    """Return 0.
-
-    Parameters
-    ----------
-    x, y : ndarray (n,)
-        -1 to 1 over the bed.
-    """
+    """Return 0. `x`, `y` (n,), -1 to 1 over the bed."""
     return 0.0 * x
 
 
@@ -128,15 +86,7 @@ SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
 def check_shape(owner: str, field: str, shape: str) -> None:
     """Refuse what is neither a shape's name nor a file's.
 
-    Parameters
-    ----------
-    owner, field : str
-        What the message calls it.
-    shape : str
-
-    Raises
-    ------
-    ParameterError
+    `owner`, `field`: what the message calls it. Raises ParameterError.
     """
     if shape not in SHAPES and not shape.endswith(FILE):
         rule = f"must be one of {', '.join(SHAPES)}, or a file {FILE}"
@@ -147,11 +97,6 @@ def evaluate_shape(shape: str, grid: Grid) -> Floats:
     """Return the values of a named shape for all cells of a bed, shape (n,), from -1 to 1.
 
     A shape's square is the bed; a bed longer than wide stretches it.
-
-    Parameters
-    ----------
-    shape : str
-    grid : Grid
     """
     middle_x, middle_y = grid.x / _half(grid.x), grid.y / _half(grid.y)
     return SHAPES[shape](middle_x, middle_y)
@@ -165,23 +110,10 @@ def _half(values: Floats) -> float:
 def read_values(field: str, path: str, grid: Grid, low: float, high: float, unit: str) -> Floats:
     """Return the values a file of numpy's gives for all cells, shape (n,).
 
-    Parameters
-    ----------
-    field : str
-        The key of the section ``control`` that names the file, for messages.
-    path : str
-        Relative to where the command runs. Holds an array (rows, columns): the first row lies at the
-        lowest y.
-    grid : Grid
-    low, high : float
-        Bounds of the values.
-    unit : str
-        Their unit.
-
-    Raises
-    ------
-    ParameterError
-        When it cannot be read, or does not fit the bed.
+    `field`: the key of the section ``control`` that names the file, for messages; `path`: relative to where
+    the command runs. Holds an array (rows, columns): the first row lies at the lowest y; `low`, `high`:
+    bounds of the values; `unit`: their unit. Raises ParameterError when it cannot be read, or does not fit
+    the bed.
     """
     plan = grid.layout
     try:

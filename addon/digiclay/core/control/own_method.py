@@ -108,25 +108,14 @@ class OwnMethod(DriveParameters):
     )
 
     def begin(self, device: DeviceInfo) -> Any:
-        """Return the memory before a session: None, numbers, arrays, and (named) tuples of them.
-
-        Parameters
-        ----------
-        device : DeviceInfo
-        """
+        """Return the memory before a session: None, numbers, arrays, and (named) tuples of them."""
 
     def locate(
         self, memory: Any, touched: Cells, device: DeviceInfo
     ) -> tuple[Any, tuple[float, float, float] | None]:
         """Return memory and the disc x, y, radius of the cells to command, m; None: those that move.
 
-        Parameters
-        ----------
-        memory : object
-            From `begin`, or `command` a period before.
-        touched : Cells
-            Those the finger may touch.
-        device : DeviceInfo
+        `memory`: from `begin`, or `command` a period before; `touched`: those the finger may touch.
         """
         force = suppress_noise(touched.force, device.force_floor)
         total = float(force.sum())
@@ -137,23 +126,12 @@ class OwnMethod(DriveParameters):
     def command(self, memory: Any, cells: Cells, device: DeviceInfo) -> tuple[Any, Orders]:
         """Return memory and orders for the cells of the disc and all that still move.
 
-        Parameters
-        ----------
-        memory : object
-            From `locate`.
-        cells : Cells
-        device : DeviceInfo
-            Control period, cylinders, fluid and noise; see `DeviceInfo`.
+        `memory`: from `locate`; `device`: control period, cylinders, fluid and noise; see `DeviceInfo`.
         """
         raise NotImplementedError("command must be defined")
 
     def build(self, device: DeviceInfo) -> Controller:
-        """Return the controller for a device; a method with a controller of its own overrides this.
-
-        Parameters
-        ----------
-        device : DeviceInfo
-        """
+        """Return the controller for a device; a method with a controller of its own overrides this."""
         return OwnControl(self, device, make_drive(self, device.cell, device.period))
 
 

@@ -61,13 +61,7 @@ class PlasticControl(CellwiseControl):
 
 
 def build(parameters: Plastic, device: DeviceInfo) -> PlasticControl:
-    """Put the plastic behavior together for a device.
-
-    Parameters
-    ----------
-    parameters : Plastic
-    device : DeviceInfo
-    """
+    """Put the plastic behavior together for a device."""
     check_damping(parameters.damping, device.cell, device.period)
     check_floor(parameters.yield_force, "yield_force", parameters.yield_force, device.force_floor)
     parameters = raise_felt_force(device.force_floor, parameters)

@@ -92,12 +92,7 @@ class PulpEstimate:
     def age(self, pulp: Floats, periods: Floats) -> None:
         """Let the pulp over cells without contact relax, in place; cells with 0 periods stay.
 
-        Parameters
-        ----------
-        pulp : ndarray (k + 1, m)
-            Filters z and tension T, N.
-        periods : ndarray (m,)
-            Control periods without contact.
+        `pulp` (k + 1, m), filters z and tension T, N; `periods` (m,), control periods without contact.
         """
         self.touch.pulp.age(pulp[:-1], self.period * periods)
         pulp[-1, periods > 0.0] = 0.0
@@ -110,14 +105,8 @@ class PulpEstimate:
         A cell is also touched where a force is expected, whatever is measured: that there is none tells where
         the fingertip ends; and a choice by noisy forces would take the cells whose noise is positive.
 
-        Parameters
-        ----------
-        pulp : ndarray (k + 1, m)
-            Filters z and tension T a period before, N.
-        force : ndarray (m,)
-            Measured, N.
-        expected : ndarray (m,)
-            Tension under the predicted fingertip, N.
+        `pulp` (k + 1, m), filters z and tension T a period before, N; `force` (m,), measured, N; `expected`
+        (m,), tension under the predicted fingertip, N.
         """
         span = self.once
         kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
@@ -135,10 +124,7 @@ class PulpEstimate:
     def predict_loss(self, pulp: Floats) -> Floats:
         """Return the tension at which there would be no force at the end of the prediction, (m,), N.
 
-        Parameters
-        ----------
-        pulp : ndarray (k + 1, m)
-            Filters z and tension T, N.
+        `pulp` (k + 1, m), filters z and tension T, N.
         """
         lost: Floats = self.later.kept[-1].dot(pulp)
         return lost
@@ -146,12 +132,7 @@ class PulpEstimate:
     def predict_force(self, depth: Floats, lost: Floats) -> Floats:
         """Return the forces at the end of the prediction, N.
 
-        Parameters
-        ----------
-        depth : ndarray (..., m)
-            Indentations then, m.
-        lost : ndarray (m,)
-            From `predict_loss`, N.
+        `depth` (..., m), indentations then, m; `lost` (m,), from `predict_loss`, N.
         """
         force = self.touch.contact.tension(depth)
         force -= lost
@@ -164,14 +145,7 @@ class PulpEstimate:
 
         The indentation is equation 11 solved for x; the stiffness is ``f_d dT/dx = f_d (b + m T)``.
 
-        Parameters
-        ----------
-        height : ndarray (m,)
-            Measured, m.
-        tension : ndarray (m,)
-            N.
-        noise : float
-            Standard deviation of the force, N.
+        `height` (m,), measured, m; `tension` (m,), N; `noise`: standard deviation of the force, N.
         """
         contact = self.touch.contact
         stiffening = tension * (contact.exponent / contact.stiffness)

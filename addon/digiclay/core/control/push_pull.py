@@ -145,15 +145,7 @@ class PushPullControl:
 def build(parameters: PushPull, device: DeviceInfo) -> PushPullControl:
     """Put push and pull together for a device.
 
-    Parameters
-    ----------
-    parameters : PushPull
-    device : DeviceInfo
-
-    Raises
-    ------
-    ParameterError
-        When a pin's own ripple would be a touch.
+    Raises ParameterError when a pin's own ripple would be a touch.
     """
     ripple = parameters.listening_speed * device.period
     if device.height_floor:

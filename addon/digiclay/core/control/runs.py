@@ -36,10 +36,7 @@ class BatchControl:
 def decide_by_run(rule: Callable[..., Any]) -> Any:
     """Return a method of a batch's controller: a list of what a rule about one run comes to for each of them.
 
-    Parameters
-    ----------
-    rule : callable
-        Method of the controller of a run: takes it, its memory, and one number of each further column.
+    `rule`: Method of the controller of a run: takes it, its memory, and one number of each further column.
     """
 
     def decide(batch: BatchControl, memory: list[Any], *columns: list[Any]) -> list[Any]:
@@ -51,10 +48,7 @@ def decide_by_run(rule: Callable[..., Any]) -> Any:
 def decide_by_any(rule: Callable[..., bool]) -> Any:
     """Return a method of a batch's controller: whether a rule holds for some run.
 
-    Parameters
-    ----------
-    rule : callable
-        Method of the controller of a run: takes it and its memory.
+    `rule`: Method of the controller of a run: takes it and its memory.
     """
 
     def decide(batch: BatchControl, memory: list[Any]) -> bool:
@@ -66,10 +60,7 @@ def decide_by_any(rule: Callable[..., bool]) -> Any:
 def gather_by_run(rule: Callable[..., tuple[Any, ...]]) -> Any:
     """Return a method of a batch's controller: the numbers that a rule finds for each run, as arrays (b,).
 
-    Parameters
-    ----------
-    rule : callable
-        Method of the controller of a run: takes it and its memory.
+    `rule`: Method of the controller of a run: takes it and its memory.
     """
 
     def gather(batch: BatchControl, memory: list[Any]) -> tuple[NDArray[Any], ...]:
@@ -82,11 +73,8 @@ def gather_by_run(rule: Callable[..., tuple[Any, ...]]) -> Any:
 def take_cells(values: NDArray[Any], cells: NDArray[np.intp]) -> NDArray[Any]:
     """Return the values of some cells.
 
-    Parameters
-    ----------
-    values : ndarray (n,) or (n, b)
-        Of all cells of the bed, of every run's bed where they differ.
-    cells : ndarray of int (m,) or (m, b)
+    `values` (n,) or (n, b), of all cells of the bed, of every run's bed where they differ; `cells` int (m,)
+    or (m, b).
     """
     return values.take(cells) if values.ndim == 1 else np.take_along_axis(values, cells, axis=0)
 
@@ -94,15 +82,8 @@ def take_cells(values: NDArray[Any], cells: NDArray[np.intp]) -> NDArray[Any]:
 def sum_weighted(rows: Floats, weights: NDArray[Any]) -> Floats:
     """Return the sums over the cells of one or k rows times a weight.
 
-    Parameters
-    ----------
-    rows : ndarray ([k,] m) or ([k,] m, b)
-    weights : ndarray (m,) or (m, b)
-        Numbers, or a test: the sums over the cells for which it holds.
-
-    Returns
-    -------
-    ndarray ([k]) or ([k,] b)
+    `rows` ([k,] m) or ([k,] m, b); `weights` (m,) or (m, b), numbers, or a test: the sums over the cells for
+    which it holds. Returns ([k]) or ([k,] b).
     """
     sums: Floats = rows.dot(weights) if weights.ndim == 1 else np.einsum("...mb,mb->...b", rows, weights)
     return sums

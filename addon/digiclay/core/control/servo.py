@@ -39,10 +39,7 @@ class Tracking(ControlParameters):
         The flow goes with the square of the opening, so a cell comes in like 1/t and would
         never be at rest without the dead band.
 
-        Parameters
-        ----------
-        target, height : ndarray (m,) or (m, b)
-            Commanded and measured, m.
+        `target`, `height` (m,) or (m, b), commanded and measured, m.
         """
         gain, band, most, least, none = self._constants[target.shape]
         error = target - height
@@ -64,13 +61,8 @@ def lock_overloaded(command: Floats, force: Floats, limit: Any) -> Floats:
 
     Opening to it would lower them, and a proportional controller would open further.
 
-    Parameters
-    ----------
-    command : ndarray (m,) or (m, b)
-    force : ndarray (m,) or (m, b)
-        N.
-    limit : float or ndarray (b,)
-        Force the high reservoir can lift, ``P_high A_a``, N.
+    `command` (m,) or (m, b); `force` (m,) or (m, b), N; `limit` (b,), force the high reservoir can lift,
+    ``P_high A_a``, N.
     """
     overload = force >= limit
     if any_true(overload):

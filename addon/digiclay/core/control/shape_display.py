@@ -145,15 +145,7 @@ class ShapeDisplayControl:
 def build(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
     """Put shape display together for a device; a shape of the scene's own is displayed in place of its own.
 
-    Parameters
-    ----------
-    parameters : ShapeDisplay
-    device : DeviceInfo
-
-    Raises
-    ------
-    ParameterError
-        When the shape leaves the stroke, or its file cannot be used.
+    Raises ParameterError when the shape leaves the stroke, or its file cannot be used.
     """
     actuator, grid = device.cell.actuator, device.grid
     if device.heights is not None:

@@ -138,15 +138,7 @@ def order_periods(
 ) -> Iterator[Controller]:
     """Yield the controller of each control period: the method itself where nothing is ordered.
 
-    Parameters
-    ----------
-    method : Controller
-    grid : Grid
-    cell : Cell
-    period : float
-        Control period, s.
-    orders : ndarray (t, 4)
-        A row a period.
+    `period`: control period, s; `orders` (t, 4), a row a period.
     """
     # As quick as a display is, and never quicker than the control period allows.
     known = DriveParameters(settling_time=max(DriveParameters().settling_time, 2.0 * period))
@@ -161,13 +153,7 @@ def order_periods(
 
 
 def find_fault(orders: Floats, periods: int) -> str:
-    """Return what is wrong with orders for so many periods; empty when nothing is.
-
-    Parameters
-    ----------
-    orders : ndarray (t, 4)
-    periods : int
-    """
+    """Return what is wrong with orders for so many periods; empty when nothing is. `orders` (t, 4)."""
     if orders.shape != (periods, ORDER) or orders.dtype != np.float64:
         return f"an array of the shape {orders.shape} of {orders.dtype}"
     radius, strength = orders[:, 2], orders[:, 3]

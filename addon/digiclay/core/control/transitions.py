@@ -47,12 +47,7 @@ BY_PLACE = (
 def follow_arrows(mode: Modes, arrows: tuple[Arrow, ...], conditions: dict[str, Flags]) -> Modes:
     """Return the modes after all arrows were followed at once; of two from one mode the later wins.
 
-    Parameters
-    ----------
-    mode : ndarray (m,) of int8
-    arrows : tuple of Arrow
-    conditions : dict of str to ndarray (m,) of bool
-        Every condition the arrows name.
+    `mode` int (m,); `conditions` bool (m,), every condition the arrows name.
     """
     after = mode.copy()
     for source, goal, condition in arrows:

@@ -32,16 +32,9 @@ class Heading(NamedTuple):
 def update_heading(heading: Heading, x: float, y: float, travel: float, reversal: float = 0.0) -> Heading:
     """Return the heading of a finger; a new one once it has traveled far enough.
 
-    Parameters
-    ----------
-    heading : Heading
-    x, y : float
-        Where the finger is now, m.
-    travel : float
-        Distance that settles the direction, m.
-    reversal : float, optional
-        Distance that settles one opposite to the last one, within 60 degrees, m, if longer: on a slope the
-        centroid of the forces moves about under a finger that goes one way.
+    `x`, `y`: where the finger is now, m; `travel`: distance that settles the direction, m; `reversal`:
+    distance that settles one opposite to the last one, within 60 degrees, m, if longer: on a slope the
+    centroid of the forces moves about under a finger that goes one way.
     """
     dx, dy = x - heading.x, y - heading.y
     way = math.hypot(dx, dy)
@@ -53,13 +46,7 @@ def update_heading(heading: Heading, x: float, y: float, travel: float, reversal
 def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
     """Return how far cells lie ahead of a point, m; negative behind it, 0 before any travel.
 
-    Parameters
-    ----------
-    heading : Heading
-    x, y : float
-        The point, m.
-    basis : ndarray (6, m)
-        Rows 1, x, y, ... of the cells.
+    `x`, `y`: the point, m; `basis` (6, m), rows 1, x, y, ... of the cells.
     """
     _, _, toward_x, toward_y = heading
     ahead: Floats = np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
@@ -69,19 +56,8 @@ def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
 def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats) -> tuple[Floats, Floats]:
     """Return distances from a point, and how far cells lie ahead of it, see `measure_lead`.
 
-    Parameters
-    ----------
-    x, y : float or ndarray (b,)
-        The point, m.
-    toward_x, toward_y : float or ndarray (b,)
-        The direction, a unit vector.
-    basis : ndarray (6, m) or (6, m, b)
-        Rows 1, x, y, x², x y, y² of the cells.
-
-    Returns
-    -------
-    distance, ahead : ndarray (m,) or (m, b)
-        m.
+    `x`, `y` (b,), the point, m; `toward_x`, `toward_y` (b,), the direction, a unit vector; `basis` (6, m) or
+    (6, m, b), rows 1, x, y, x², x y, y² of the cells. Returns `distance`, `ahead` (m,) or (m, b), m.
     """
     if basis.ndim == 2:  # one product
         forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
@@ -101,12 +77,7 @@ def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats)
 def measure_excess(x: Any, y: Any, radius: Any, basis: Floats) -> Floats:
     """Return by how much the squares of distances from a point exceed that of a radius, m².
 
-    Parameters
-    ----------
-    x, y, radius : float or ndarray (b,)
-        m.
-    basis : ndarray (6, m) or (6, m, b)
-        Rows 1, x, y, x², x y, y² of the cells.
+    `x`, `y`, `radius` (b,), m; `basis` (6, m) or (6, m, b), rows 1, x, y, x², x y, y² of the cells.
     """
     if basis.ndim == 2:  # one product
         excess: Floats = np.array(_circle(x, y, radius)).dot(basis)
@@ -127,12 +98,7 @@ def _circle(x: float, y: float, radius: float = 0.0) -> tuple[float, ...]:
 def measure_square(x: Floats | float, y: Floats | float, basis: Floats) -> Floats:
     """Return squared distances from one point, shape (m,), or from s points, shape (s, m), m².
 
-    Parameters
-    ----------
-    x, y : float or ndarray (s,)
-        m.
-    basis : ndarray (6, m)
-        Rows 1, x, y, x², x y, y² of the cells.
+    `x`, `y` (s,), m; `basis` (6, m), rows 1, x, y, x², x y, y² of the cells.
     """
     one = x * 0.0 + 1.0
     form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T

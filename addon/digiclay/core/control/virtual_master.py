@@ -186,13 +186,7 @@ class VirtualMasterBatch(VirtualMasterControl):
 
 
 def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl:
-    """Put Method I together for a device; the device has a blister.
-
-    Parameters
-    ----------
-    parameters : VirtualMaster
-    device : DeviceInfo
-    """
+    """Put Method I together for a device; the device has a blister."""
     assert device.blister is not None
     asked = parameters.force_setpoint
     check_floor(HEAVIEST * asked, "force_setpoint", asked, device.force_floor)

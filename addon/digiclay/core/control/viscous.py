@@ -132,13 +132,7 @@ class ViscousControl:
 
 
 def build(parameters: Viscous, device: DeviceInfo) -> ViscousControl:
-    """Put the viscous behavior together for a device.
-
-    Parameters
-    ----------
-    parameters : Viscous
-    device : DeviceInfo
-    """
+    """Put the viscous behavior together for a device."""
     check_damping(parameters.damping, device.cell, device.period)
     return ViscousControl(
         raise_felt_force(device.force_floor, parameters),

@@ -50,14 +50,8 @@ class Selection:
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
         """Return a state whose active cells are all that can change in the coming period.
 
-        Parameters
-        ----------
-        state : State
-            Its arrays are used up.
-        finger : FingerPeriod or None
-            The finger's way through the period.
-        control : (float, float, float) or None
-            Disc x, y, radius that the controller will command, m.
+        `state`: its arrays are used up; `finger`: the finger's way through the period; `control` (float,
+        float, float), disc x, y, radius that the controller will command, m.
         """
         held, window = state.active, finger.window if finger else None
         if self.holds(held, state.period, window, control):
@@ -72,15 +66,8 @@ class Selection:
     def holds(self, held: ActiveSet, period: int, window: Window | None, control: Disc | None) -> bool:
         """Return whether a set still has all cells that can change.
 
-        Parameters
-        ----------
-        held : ActiveSet
-        period : int
-            Number of control periods done.
-        window : Window or None
-            Where the finger may touch in the coming period.
-        control : (float, float, float) or None
-            See `update`.
+        `period`: number of control periods done; `window`: where the finger may touch in the coming period;
+        `control` (float, float, float), see `update`.
         """
         return (
             period < held.until
@@ -99,16 +86,8 @@ class Selection:
     ) -> ActiveSet:
         """Return the set that comes after another one: its cells, and for how long it serves.
 
-        Parameters
-        ----------
-        held : ActiveSet
-            The set before; its block, modes and basis stay.
-        period, window, control
-            See `holds`.
-        moving : ndarray of int (m,)
-            Cells that still move.
-        top : float
-            No pin top is higher than this, m.
+        `held`: the set before; its block, modes and basis stay; `period`, `window`, `control`: see `holds`;
+        `moving` int (m,), cells that still move; `top`: no pin top is higher than this, m.
         """
         grid = self.grid
         peak = min(top + KEPT * self.period * self.fastest, self.cell.actuator.stroke)
@@ -140,12 +119,8 @@ class Selection:
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
         """Take cells out of the bed, the pulp over them aged.
 
-        Parameters
-        ----------
-        state : State
-            Whose active cells have been released.
-        chosen : ActiveSet
-            The cells; its block and modes are not looked at.
+        `state`: whose active cells have been released; `chosen`: the cells; its block and modes are not
+        looked at.
         """
         near, flat, touch = chosen.near, chosen.flat, self.cell.touch
         block = state.rows.reshape(self.rows.count, -1).take(flat, axis=1)

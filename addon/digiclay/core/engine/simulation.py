@@ -30,11 +30,8 @@ def begin(system: System) -> State:
 def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:
     """Work out the fingers' ways through some control periods; None where nothing touches.
 
-    Parameters
-    ----------
-    system : System
-    poses : ndarray (t, p, f, 7)
-        Of the fingers at `System.instants` of t periods: lowest point, m, and unit quaternion.
+    `poses` (t, p, f, 7), of the fingers at `System.instants` of t periods: lowest point, m, and unit
+    quaternion.
     """
     if system.cell.touch is None:
         return [None] * len(poses)
@@ -44,18 +41,8 @@ def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:
 def step(system: System, state: State, poses: Floats) -> State:
     """Simulate one control period; the state handed in stays as it is.
 
-    Parameters
-    ----------
-    system : System
-    state : State
-    poses : ndarray (p, f, 7)
-        Of the fingers at `System.instants`: position of the lowest point, m, and unit quaternion
-        w, x, y, z.
-
-    Raises
-    ------
-    DivergenceError
-        When a height, force or opening is no longer finite.
+    `poses` (p, f, 7), of the fingers at `System.instants`: position of the lowest point, m, and unit
+    quaternion w, x, y, z. Raises DivergenceError when a height, force or opening is no longer finite.
     """
     return advance(system, state.copy(), trace_fingers(system, poses[None])[0])
 
@@ -63,18 +50,8 @@ def step(system: System, state: State, poses: Floats) -> State:
 def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
     """Simulate one control period in the arrays of `state`, which is used up.
 
-    Parameters
-    ----------
-    system : System
-    state : State
-        Not to be used again; keep a `State.copy` to come back to it.
-    finger : FingerPeriod or None
-        From `trace_fingers`.
-
-    Raises
-    ------
-    DivergenceError
-        When a height, force or opening is no longer finite.
+    `state`: not to be used again; keep a `State.copy` to come back to it; `finger`: from `trace_fingers`.
+    Raises DivergenceError when a height, force or opening is no longer finite.
     """
     after = simulate_period(system, state, finger)
     numbers = after.active.numbers
@@ -103,17 +80,10 @@ def simulate_period(system: System, state: State, finger: Any) -> State:
 def repeat_period(system: System, state: State, finger: Any, leader: State) -> State:
     """Simulate the control period that a run, or a batch, has just done, under its commands.
 
-    Parameters
-    ----------
-    system : System
-        Of the same bed and rows; its controller and sensors are left aside.
-    state : State
-        Before the period; used up.
-    finger : FingerPeriod or fingers.FingersPeriod or None
-        The fingertip's path through the period; the fingertips' of a batch.
-    leader : State
-        After the period. The cells that were active there are so here: the two differ by errors of the
-        integration, and a set of cells has room for far more.
+    `system`: of the same bed and rows; its controller and sensors are left aside; `state`: before the period;
+    used up; `finger` FingerPeriod or fingers.FingersPeriod or None, the fingertip's path through the period;
+    the fingertips' of a batch; `leader`: after the period. The cells that were active there are so here: the
+    two differ by errors of the integration, and a set of cells has room for far more.
     """
     if state.active.cells is not leader.active.cells:
         system.selection.release(state)
@@ -129,15 +99,8 @@ def find_divergence(
 ) -> DivergenceError | None:
     """Return the error of a session with a number that is not finite; None where all are.
 
-    Parameters
-    ----------
-    system : System
-        Of this session.
-    cells : ndarray of int (m,)
-    block : ndarray (r, m)
-        Their rows.
-    period : int
-        The control period that has been simulated.
+    `system`: of this session; `cells` int (m,); `block` (r, m), their rows; `period`: the control period that
+    has been simulated.
     """
     bad, rows = np.argwhere(~np.isfinite(block)), system.rows
     if not bad.size:
@@ -157,19 +120,8 @@ def find_divergence(
 def periods(system: System, trajectories: Sequence[Trajectory], state: State, count: int) -> Iterator[State]:
     """Simulate control periods along the fingers' trajectories; the arrays of `state` are used up.
 
-    Parameters
-    ----------
-    system : System
-    trajectories : sequence of Trajectory
-        One a finger.
-    state : State
-    count : int
-        Control periods.
-
-    Yields
-    ------
-    State
-        After each period; valid until the next one is asked for.
+    `trajectories`: one a finger; `count`: control periods. Yields after each period; valid until the next one
+    is asked for.
     """
     done = 0
     while done < count:

@@ -78,23 +78,9 @@ def make_segments(
 ) -> tuple[tuple[Segment, ...], Floats]:
     """Cut a control period into physics steps.
 
-    Parameters
-    ----------
-    stepper : Stepper
-    cut : float
-        Time into the period at which it is cut besides, s; 0: nowhere.
-    period : float
-        Control period, s.
-    count : int
-        Number of steps of equal length.
-
-    Returns
-    -------
-    segments : tuple of Segment
-    selection : Selection
-        Of the active cells.
-    instants : ndarray (p,)
-        When the stepper needs the finger's pose, s.
+    `cut`: time into the period at which it is cut besides, s; 0: nowhere; `period`: control period, s;
+    `count`: number of steps of equal length. Returns `segments`; `selection`: of the active cells; `instants`
+    (p,), when the stepper needs the finger's pose, s.
     """
     times = {round(i * period / count, 15) for i in range(count + 1)}
     if cut:

@@ -22,16 +22,7 @@ LARGEST = 2**32 - 1
 def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """Write the bodies; `factor` is not used, since the unit is given.
 
-    Parameters
-    ----------
-    file : binary file
-    bodies : sequence of Body
-    factor : float
-
-    Raises
-    ------
-    OutputError
-        When the file would be too large for the format.
+    Raises OutputError when the file would be too large for the format.
     """
     told = _description(bodies)
     size = told["buffers"][0]["byteLength"]

@@ -37,18 +37,9 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
     """Return vertices (v, 3), m, and triangles (f, 3) of a file's bytes; `path` is where they lie.
 
-    Parameters
-    ----------
-    path : Path
-        Files that it refers to are looked for beside it.
-    data : bytes
-
-    Raises
-    ------
-    OSError
-        When a file of vertices cannot be read.
-    ParameterError
-        When it is no glTF, is damaged, refers to what is not beside it, or is too large.
+    `path`: files that it refers to are looked for beside it. Raises OSError when a file of vertices cannot be
+    read. Raises ParameterError when it is no glTF, is damaged, refers to what is not beside it, or is too
+    large.
     """
     try:
         tree, binary = _chunks(data, path.name) if data[:4] == b"glTF" else (json.loads(data), None)

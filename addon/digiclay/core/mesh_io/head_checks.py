@@ -27,12 +27,7 @@ def stl_is_text(data: bytes) -> bool:
 def check_stl(data: bytes, name: str) -> None:
     """Refuse an STL with fewer triangles than its header states, or with an incomplete one.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    name : str
-        What the message calls it.
+    `data`: the file; `name`: what the message calls it.
     """
     if stl_is_text(data):
         lower = data.lower()
@@ -53,12 +48,7 @@ def check_stl(data: bytes, name: str) -> None:
 def check_ply(data: bytes, name: str) -> None:
     """Refuse a PLY whose elements need more bytes than there are.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    name : str
-        What the message calls it.
+    `data`: the file; `name`: what the message calls it.
     """
     end = re.search(rb"^end_header[ \t]*\r?$\n?", data[:LONGEST_HEAD], re.MULTILINE)
     if not data.startswith(b"ply") or end is None:
@@ -100,12 +90,7 @@ def check_ply(data: bytes, name: str) -> None:
 def check_off(data: bytes, name: str) -> None:
     """Refuse an OFF that has fewer lines than vertices and faces.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    name : str
-        What the message calls it.
+    `data`: the file; `name`: what the message calls it.
     """
     lines = [line for line in (part.partition(b"#")[0].strip() for part in data.splitlines()) if line]
     head = b" ".join(lines[:2]).split()

@@ -14,16 +14,8 @@ SMALLER = "Make the mesh coarser first."
 def make_refusal(rule: str, name: str, said: str, hint: str = "") -> ParameterError:
     """Return the error of an unusable mesh: the rule, the file, and its content.
 
-    Parameters
-    ----------
-    rule : str
-        What holds for every mesh, from *must* on.
-    name : str
-        Of the file.
-    said : str
-        What this one has.
-    hint : str
-        What to do about it.
+    `rule`: what holds for every mesh, from *must* on; `name`: of the file; `said`: what this one has; `hint`:
+    what to do about it.
     """
     return ParameterError("shape", "file", rule, f"{name}: {said}", hint)
 
@@ -31,12 +23,7 @@ def make_refusal(rule: str, name: str, said: str, hint: str = "") -> ParameterEr
 def refuse_many_triangles(name: str, count: int) -> None:
     """Refuse a mesh of more triangles than can be worked on, before they are made.
 
-    Parameters
-    ----------
-    name : str
-        Of the file.
-    count : int
-        Triangles.
+    `name`: of the file; `count`: triangles.
     """
     if count > MOST_TRIANGLES:
         rule = f"must have at most {MOST_TRIANGLES // 1_000_000} million triangles"
@@ -48,14 +35,7 @@ def refuse_many_triangles(name: str, count: int) -> None:
 def refuse_size(name: str, size: int, what: str = "") -> None:
     """Refuse a file of more bytes than can be read; `what` names the part.
 
-    Parameters
-    ----------
-    name : str
-        Of the file.
-    size : int
-        Bytes.
-    what : str
-        Part of the file that has this size; empty: the file.
+    `name`: of the file; `size`: bytes; `what`: part of the file that has this size; empty: the file.
     """
     if size > MOST_BYTES:
         rule = f"must have at most {MOST_BYTES / 1e9:g} GB{' unpacked' if what else ''}"

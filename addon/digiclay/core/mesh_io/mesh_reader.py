@@ -58,12 +58,8 @@ def find_library(kind: str) -> str:
 def read(path: Path) -> Read:
     """Read a mesh; its extension, one of `MESHES`, determines the format.
 
-    Raises
-    ------
-    OSError
-        When the file cannot be read.
-    ParameterError
-        When it is too large, cut off, damaged, or refers to what is not in its folder.
+    Raises OSError when the file cannot be read. Raises ParameterError when it is too large, cut off, damaged,
+    or refers to what is not in its folder.
     """
     kind = path.suffix.lower()
     refuse_size(path.name, path.stat().st_size)

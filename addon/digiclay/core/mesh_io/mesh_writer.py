@@ -38,10 +38,7 @@ UNITS: dict[str, float] = {"mm": 1e3, "m": 1.0}
 def find_format(name: str) -> str:
     """Return the format called `name` (``"stl"``, ``".STL"``) as a key of `FORMATS`.
 
-    Raises
-    ------
-    OutputError
-        When there is no such format.
+    Raises OutputError when there is no such format.
     """
     key = name.lower().removeprefix(".")
     if key not in FORMATS:
@@ -64,31 +61,12 @@ def write(
 ) -> Path:
     """Write bodies into one file, a few MB at a time.
 
-    Parameters
-    ----------
-    bodies : sequence of Body
-        One at least; they are left as they are.
-    path : str or Path
-        The file; an older one is replaced once the new one is complete.
-    unit : {"mm", "m"}
-        Length unit of all formats but GLB, which is always in meters and y up, because its
-        standard says so.
-    kind : str, optional
-        A key of `FORMATS`; by default the extension of `path`.
-    up, forward : str
-        Axes of an OBJ, of `axes.AXES`; by default those of Blender.
-
-    Returns
-    -------
-    Path
-        The file written.
-
-    Raises
-    ------
-    OutputError
-        On an unknown format, nothing to write, or when the file cannot be written.
-    ParameterError
-        On an unknown unit or axis.
+    `bodies`: one at least; they are left as they are; `path`: the file; an older one is replaced once the new
+    one is complete; `unit`: length unit of all formats but GLB, which is always in meters and y up, because
+    its standard says so; `kind`: a key of `FORMATS`; by default the extension of `path`; `up`, `forward`:
+    axes of an OBJ, of `axes.AXES`; by default those of Blender. Returns the file written. Raises OutputError:
+    on an unknown format, nothing to write, or when the file cannot be written. Raises ParameterError: on an
+    unknown unit or axis.
     """
     target = Path(path)
     named = find_format(target.suffix if kind is None else kind)

@@ -19,10 +19,7 @@ IDENTITY: Floats = np.vstack([np.eye(3), np.zeros(3)])
 def nest_placement(inner: Floats, outer: Floats) -> Floats:
     """Return the placement, (4, 3), of what is placed in something that is placed itself.
 
-    Parameters
-    ----------
-    inner, outer : ndarray (4, 3)
-        Three rows of the linear part, and one of the offset.
+    `inner`, `outer` (4, 3), three rows of the linear part, and one of the offset.
     """
     placement: Floats = inner @ outer[:3]
     placement[3] += outer[3]
@@ -34,17 +31,9 @@ def join_meshes(meshes: Iterable[tuple[Floats, Indices, Floats]], name: str) -> 
 
     Triangles of a mesh that is mirrored are turned, so that outside stays outside.
 
-    Parameters
-    ----------
-    meshes : iterable of (ndarray (v, 3), ndarray of int (f, 3), ndarray (4, 3))
-        Vertices, triangles, placement of each.
-    name : str
-        What the message calls the file.
-
-    Raises
-    ------
-    ParameterError
-        When a triangle has a corner that is not among its own mesh's vertices.
+    `meshes` int (v, 3) or (f, 3) or (4, 3), vertices, triangles, placement of each; `name`: what the message
+    calls the file. Raises ParameterError when a triangle has a corner that is not among its own mesh's
+    vertices.
     """
     places, triangles, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
     for vertices, faces, placement in meshes:

@@ -19,12 +19,7 @@ FACE = np.dtype([("count", "u1"), ("vertices", "<i4", 3)])
 def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """Write the bodies one after the other, lengths in 1 / `factor` m, forces in N.
 
-    Parameters
-    ----------
-    file : binary file
-    bodies : sequence of Body
-    factor : float
-        Units of the file in a meter.
+    `factor`: units of the file in a meter.
     """
     unit = "mm" if factor > 1.0 else "m"
     lines = [

@@ -19,12 +19,7 @@ TEXT += "endloop\nendfacet\n"
 def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """Write all bodies as one list of triangles, lengths in 1 / `factor` m.
 
-    Parameters
-    ----------
-    file : binary file
-    bodies : sequence of Body
-    factor : float
-        Units of the file in a meter.
+    `factor`: units of the file in a meter.
     """
     # The first word must not be "solid": by it readers know the text form.
     file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
@@ -40,12 +35,7 @@ def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was.
 
-    Parameters
-    ----------
-    file : binary file
-    bodies : sequence of Body
-    factor : float
-        Units of the file in a meter.
+    `factor`: units of the file in a meter.
     """
     for body in bodies:
         file.write(f"solid {body.name}\n".encode())

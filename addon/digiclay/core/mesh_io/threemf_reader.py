@@ -78,12 +78,8 @@ class _Extent:
 def read(path: Path) -> tuple[Floats, Indices, float]:
     """Return vertices (v, 3), triangles (f, 3), and the meters in the vertices' unit.
 
-    Raises
-    ------
-    OSError
-        When the file cannot be read.
-    ParameterError
-        When it is no 3MF, is damaged, refers to what it does not hold, or is too large.
+    Raises OSError when the file cannot be read. Raises ParameterError when it is no 3MF, is damaged, refers
+    to what it does not hold, or is too large.
     """
     name, model = path.name, _Model()
     try:

@@ -27,15 +27,7 @@ MOMENT = (1980, 1, 1, 0, 0, 0)
 
 
 def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies, lengths in 1 / `factor` m.
-
-    Parameters
-    ----------
-    file : binary file
-    bodies : sequence of Body
-    factor : float
-        Units of the file in a meter.
-    """
+    """Write the bodies, lengths in 1 / `factor` m. `factor`: units of the file in a meter."""
     unit = "millimeter" if factor > 1.0 else "meter"
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):

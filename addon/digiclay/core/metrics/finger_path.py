@@ -68,11 +68,8 @@ class CellSums:
 def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
     """Return the sums over the cells of a history.
 
-    Parameters
-    ----------
-    history : mapping
-        The arrays of ``history.npz``, of at least one row: height, force, mode, total_force and
-        position.
+    `history`: the arrays of ``history.npz``, of at least one row: height, force, mode, total_force and
+    position.
     """
     total, height, force, position = (
         np.asarray(history[name], dtype=np.float64) for name in ("total_force", "height", "force", "position")
@@ -89,17 +86,7 @@ def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
     ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
     point, r_j the cells' positions.
 
-    Parameters
-    ----------
-    sums : CellSums
-        Of t rows.
-    fingertip : array_like, shape (t, 7)
-        Lowest point, m, and quaternion.
-
-    Returns
-    -------
-    ndarray, shape (rows in contact,)
-        m.
+    `sums`: of t rows; `fingertip` (t, 7), lowest point, m, and quaternion. Returns (rows in contact,), m.
     """
     rows = sums.touching
     centroid = np.column_stack([sums.x, sums.y])[rows] / sums.total[rows, None]
@@ -112,17 +99,7 @@ def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
 
     ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
 
-    Parameters
-    ----------
-    sums : CellSums
-        Of t rows.
-    fingertip : array_like, shape (t, 7)
-        Lowest point, m, and quaternion.
-
-    Returns
-    -------
-    ndarray, shape (rows in contact,)
-        m.
+    `sums`: of t rows; `fingertip` (t, 7), lowest point, m, and quaternion. Returns (rows in contact,), m.
     """
     rows, tip = sums.touching, np.asarray(fingertip, dtype=np.float64)
     above: Floats = sums.height[rows] / sums.total[rows] - tip[rows, 2]
@@ -138,23 +115,9 @@ def measure_ridge_errors(
     finger than cell j. A cell counts when the finger went on, in rows of the same unbroken
     stretch, to a place at least `away` from it: where it pressed or left is no ridge.
 
-    Parameters
-    ----------
-    position : array_like, shape (n, 2)
-        m.
-    final : array_like, shape (n,)
-        Heights at the end, m.
-    fingertip : array_like, shape (t, 7)
-        Lowest point, m, and quaternion.
-    rows : ndarray of bool, shape (t,)
-        Rows in which the finger shapes.
-    away : float, optional
-        m.
-
-    Returns
-    -------
-    ndarray, shape (cells that count,)
-        m, in the order in which the finger passed them.
+    `position` (n, 2), m; `final` (n,), heights at the end, m; `fingertip` (t, 7), lowest point, m, and
+    quaternion; `rows` bool (t,), rows in which the finger shapes; `away`, m. Returns (cells that count,), m,
+    in the order in which the finger passed them.
     """
     place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
     chosen = np.flatnonzero(rows)

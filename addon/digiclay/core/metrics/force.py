@@ -22,22 +22,10 @@ def compute_rfd(
 
     ``RFD = sqrt(sum w_i (F_i - F_ref,i)² / sum w_i)`` with the `weights` of the rows.
 
-    Parameters
-    ----------
-    time : array_like, shape (t,)
-        s.
-    total_force : array_like, shape (t,)
-        N.
-    set_point : array_like, shape (t,) or ()
-        Total force asked for, N; rows in which it is NaN are left out.
-    rows : ndarray of bool, shape (t,), optional
-        Rows to judge; those in contact by default. They include touching down, and leave out
-        the gaps when the finger is lost: read it next to `compute_contact_loss_share`.
-
-    Returns
-    -------
-    float or None
-        None when there is no such row.
+    `time` (t,), s; `total_force` (t,), N; `set_point` (t,) or (), total force asked for, N; rows in which it
+    is NaN are left out; `rows` bool (t,), rows to judge; those in contact by default. They include touching
+    down, and leave out the gaps when the finger is lost: read it next to `compute_contact_loss_share`.
+    Returns none when there is no such row.
     """
     force = np.asarray(total_force, dtype=np.float64)
     wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
@@ -51,17 +39,7 @@ def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float
 
     A pause the session makes on purpose, with the finger lifted, counts as well.
 
-    Parameters
-    ----------
-    time : array_like, shape (t,)
-        s.
-    total_force : array_like, shape (t,)
-        N.
-
-    Returns
-    -------
-    float or None
-        In [0, 1); None when the finger never touches.
+    `time` (t,), s; `total_force` (t,), N. Returns in [0, 1); None when the finger never touches.
     """
     touching = find_contact_rows(total_force)
     if not np.any(touching):
@@ -92,19 +70,9 @@ def measure_touchdown(
 ) -> tuple[float | None, float | None]:
     """Return overshoot and settling time of the force at first touch; None without a set point.
 
-    Parameters
-    ----------
-    time, total_force : ndarray, shape (t,)
-        s, N.
-    set_point : ndarray, shape (t,)
-        Total force asked for, N; NaN in rows that ask for none: in them the force is not settled.
-
-    Returns
-    -------
-    passed : float or None
-        Largest force beyond the set point, as a share of its mean over the first touch.
-    settled : float or None
-        s.
+    `time`, `total_force` (t,), s, N; `set_point` (t,), total force asked for, N; NaN in rows that ask for
+    none: in them the force is not settled. Returns `passed`: largest force beyond the set point, as a share
+    of its mean over the first touch; `settled`, s.
     """
     first = find_first_touch(total_force)
     if first.stop == first.start:

@@ -53,15 +53,7 @@ class Perceived:
 def find_weber_fractions(force: float) -> tuple[float, float]:
     """Return the smallest and the largest Weber fraction of a force.
 
-    Parameters
-    ----------
-    force : float
-        Reference force, N, above 0.
-
-    Raises
-    ------
-    ParameterError
-        When the force is not above 0 or not finite.
+    `force`: reference force, N, above 0. Raises ParameterError when the force is not above 0 or not finite.
     """
     if not (math.isfinite(force) and force > 0.0):
         raise ParameterError("Perception", "force", "must be above 0 N and finite", f"{force:g} N")
@@ -71,19 +63,9 @@ def find_weber_fractions(force: float) -> tuple[float, float]:
 def perceive(deviation: float | None, force: float | None, unevenness: float | None) -> Perceived:
     """Return deviations in units of touch.
 
-    Parameters
-    ----------
-    deviation : float or None
-        Of the force from its reference, N, at least 0.
-    force : float or None
-        Reference force, N, above 0.
-    unevenness : float or None
-        Of a surface, m, at least 0.
-
-    Raises
-    ------
-    ParameterError
-        When a deviation is negative or not finite, or the force is no reference.
+    `deviation`: of the force from its reference, N, at least 0; `force`: reference force, N, above 0;
+    `unevenness`: of a surface, m, at least 0. Raises ParameterError when a deviation is negative or not
+    finite, or the force is no reference.
     """
     for name, value, unit in (("deviation", deviation, "N"), ("unevenness", unevenness, "m")):
         if value is not None and not (math.isfinite(value) and value >= 0.0):

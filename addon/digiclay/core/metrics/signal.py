@@ -16,15 +16,7 @@ WINDOW = 0.25
 def compute_weights(time: ArrayLike) -> Floats:
     """Return the time each row stands for, s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half of it at the ends.
 
-    Parameters
-    ----------
-    time : array_like, shape (t,)
-        Increasing, s.
-
-    Returns
-    -------
-    ndarray, shape (t,)
-        The weight of a single row is 1.
+    `time` (t,), increasing, s. Returns (t,), the weight of a single row is 1.
     """
     moment = np.asarray(time, dtype=np.float64)
     if len(moment) < 2:
@@ -35,12 +27,7 @@ def compute_weights(time: ArrayLike) -> Floats:
 
 
 def compute_mean(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted mean, or None when there is nothing to average.
-
-    Parameters
-    ----------
-    values, weight : ndarray (t,)
-    """
+    """Return the weighted mean, or None when there is nothing to average. `values`, `weight` (t,)."""
     total = float(np.sum(weight))
     return float(np.sum(weight * values)) / total if total > 0.0 else None
 
@@ -48,9 +35,7 @@ def compute_mean(values: Floats, weight: Floats) -> float | None:
 def compute_deviation(values: Floats, weight: Floats) -> float | None:
     """Return the weighted standard deviation about the weighted mean, or None without any rows.
 
-    Parameters
-    ----------
-    values, weight : ndarray (t,)
+    `values`, `weight` (t,).
     """
     middle = compute_mean(values, weight)
     if middle is None:
@@ -64,16 +49,8 @@ def measure_overshoot(values: ArrayLike, target: float) -> float | None:
 
     ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; a falling signal is judged alike.
 
-    Parameters
-    ----------
-    values : array_like, shape (t,)
-        The signal, from the row in which it sets out.
-    target : float
-
-    Returns
-    -------
-    float or None
-        0 for a signal that never passes its target; None for one that has no way to go.
+    `values` (t,), the signal, from the row in which it sets out. Returns 0 for a signal that never passes its
+    target; None for one that has no way to go.
     """
     signal = np.asarray(values, dtype=np.float64)
     if not len(signal) or signal[0] == target:
@@ -87,17 +64,8 @@ def measure_settling_time(time: ArrayLike, values: ArrayLike, target: float, ban
 
     From the first row to the first one from which on ``|y_i - y_target| <= band`` to the end.
 
-    Parameters
-    ----------
-    time, values : array_like, shape (t,)
-        s, and the signal.
-    target, band : float
-        In the signal's unit.
-
-    Returns
-    -------
-    float or None
-        None when the signal is outside the band at its end, or has no rows.
+    `time`, `values` (t,), s, and the signal; `target`, `band`: in the signal's unit. Returns none when the
+    signal is outside the band at its end, or has no rows.
     """
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     outside = np.flatnonzero(~(np.abs(signal - target) <= band))
@@ -114,10 +82,7 @@ def measure_amplitude(values: ArrayLike) -> float:
 def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
     """Return how often a signal rises through its mean, Hz; None when it does so less than three times.
 
-    Parameters
-    ----------
-    time, values : array_like, shape (t,)
-        s, and the signal.
+    `time`, `values` (t,), s, and the signal.
     """
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     above = signal > signal.mean() if len(signal) else np.empty(0, dtype=bool)
@@ -128,12 +93,7 @@ def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
 
 
 def find_stretches(rows: NDArray[np.bool_]) -> list[slice]:
-    """Return the unbroken stretches of chosen rows, in order.
-
-    Parameters
-    ----------
-    rows : ndarray of bool, shape (t,)
-    """
+    """Return the unbroken stretches of chosen rows, in order. `rows` bool (t,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
     return [slice(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -146,19 +106,8 @@ def measure_oscillation(
     ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window around row i. A row
     counts when its whole window is within an unbroken stretch of the chosen rows.
 
-    Parameters
-    ----------
-    time, values : array_like, shape (t,)
-        Increasing, s, and the signal.
-    rows : ndarray of bool, shape (t,)
-        Chosen rows.
-    window : float, optional
-        s.
-
-    Returns
-    -------
-    float or None
-        None when no stretch is as long as the window.
+    `time`, `values` (t,), increasing, s, and the signal; `rows` bool (t,), chosen rows; `window`, s. Returns
+    none when no stretch is as long as the window.
     """
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     off: list[Floats] = []

@@ -87,15 +87,8 @@ METRICS: dict[str, tuple[str, str]] = {
 def compute_cell_area(position: ArrayLike) -> float | None:
     """Return the area of the bed one cell stands for, m²: distance in a row times distance of the rows.
 
-    Parameters
-    ----------
-    position : array_like, shape (n, 2)
-        m; ordered row by row.
-
-    Returns
-    -------
-    float or None
-        A single row is taken as wide as its pins are apart; None for a single pin.
+    `position` (n, 2), m; ordered row by row. Returns a single row is taken as wide as its pins are apart;
+    None for a single pin.
     """
     place = np.asarray(position, dtype=np.float64)
     rows, columns = find_grid_shape(place)
@@ -108,23 +101,9 @@ def compute_cell_area(position: ArrayLike) -> float | None:
 def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
     """Return every metric of a session.
 
-    Parameters
-    ----------
-    history : mapping
-        The arrays of ``history.npz``: time, height, force, mode, fingertip, total_force and
-        position.
-    set_point : SetPoint or None
-        Force asked for; None where none is.
-
-    Returns
-    -------
-    dict
-        The keys of `METRICS`; SI. None where there is nothing to compute from, never a NaN.
-
-    Raises
-    ------
-    ParameterError
-        When the history has no rows.
+    `history`: the arrays of ``history.npz``: time, height, force, mode, fingertip, total_force and position;
+    `set_point`: force asked for; None where none is. Returns the keys of `METRICS`; SI. None where there is
+    nothing to compute from, never a NaN. Raises ParameterError when the history has no rows.
     """
     time = np.asarray(history["time"], dtype=np.float64)
     if not len(time):
@@ -143,26 +122,10 @@ def compute_metrics_from_sums(
 ) -> dict[str, float | None]:
     """Return every metric of the session the sums are of.
 
-    Parameters
-    ----------
-    sums : CellSums
-        Of t rows of n cells.
-    time : ndarray, shape (t,)
-        s.
-    fingertip : ndarray, shape (t, 7)
-        Lowest point, m, and quaternion.
-    position : ndarray, shape (n, 2)
-        m; ordered row by row.
-    set_point : SetPoint or None
-        Force asked for; None where none is.
-    near : ndarray of int or slice, optional
-        The cells that are the nearest to the finger at some time, where they are known: only they can
-        be left behind in a ridge.
-
-    Returns
-    -------
-    dict
-        See `compute_metrics`.
+    `sums`: of t rows of n cells; `time` (t,), s; `fingertip` (t, 7), lowest point, m, and quaternion;
+    `position` (n, 2), m; ordered row by row; `set_point`: force asked for; None where none is; `near`: the
+    cells that are the nearest to the finger at some time, where they are known: only they can be left behind
+    in a ridge. Returns see `compute_metrics`.
     """
     total, weight, felt, rows = sums.total, compute_weights(time), sums.touching, sums.shaping
     # A finger straight above its blister is a rounding error away from it, not 1e-17 m.

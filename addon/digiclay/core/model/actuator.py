@@ -42,12 +42,7 @@ class Actuator(Parameters):
     def rate(self, flow: Floats, height: Floats) -> Floats:
         """Return dH/dt = q / A_a, m/s (equation 1); no flow into an end stop.
 
-        Parameters
-        ----------
-        flow : ndarray (n,)
-            Flow into the cylinder, m³/s.
-        height : ndarray (n,)
-            Height, m.
+        `flow` (n,), flow into the cylinder, m³/s; `height` (n,), height, m.
         """
         inward = ((height >= self.stroke) & (flow > 0.0)) | ((height <= 0.0) & (flow < 0.0))
         return np.where(inward, 0.0, flow / self.area)

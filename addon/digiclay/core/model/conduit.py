@@ -51,12 +51,7 @@ class OrificeAndConduit:
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`.
 
-        Parameters
-        ----------
-        opening : ndarray
-            Valve opening K, any shape.
-        out : ndarray, optional
-            Takes the result.
+        `opening` ndarray, valve opening K, any shape; `out`: takes the result.
         """
         lift = self.valve.laminar_lift(opening, out)
         series = lift * self.resistance
@@ -67,12 +62,7 @@ class OrificeAndConduit:
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`.
 
-        Parameters
-        ----------
-        opening : ndarray (n,)
-            Valve opening K.
-        drop : ndarray (n,)
-            Pressure drop over valve and conduit, Pa.
+        `opening` (n,), valve opening K; `drop` (n,), pressure drop over valve and conduit, Pa.
         """
         a = self.valve.turbulent * np.abs(opening)
         ra = self.resistance * a
@@ -83,23 +73,11 @@ class OrificeAndConduit:
     def flow(self, opening: Floats, drop: Floats) -> Floats:
         """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`.
 
-        Parameters
-        ----------
-        opening : ndarray (n,)
-            Valve opening K.
-        drop : ndarray (n,)
-            Pressure drop over valve and conduit, Pa.
+        `opening` (n,), valve opening K; `drop` (n,), pressure drop over valve and conduit, Pa.
         """
         return self.conductance(opening, drop) * drop
 
 
 def connect_in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:
-    """Put a conduit behind a valve.
-
-    Parameters
-    ----------
-    valve : Orifice
-    conduit : Conduit
-    fluid : Fluid
-    """
+    """Put a conduit behind a valve."""
     return OrificeAndConduit(valve, conduit.resistance(fluid))

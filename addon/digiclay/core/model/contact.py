@@ -37,10 +37,7 @@ class ExponentialLaw:
     def tension(self, depth: Floats) -> Floats:
         """Return the elastic force T, N, before the share f_d.
 
-        Parameters
-        ----------
-        depth : ndarray (..., n)
-            Indentation x, m; negative where there is a gap.
+        `depth` (..., n), indentation x, m; negative where there is a gap.
         """
         m, offset, none, most, unit = self._numbers[depth.shape]
         exponent: Floats = depth * m

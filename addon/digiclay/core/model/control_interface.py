@@ -74,23 +74,13 @@ class Controller(Protocol):
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
         """Take in the cells the finger may touch; return memory and the disc x, y, radius to control.
 
-        Parameters
-        ----------
-        memory : object
-            From `begin`, or the period before.
-        touched : Measurement
-            Of the cells the finger may touch.
+        `memory`: from `begin`, or the period before; `touched`: of the cells the finger may touch.
         """
         ...
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Return memory and orders for the cells of the disc and all that still move.
 
-        Parameters
-        ----------
-        memory : object
-            From `locate`.
-        seen : Measurement
-            Of the cells to command.
+        `memory`: from `locate`; `seen`: of the cells to command.
         """
         ...

@@ -39,14 +39,7 @@ class Queue:
 
 
 def split_delay(delay: Delay, period: float) -> Queue:
-    """Split a dead time into whole control periods and the cut inside one.
-
-    Parameters
-    ----------
-    delay : Delay
-    period : float
-        Control period, s.
-    """
+    """Split a dead time into whole control periods and the cut inside one. `period`: control period, s."""
     whole = int(delay.dead_time / period + 1e-9)
     cut = delay.dead_time - whole * period
     if cut < 1e-9 * period:

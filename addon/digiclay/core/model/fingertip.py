@@ -33,15 +33,7 @@ _SLOPE = 0.5 / _ROOT
 def require_one(fingers: Sequence[Item]) -> Item:
     """Return the only finger, or what there is of it; docs/architecture.md lists the callers.
 
-    Parameters
-    ----------
-    fingers : sequence
-        One item a finger.
-
-    Raises
-    ------
-    ParameterError
-        When there is none, or more than one.
+    `fingers`: one item a finger. Raises ParameterError when there is none, or more than one.
     """
     if len(fingers) != 1:
         rule = "must be one: the physics carries exactly one finger"
@@ -81,17 +73,9 @@ class Fingertip(Parameters):
     def outline(self, poses: Floats) -> Floats:
         """Work out, for each pose, what its underside needs.
 
-        Parameters
-        ----------
-        poses : ndarray (k, 7)
-            Position of the lowest point, m, and unit quaternion w, x, y, z.
-
-        Returns
-        -------
-        ndarray (k, 10)
-            Center x, y, z, m; the matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²;
-            the tilt of the mid surface t_x, t_y; the half thickness over the center, m; the
-            smaller eigenvalue of S, 1/m².
+        `poses` (k, 7), position of the lowest point, m, and unit quaternion w, x, y, z. Returns (k, 10),
+        center x, y, z, m; the matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; the tilt of the
+        mid surface t_x, t_y; the half thickness over the center, m; the smaller eigenvalue of S, 1/m².
         """
         rotation = make_matrices(poses[:, 3:])
         axes = np.array([self.length, self.width, self.height])
@@ -124,17 +108,8 @@ def compute_reach(base: float, tilt: float, bend: float, peak: float) -> float:
     A paraboloid that nowhere lies above the underside gives a bound for every tilt; it
     stays one with the smallest base, the largest tilt and the smallest bend of several poses.
 
-    Parameters
-    ----------
-    base, tilt, bend : float
-        From `compute_reaches`.
-    peak : float
-        No pin top is higher than this, m.
-
-    Returns
-    -------
-    float
-        Negative when the finger is wholly above `peak`.
+    `base`, `tilt`, `bend`: from `compute_reaches`; `peak`: no pin top is higher than this, m. Returns
+    negative when the finger is wholly above `peak`.
     """
     square = tilt * tilt + 2.0 * bend * (peak - base)
     return (tilt + math.sqrt(square)) / bend if square > 0.0 else -1.0
@@ -147,17 +122,8 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
     ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
     tangent, a quadratic form, is the paraboloid that takes over at R = c, and c is in m.
 
-    Parameters
-    ----------
-    outline : ndarray (..., p, 10)
-        From `Fingertip.outline`.
-
-    Returns
-    -------
-    forms : ndarray (..., 2 p, 6)
-        Coefficients of 1, x, y, x², x y, y²: p rows in R, then p rows in the tangent, m.
-    join : ndarray (..., 2, p, 1)
-        c, m, and its root.
+    `outline` (..., p, 10), from `Fingertip.outline`. Returns `forms` (..., 2 p, 6), coefficients of 1, x, y,
+    x², x y, y²: p rows in R, then p rows in the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
     """
     x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = np.moveaxis(outline, -1, 0)
     zero = np.zeros_like(x)
@@ -176,13 +142,8 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
 def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
     """Return the height of the finger's underside, shape (..., p, k), m.
 
-    Parameters
-    ----------
-    forms : ndarray (..., 2 p, 6)
-    join : ndarray (..., 2, p, 1)
-        From `compute_forms`.
-    basis : ndarray (6, k)
-        Rows 1, x, y, x², x y, y² of the places asked for.
+    `forms` (..., 2 p, 6); `join` (..., 2, p, 1), from `compute_forms`; `basis` (6, k), rows 1, x, y, x², x y,
+    y² of the places asked for.
     """
     count = join.shape[-2]
     # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
@@ -193,12 +154,7 @@ def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
 def join_surfaces(inner: Floats, tangent: Floats, least: Any, root: Any) -> Floats:
     """Return ``tangent + (sqrt(max(inner, least)) - root)²`` in the array of `inner`, m; see `compute_forms`.
 
-    Parameters
-    ----------
-    inner, tangent : ndarray
-        R and the tangent, m.
-    least, root : float or ndarray
-        c, m, and its root.
+    `inner`, `tangent`: R and the tangent, m; `least`, `root` float or ndarray, c, m, and its root.
     """
     np.maximum(inner, least, out=inner)
     np.sqrt(inner, inner)

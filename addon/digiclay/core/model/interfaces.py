@@ -32,37 +32,16 @@ class Flow(Protocol):
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return flow over drop in laminar flow, m3/s/Pa.
 
-        Parameters
-        ----------
-        opening : float or ndarray
-            Valve opening K.
-        out : ndarray, optional
-            Array for the result.
+        `opening` float or ndarray, valve opening K; `out`: array for the result.
         """
         ...
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
-        """Return flow over drop, m3/s/Pa.
-
-        Parameters
-        ----------
-        opening : ndarray
-            Valve opening K.
-        drop : ndarray
-            Pressure drop, Pa.
-        """
+        """Return flow over drop, m3/s/Pa. `opening`: valve opening K; `drop`: pressure drop, Pa."""
         ...
 
     def flow(self, opening: Floats, drop: Floats) -> Floats:
-        """Return the flow into the cylinder, m3/s.
-
-        Parameters
-        ----------
-        opening : ndarray
-            Valve opening K.
-        drop : ndarray
-            Pressure drop, Pa.
-        """
+        """Return the flow into the cylinder, m3/s. `opening`: valve opening K; `drop`: pressure drop, Pa."""
         ...
 
 
@@ -73,33 +52,17 @@ class Lag(Protocol):
     def rows(self) -> int: ...
 
     def opening(self, own: Floats, command: Floats) -> Floats:
-        """Return the opening K, shape (n,).
-
-        Parameters
-        ----------
-        own : ndarray (rows, n)
-        command : ndarray (n,)
-        """
+        """Return the opening K, shape (n,). `own` (rows, n); `command` (n,)."""
         ...
 
     def rate(self, own: Floats, command: Floats) -> Floats:
-        """Return the rates of change of `own`, 1/s.
-
-        Parameters
-        ----------
-        own : ndarray (rows, n)
-        command : ndarray (n,)
-        """
+        """Return the rates of change of `own`, 1/s. `own` (rows, n); `command` (n,)."""
         ...
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
         """Return the linear map from own rows and queued commands to the openings at some times.
 
-        Parameters
-        ----------
-        queue : Queue
-        times : sequence of float
-            Times into the period, s.
+        `times`: times into the period, s.
         """
         ...
 
@@ -125,14 +88,7 @@ class Pulp(Protocol):
     def relaxed(self, own: Floats) -> Any: ...
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
-        """Return the rates of change of `own`, N/s.
-
-        Parameters
-        ----------
-        own : ndarray (rows, k)
-        tension : ndarray (k,)
-            Elastic force, N.
-        """
+        """Return the rates of change of `own`, N/s. `own` (rows, k); `tension` (k,), elastic force, N."""
         ...
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]: ...
@@ -140,14 +96,7 @@ class Pulp(Protocol):
     def propagator(self, step: float) -> Floats: ...
 
     def age(self, own: Floats, time: Floats) -> None:
-        """Let `own` decay without tension, in place.
-
-        Parameters
-        ----------
-        own : ndarray (rows, k)
-        time : ndarray (k,)
-            s.
-        """
+        """Let `own` decay without tension, in place. `own` (rows, k); `time` (k,), s."""
         ...
 
 
@@ -160,10 +109,7 @@ class Sensors(Protocol):
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is.
 
-        Parameters
-        ----------
-        own : ndarray (rows, m)
-        truth : Truth
+        `own` (rows, m).
         """
         ...
 
@@ -229,27 +175,17 @@ class Stepper(Protocol):
     def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
         """Work out once what all periods share.
 
-        Parameters
-        ----------
-        cell : physics.Cell
-        queue : Queue
-            Commands on their way to the valve.
-        segments : tuple of Segment
-            Physics steps of a period.
+        `cell` physics.Cell; `queue`: commands on their way to the valve; `segments`: physics steps of a
+        period.
         """
         ...
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
         """Prepare to move a block of cells on, as often as its set of cells serves.
 
-        Parameters
-        ----------
-        plan : object
-            From `plan`; with the numbers of all runs for cells of many.
-        rows : ndarray (r + q, n) or (r + q, n, b)
-            State rows, see `physics.Cell`, then the commands of the queue, oldest first.
-        near : int
-            Number k of cells, the first, that the finger may touch.
+        `plan`: from `plan`; with the numbers of all runs for cells of many; `rows` (r + q, n) or (r + q, n,
+        b), state rows, see `physics.Cell`, then the commands of the queue, oldest first; `near`: number k of
+        cells, the first, that the finger may touch.
         """
         ...
 

@@ -40,17 +40,9 @@ class ValveLag(Parameters):
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
         """Return the opening at some times of a control period, as a linear map; exact.
 
-        Parameters
-        ----------
-        queue : Queue
-            Says when the valve goes over from one held command to the next.
-        times : sequence of float (t,)
-            Times into the period, s.
-
-        Returns
-        -------
-        ndarray (t, 1 + queue.length)
-            To be multiplied with the opening at the start and the commands of the queue.
+        `queue`: says when the valve goes over from one held command to the next; `times` (t,), times into the
+        period, s. Returns (t, 1 + queue.length), to be multiplied with the opening at the start and the
+        commands of the queue.
         """
         response = np.zeros((len(times), 1 + queue.length))
         for row, time in zip(response, times, strict=True):

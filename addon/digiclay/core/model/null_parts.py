@@ -30,11 +30,7 @@ class InstantValve:
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
         """Return the map that picks the command seen at each time, shape (t, queue.length).
 
-        Parameters
-        ----------
-        queue : Queue
-        times : sequence of float
-            Times into the period, s.
+        `times`: times into the period, s.
         """
         response = np.zeros((len(times), queue.length))
         response[np.arange(len(times)), [queue.seen(time) for time in times]] = 1.0
@@ -56,14 +52,7 @@ class Unrelaxed:
         return 0.0
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
-        """Return no rows.
-
-        Parameters
-        ----------
-        own : ndarray (0, n)
-        tension : ndarray (n,)
-            N.
-        """
+        """Return no rows. `own` (0, n); `tension` (n,), N."""
         return own
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]:
@@ -75,14 +64,7 @@ class Unrelaxed:
         return np.empty((0, 3))
 
     def age(self, own: Floats, time: Floats) -> None:
-        """Nothing to age.
-
-        Parameters
-        ----------
-        own : ndarray (0, n)
-        time : ndarray (n,)
-            s.
-        """
+        """Nothing to age. `own` (0, n); `time` (n,), s."""
 
 
 @dataclass(frozen=True)

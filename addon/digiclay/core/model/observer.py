@@ -117,15 +117,7 @@ def make_valve_observer(
 ) -> ValveObserver:
     """Make an observer for cells whose commands go through `line`; `doubt` as in `ValveObserver`, m.
 
-    Parameters
-    ----------
-    inner : Sensors
-    cell : Cell
-    line : Queue
-    period : float
-        Control period, s.
-    doubt : float
-        m.
+    `period`: control period, s; `doubt`, m.
     """
     nodes, weights = np.polynomial.legendre.leggauss(NODES)  # type: ignore[no-untyped-call]
     edges = (0.0, line.cut, period) if line.cut else (0.0, period)

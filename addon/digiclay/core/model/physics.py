@@ -68,14 +68,8 @@ class Speeds:
         A finger that pushes a pin leaves it where they part, and what it does not push goes no faster than
         its valve lets it: no pin is lower than it was, or than the finger came, by more than such a fall.
 
-        Parameters
-        ----------
-        height : ndarray (n, ..)
-            Heights before, m.
-        under : ndarray (p, k, ..)
-            Undersides of the finger over the first k, m.
-        time : float or ndarray (b,)
-            s.
+        `height` (n, ..), heights before, m; `under` (p, k, ..), undersides of the finger over the first k, m;
+        `time` (b,), s.
         """
         lowest = height.copy()
         near = lowest[: under.shape[1]]
@@ -94,13 +88,7 @@ def find_speeds(cell: Cell) -> Speeds:
 def find_contact_force(cell: Cell, y: Floats, under: Floats) -> Floats:
     """Return the force on the first k cells of a block, shape (k,), N.
 
-    Parameters
-    ----------
-    cell : Cell
-    y : ndarray (r, n)
-        State rows, see `Cell`.
-    under : ndarray (k,)
-        Underside of the finger over the first k cells, m.
+    `y` (r, n), state rows, see `Cell`; `under` (k,), underside of the finger over the first k cells, m.
     """
     if cell.touch is None:
         return np.empty(0)
@@ -110,15 +98,8 @@ def find_contact_force(cell: Cell, y: Floats, under: Floats) -> Floats:
 def compute_rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     """Return dy/dt of a block of cells.
 
-    Parameters
-    ----------
-    cell : Cell
-    y : ndarray (r, n)
-        State rows, see `Cell`.
-    under : ndarray (k,)
-        Underside of the finger over the first k cells, m.
-    command : ndarray (n,)
-        Held valve commands, in [-1, 1].
+    `y` (r, n), state rows, see `Cell`; `under` (k,), underside of the finger over the first k cells, m;
+    `command` (n,), held valve commands, in [-1, 1].
     """
     height, lag, pulp = y[0], y[cell.lag_rows], y[cell.pulp_rows, : under.size]
     pressure = np.zeros_like(height)

@@ -68,12 +68,7 @@ class Relaxation(Parameters):
     def rate(self, own: Floats, tension: Floats) -> Floats:
         """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13).
 
-        Parameters
-        ----------
-        own : ndarray (k, n)
-            The filters, N.
-        tension : ndarray (n,)
-            N.
+        `own` (k, n), the filters, N; `tension` (n,), N.
         """
         return self.rates * (tension - own)
 
@@ -84,11 +79,7 @@ class Relaxation(Parameters):
         step if the tension is linear in time, and the whole loss where the filters are quicker
         than the step.
 
-        Returns
-        -------
-        map : ndarray (k + 1,)
-        share : float
-            In [0, 1).
+        Returns `map` (k + 1,); `share`: in [0, 1).
         """
         turns = self.rates[:, 0] * step
         kept = -np.expm1(-turns) / turns
@@ -102,9 +93,7 @@ class Relaxation(Parameters):
 
         Exact for a tension linear in time.
 
-        Returns
-        -------
-        ndarray (k, k + 3)
+        Returns (k, k + 3).
         """
         turns = self.rates * step
         fresh = -np.expm1(-turns)
@@ -114,11 +103,6 @@ class Relaxation(Parameters):
     def age(self, own: Floats, time: Floats) -> None:
         """Let filters decay without contact for `time` seconds, shape (n[, b]), in place; exact.
 
-        Parameters
-        ----------
-        own : ndarray (k, n[, b])
-            The filters, N.
-        time : ndarray (n[, b])
-            s.
+        `own` (k, n[, b]), the filters, N; `time` (n[, b]), s.
         """
         own *= np.exp(-per_row(self.rates, own.ndim) * time)

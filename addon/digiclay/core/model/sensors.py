@@ -98,18 +98,8 @@ def draw_normals(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Float
     A counter is hashed instead of drawing from a generator: what a cell reads does not depend
     on which others are read, nor on what was read before.
 
-    Parameters
-    ----------
-    seed : int or ndarray of int (b,)
-        Not negative.
-    period : int or ndarray of int (t,)
-        Not negative.
-    cells : ndarray of int (m,) or (m, b)
-
-    Returns
-    -------
-    first, second : ndarray ([t,] m[, b])
-        By Box and Muller's method; no farther from 0 than 8.6.
+    `seed` int (b,), not negative; `period` int (t,), not negative; `cells` int (m,) or (m, b). Returns
+    `first`, `second` ([t,] m[, b]), by Box and Muller's method; no farther from 0 than 8.6.
     """
     periods = np.asarray(period, np.uint64)
     start = _mix(np.array(seed, np.uint64, ndmin=1))

@@ -31,10 +31,7 @@ class SetPoint:
         ``F_ref`` for all cells together, ``n F_ref`` for n cells that follow; NaN where none does,
         since then no force is asked for.
 
-        Parameters
-        ----------
-        following : array_like of int
-            Numbers of cells in the mode `FORCE_FOLLOW`.
+        `following`: numbers of cells in the mode `FORCE_FOLLOW`.
         """
         count = np.asarray(following, dtype=np.float64)
         if not self.per_cell:
@@ -46,10 +43,6 @@ class SetPoint:
 def find_set_point(set_point: SetPoint | None, following: ArrayLike) -> Floats:
     """Return the `SetPoint.total`, N; NaN throughout for a method without a set point.
 
-    Parameters
-    ----------
-    set_point : SetPoint or None
-    following : array_like of int
-        Numbers of cells in the mode `FORCE_FOLLOW`.
+    `following`: numbers of cells in the mode `FORCE_FOLLOW`.
     """
     return np.full(np.shape(following), np.nan) if set_point is None else set_point.total(following)

@@ -63,11 +63,7 @@ class FingerPath:
 
         It is asked for period by period, mostly of the same places: several are worked out at a time.
 
-        Parameters
-        ----------
-        period : int
-        basis : ndarray (6, k)
-            See `fingertip.compute_underside`.
+        `basis` (6, k), see `fingertip.compute_underside`.
         """
         known, first, unders = self._last
         if known is not basis or not first <= period < first + len(unders):
@@ -95,11 +91,7 @@ class FingerPeriod(NamedTuple):
 def trace_finger(fingertip: Fingertip, poses: Floats) -> list[FingerPeriod]:
     """Work out how the finger comes, for some control periods.
 
-    Parameters
-    ----------
-    fingertip : Fingertip
-    poses : ndarray (t, p, 7)
-        Its poses at the p instants of t periods: position of the lowest point, m, quaternion.
+    `poses` (t, p, 7), its poses at the p instants of t periods: position of the lowest point, m, quaternion.
     """
     count, instants, _ = poses.shape
     outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
@@ -115,11 +107,7 @@ def trace_finger(fingertip: Fingertip, poses: Floats) -> list[FingerPeriod]:
 def find_reached_disc(window: Window, peak: float) -> Disc | None:
     """Return the disc x, y, radius that holds every cell the finger may touch in a period, m; None: no cell.
 
-    Parameters
-    ----------
-    window : Window
-    peak : float
-        No pin top is higher than this, m.
+    `peak`: no pin top is higher than this, m.
     """
     x, y, spread, base, tilt, bend = window
     radius = compute_reach(base, tilt, bend, peak)
@@ -131,15 +119,8 @@ def compute_force(touch: Touch, height: Floats, under: Floats, filters: Floats) 
 
     ``F = f_d max(T(x) - Σ ĉ_i z_i, 0)``: the pulp pushes but does not stick.
 
-    Parameters
-    ----------
-    touch : Touch
-    height : ndarray (k,)
-        Pin tops H, m.
-    under : ndarray (k,)
-        Underside of the finger over them, m; x = H - underside.
-    filters : ndarray (r, k)
-        The relaxation's state rows z_i, N.
+    `height` (k,), pin tops H, m; `under` (k,), underside of the finger over them, m; x = H - underside;
+    `filters` (r, k), the relaxation's state rows z_i, N.
     """
     none, share = touch.constants[height.shape]
     tension = touch.contact.tension(height - under)

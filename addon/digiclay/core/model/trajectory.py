@@ -148,14 +148,7 @@ class Path:
 def make_level(times: Floats, positions: Floats, interpolation: str = "smooth") -> Trajectory:
     """Return the trajectory of a level finger.
 
-    Parameters
-    ----------
-    times : ndarray (w,)
-        s.
-    positions : ndarray (w, 3)
-        m.
-    interpolation : str, optional
-        See `Trajectory`.
+    `times` (w,), s; `positions` (w, 3), m; `interpolation`: see `Trajectory`.
     """
     return Trajectory(times, positions, np.tile(LEVEL, (times.size, 1)), interpolation)
 
@@ -163,12 +156,7 @@ def make_level(times: Floats, positions: Floats, interpolation: str = "smooth") 
 def sample_poses(trajectories: Sequence[Trajectory], times: Floats) -> Floats:
     """Return the poses of all fingers, shape (k, f, 7).
 
-    Parameters
-    ----------
-    trajectories : sequence of Trajectory
-        Those of the f fingers.
-    times : ndarray (k,)
-        s.
+    `trajectories`: those of the f fingers; `times` (k,), s.
     """
     return np.stack([trajectory.poses(times) for trajectory in trajectories], axis=1)
 
@@ -178,12 +166,8 @@ def interpolate_poses(path: Floats, parts: Floats) -> Floats:
 
     Whether they are computed row by row or together makes no difference to any bit.
 
-    Parameters
-    ----------
-    path : ndarray (t + 1, f, 7)
-        Poses of the fingers: position, m, and unit quaternion.
-    parts : ndarray (p,)
-        Where on each line, 0 to 1.
+    `path` (t + 1, f, 7), poses of the fingers: position, m, and unit quaternion; `parts` (p,), where on each
+    line, 0 to 1.
     """
     count, fingers = len(path) - 1, path.shape[1]
     start, end = (np.repeat(rows, parts.size, axis=0).reshape(-1, 7) for rows in (path[:-1], path[1:]))

@@ -79,12 +79,7 @@ class Orifice:
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K; in `out` if that is given.
 
-        Parameters
-        ----------
-        opening : ndarray
-            Valve opening K, any shape.
-        out : ndarray, optional
-            Takes the result.
+        `opening` ndarray, valve opening K, any shape; `out`: takes the result.
         """
         conductance = self.laminar_lift(opening, out)
         conductance *= self.laminar
@@ -93,12 +88,7 @@ class Orifice:
     def laminar_lift(self, opening: Any, out: Floats | None) -> Any:
         """Return the opening's size to the power of the laminar branch.
 
-        Parameters
-        ----------
-        opening : ndarray
-            Valve opening K, any shape.
-        out : ndarray or None
-            Takes the result.
+        `opening` ndarray, valve opening K, any shape; `out`: takes the result.
         """
         if out is None:
             return opening * opening if self.power == 2 else abs(opening)
@@ -121,24 +111,13 @@ class Orifice:
     def flow(self, opening: Floats, drop: Floats) -> Floats:
         """Return the flow Q with the sign of `drop`, m³/s (equations 3 to 7); arguments as `conductance`.
 
-        Parameters
-        ----------
-        opening : ndarray (n,)
-            Valve opening K.
-        drop : ndarray (n,)
-            Pressure drop, Pa.
+        `opening` (n,), valve opening K; `drop` (n,), pressure drop, Pa.
         """
         return self.conductance(opening, drop) * drop
 
 
 def make_orifice(valve: Valve, fluid: Fluid) -> Orifice:
-    """Work out the flow law from the conditions of equation 5, slope and knee, not from rounded constants.
-
-    Parameters
-    ----------
-    valve : Valve
-    fluid : Fluid
-    """
+    """Work out the flow law from the conditions of equation 5, slope and knee, not from rounded constants."""
     area_term = math.pi * valve.discharge_slope * valve.orifice_diameter**2
     laminar = area_term**2 / (8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity * valve.stroke)
     turbulent = area_term / 4.0 * math.sqrt(2.0 / fluid.density)

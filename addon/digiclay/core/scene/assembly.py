@@ -61,15 +61,7 @@ def make_motion(scene: Scene) -> Motion:
 
 
 def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
-    """Return how many rows the state of a scene's system has.
-
-    Parameters
-    ----------
-    scene : Scene
-    bed : Grid
-    motion : Motion
-        Both its own.
-    """
+    """Return how many rows the state of a scene's system has. `motion`: both its own."""
     return _count_rows(motion, *_make_control(scene, bed, motion))
 
 

@@ -57,14 +57,7 @@ def compute_display_time(display: ShapeDisplayControl) -> float:
 
 
 def find_summit(grid: Grid, heights: Floats) -> tuple[float, float]:
-    """Return the place of the highest cells that is nearest to the bed's middle, m.
-
-    Parameters
-    ----------
-    grid : Grid
-    heights : ndarray (n,)
-        m.
-    """
+    """Return the place of the highest cells that is nearest to the bed's middle, m. `heights` (n,), m."""
     high = np.flatnonzero(heights >= heights.max() - NEARLY * np.ptp(heights))
     cell = int(high[np.argmin(np.hypot(grid.x[high], grid.y[high]))])
     return float(grid.x[cell]), float(grid.y[cell])
@@ -73,14 +66,7 @@ def find_summit(grid: Grid, heights: Floats) -> tuple[float, float]:
 def find_touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
     """Return the height at which a level finger that comes down over a place first touches, m.
 
-    Parameters
-    ----------
-    grid : Grid
-    heights : ndarray (n,)
-        Pin tops, m.
-    finger : Fingertip
-    x, y : float
-        The place, m.
+    `heights` (n,), pin tops, m; `x`, `y`: the place, m.
     """
     outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
     under = compute_underside(*compute_forms(outline), grid.compute_basis(np.arange(grid.count)))
@@ -90,19 +76,8 @@ def find_touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, 
 def make_forming_scene(scene: Scene, system: System, gesture: str) -> Scene:
     """Return a scene whose finger waits until the shape stands, and then forms its highest part.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a shape.
-    system : System
-        Of that scene.
-    gesture : str
-        A key of `GESTURES`.
-
-    Raises
-    ------
-    ParameterError
-        When the scene has no shape, or no finger.
+    `scene`: with a shape; `system`: of that scene; `gesture`: a key of `GESTURES`. Raises ParameterError when
+    the scene has no shape, or no finger.
     """
     display = find_display(system)
     if display is None:

@@ -129,10 +129,7 @@ class HistoryWriter:
     def begin(self, height: Floats, mode: Modes) -> None:
         """Begin anew with the state before a session, in which no force acts.
 
-        Parameters
-        ----------
-        height, mode : ndarray (n,)
-            Of all cells.
+        `height`, `mode` (n,), of all cells.
         """
         self._now[:], self._mode_now[:] = (height, np.zeros_like(height)), mode
         self._height[0], self._force[0] = self._now
@@ -155,12 +152,8 @@ class HistoryWriter:
     def finish(self, period: int, every: int) -> dict[str, NDArray[Any]]:
         """Return the rows: period (t,), height, force, command, mode (t, n); valid until it begins anew.
 
-        Parameters
-        ----------
-        period : int
-            Control periods done; where the session was cut short between two rows, it gets one more.
-        every : int
-            Control periods a row.
+        `period`: control periods done; where the session was cut short between two rows, it gets one more;
+        `every`: control periods a row.
         """
         count = 1 - (-period // every)
         self._height[count - 1], self._force[count - 1] = self._now
@@ -201,11 +194,6 @@ def write(history: dict[str, NDArray[Any]], path: Path) -> None:
     Deflated at the quickest level, because a row repeats most of the one before. The paper's
     session, 83 MB: 0.08 s and 83 MB plain, 0.26 s and 10 MB so, 0.48 s and 9.6 MB at the
     default level.
-
-    Parameters
-    ----------
-    history : dict of ndarray
-    path : Path
     """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, array in history.items():

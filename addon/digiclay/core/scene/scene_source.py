@@ -29,10 +29,7 @@ def list_samples() -> list[str]:
 def find(word: str) -> Path:
     """Return the file of a scene: a sample's name, a file, or the folder of a run.
 
-    Raises
-    ------
-    SceneError
-        When there is no such file, or sample.
+    Raises SceneError when there is no such file, or sample.
     """
     samples = list_files(SAMPLES, ".toml")
     if word not in samples and os.path.isdir(word):
@@ -61,15 +58,7 @@ class Setting(NamedTuple):
 def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
     """Read a scene file, and override it by settings.
 
-    Parameters
-    ----------
-    path : Path
-    settings : sequence of Setting, optional
-
-    Raises
-    ------
-    SceneError
-        One line: file or option, key, rule, value.
+    Raises SceneError: one line: file or option, key, rule, value.
     """
     return make_scene(path, read_table(path), settings)
 
@@ -79,14 +68,7 @@ def load_recorded(path: Path) -> Scene:
 
     Without its control, when that is a method of one's own that is not loaded.
 
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    SceneError
-        As `load`.
+    Raises SceneError as `load`.
     """
     table = read_table(path)
     control = table.get("control")
@@ -101,20 +83,9 @@ def make_scene(
 ) -> Scene:
     """Make a scene of its file's content, overridden by settings.
 
-    Parameters
-    ----------
-    path : Path
-        The file, by which messages call the scene, and beside which a shape may lie.
-    table : mapping
-        What `read_table` gives of it; it stays as it is.
-    settings : sequence of Setting, optional
-    known : ReadParts, optional
-        Parts of scenes of the same file, which are not read again.
-
-    Raises
-    ------
-    SceneError
-        As `load`.
+    `path`: the file, by which messages call the scene, and beside which a shape may lie; `table`: what
+    `read_table` gives of it; it stays as it is; `known`: parts of scenes of the same file, which are not read
+    again. Raises SceneError as `load`.
     """
     try:
         merged = merge_one_finger(_find_beside(table, path.parent))

@@ -84,25 +84,12 @@ MOST_CUT = {"adaptive": 10, "richardson": 500}
 
 @lru_cache
 def import_part(module: str, name: str) -> Any:
-    """Import a class of the core by name, now that a scene needs it.
-
-    Parameters
-    ----------
-    module, name : str
-        Of the class.
-    """
+    """Import a class of the core by name, now that a scene needs it. `module`, `name`: of the class."""
     return getattr(importlib.import_module(f"..{module}", __package__), name)
 
 
 def import_parameters(section: str, method: str) -> type[Parameters]:
-    """Import the class that holds the parameters of a section.
-
-    Parameters
-    ----------
-    section : str
-    method : str
-        The control method.
-    """
+    """Import the class that holds the parameters of a section. `method`: the control method."""
     if section in LAWS:
         return law_parameters(section)
     if section == "control":

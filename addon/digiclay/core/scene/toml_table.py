@@ -37,19 +37,8 @@ TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
 def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Scene:
     """Make a scene of the tables of a scene file; whatever they leave open gets its default.
 
-    Parameters
-    ----------
-    table : mapping
-        As `tomllib.loads` gives it.
-    name : str, optional
-        The scene's name, where the table has none.
-    known : ReadParts, optional
-        Parts of similar tables, which are not read again.
-
-    Raises
-    ------
-    ParameterError
-        Its owner is the section.
+    `table`: as `tomllib.loads` gives it; `name`: the scene's name, where the table has none; `known`: parts
+    of similar tables, which are not read again. Raises ParameterError: its owner is the section.
     """
     known = known or ReadParts()
     refuse_unknown("", table, TOP_LEVEL)
@@ -213,11 +202,7 @@ def _read_waypoint(owner: str, row: Table) -> Waypoint:
 def format_scene(scene: Scene, write: Writer | None = None) -> str:
     """Write a scene as a scene file that resolves to an equal one: every parameter, in SI units.
 
-    Parameters
-    ----------
-    scene : Scene
-    write : callable, optional
-        Another `write_part`.
+    `write`: another `write_part`.
     """
     return "\n".join(_write_lines(scene, write or write_part)) + "\n"
 
@@ -251,12 +236,7 @@ def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
 def write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:
     """Return the lines of a section; none for an omitted part.
 
-    Parameters
-    ----------
-    section : str
-    part : Parameters, Path or None
-    method : str, optional
-        The control method, in the control's section.
+    `method`: the control method, in the control's section.
     """
     if part is None:
         return

@@ -112,16 +112,8 @@ def make_reference(scene: Scene) -> Scene:
 def compare(height: Floats, force: Floats, other_height: Floats, other_force: Floats) -> Floats:
     """Return the largest differences of height, m, and force, N, over the cells, and that of the total force.
 
-    Parameters
-    ----------
-    height, other_height : ndarray (n,) or (n, b)
-        m; the last axis, if there is one, is the run.
-    force, other_force : ndarray (k,) or (k, b)
-        N.
-
-    Returns
-    -------
-    ndarray (3,) or (3, b)
+    `height`, `other_height` (n,) or (n, b), m; the last axis, if there is one, is the run; `force`,
+    `other_force` (k,) or (k, b), N. Returns (3,) or (3, b).
     """
     apart, pushed = np.abs(height - other_height), force - other_force
     total = np.abs(np.add.reduce(pushed))
@@ -138,16 +130,9 @@ def estimate_errors(
 ) -> Errors | None:
     """Estimate the errors of a run by integrating its commands with the `reference_settings`.
 
-    Parameters
-    ----------
-    scene : Scene
-        One that `has_every_command`.
-    history : dict of ndarray
-        What its run recorded.
-    progress : callable, optional
-        Told after each control period how many are done, and of how many.
-    stopped : callable, optional
-        Asked after each control period; when it says True, there is no estimate: None.
+    `scene`: one that `has_every_command`; `history`: what its run recorded; `progress`: told after each
+    control period how many are done, and of how many; `stopped`: asked after each control period; when it
+    says True, there is no estimate: None.
     """
     system = assemble(make_reference(scene))
     system = replace(system, controller=Replay(system.grid, history["command"]))
@@ -180,11 +165,7 @@ def reset(monitor: ErrorMonitor) -> ErrorMonitor:
 def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
     """Return the monitor with a copy of the session's state, where a stretch is due; else as it is.
 
-    Parameters
-    ----------
-    monitor : ErrorMonitor
-    state : State
-        The session's, before a control period.
+    `state`: the session's, before a control period.
     """
     if monitor.state is not None or 0 < monitor.age < STRETCH + PAUSE:
         return monitor
@@ -194,14 +175,9 @@ def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
 def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
     """Return the monitor with the control period that a session has just done.
 
-    Parameters
-    ----------
-    monitor : ErrorMonitor
-        Given the state before by `begin_stretch`, or by the period before.
-    after : State
-        The session's, at the end of the period.
-    path : ndarray (2, f, 7)
-        The finger at both ends of the period; see `live_periods.simulate_path`.
+    `monitor`: given the state before by `begin_stretch`, or by the period before; `after`: the session's, at
+    the end of the period; `path` (2, f, 7), the finger at both ends of the period; see
+    `live_periods.simulate_path`.
     """
     monitor = replace(monitor, age=monitor.age + 1)
     if monitor.state is None:
@@ -215,13 +191,7 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
     One is done in every `SPREAD` of the session's at most, and none in a tick of more periods than the one
     before: such ticks take the longest already. After a reference that diverges the monitor starts anew.
 
-    Parameters
-    ----------
-    monitor : ErrorMonitor
-    after : State
-        The session's, at the end of the tick.
-    count : int
-        Control periods of the session in this tick.
+    `after`: the session's, at the end of the tick; `count`: control periods of the session in this tick.
     """
     longer, monitor = count > monitor.before, replace(monitor, before=count)
     due = 0 if longer else min(monitor.age // SPREAD - monitor.done, max(1, count // SPREAD))

@@ -12,26 +12,14 @@ from ..base.png import is_whole_picture
 
 
 def name_frame(folder: Path, frame: int) -> Path:
-    """Return the file of a frame.
-
-    Parameters
-    ----------
-    folder : Path
-    frame : int
-        Its number, from 0.
-    """
+    """Return the file of a frame. `frame`: its number, from 0."""
     return folder / f"{frame:06d}.png"
 
 
 def list_missing(folder: Path, frames: Sequence[int]) -> list[int]:
     """Return the frames of which a folder has no whole picture.
 
-    Parameters
-    ----------
-    folder : Path
-        It may be missing itself.
-    frames : sequence of int
-        Their numbers, from 0.
+    `folder`: it may be missing itself; `frames`: their numbers, from 0.
     """
     return [frame for frame in frames if not _is_there(name_frame(folder, frame))]
 
@@ -49,17 +37,8 @@ def _is_there(path: Path) -> bool:
 def read_range(text: str, count: int) -> range:
     """Return the frames that a text names: ``0-24``, ``7``, or ``50+25``, 25 frames from number 50 on.
 
-    Parameters
-    ----------
-    text : str
-        Numbers from 0. The form with ``+`` ends with the film at the latest.
-    count : int
-        Number of frames of the film.
-
-    Raises
-    ------
-    OutputError
-        When it is no range, is empty, or goes beyond the film.
+    `text`: numbers from 0. The form with ``+`` ends with the film at the latest; `count`: number of frames of
+    the film. Raises OutputError when it is no range, is empty, or goes beyond the film.
     """
     read = re.fullmatch(r"(\d{1,9})(?:([-+])(\d{1,9}))?", text.strip(), re.ASCII)
     if not read:

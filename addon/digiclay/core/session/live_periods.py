@@ -68,15 +68,7 @@ def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int
     What is more than `most`, or more than this machine can do between two ticks, is dropped and
     not made up for later.
 
-    Parameters
-    ----------
-    clock : Clock
-    now : float
-        A clock that never goes back, s.
-    period : float
-        Control period, s.
-    most : int
-        Most periods at a time.
+    `now`: a clock that never goes back, s; `period`: control period, s; `most`: most periods at a time.
     """
     if clock.seen is None:
         return 0, replace(clock, seen=now)
@@ -100,13 +92,7 @@ def _count_affordable(clock: Clock, gone: float) -> int:
 def update_cost(clock: Clock, count: int, took: float) -> Clock:
     """Return the clock after some periods of a measured duration.
 
-    Parameters
-    ----------
-    clock : Clock
-    count : int
-        Control periods.
-    took : float
-        Of the wall's time, all together, s.
+    `count`: control periods; `took`: of the wall's time, all together, s.
     """
     if count < 1 or took <= 0.0:
         return clock
@@ -117,12 +103,7 @@ def update_cost(clock: Clock, count: int, took: float) -> Clock:
 def interpolate_path(start: Floats, end: Floats, count: int) -> Floats:
     """Return where the fingers are between periods, shape (count + 1, f, 7), on their ways from pose to pose.
 
-    Parameters
-    ----------
-    start, end : ndarray (f, 7)
-        Poses when last read, and now.
-    count : int
-        Control periods in between, at least 1.
+    `start`, `end` (f, 7), poses when last read, and now; `count`: control periods in between, at least 1.
     """
     path: Floats = interpolate_poses(np.array([start, end]), np.arange(count + 1) / count)[0]
     path[0] = start
@@ -135,11 +116,8 @@ def clamp_pose(pose: Floats, stroke: float) -> Floats:
     Pins bottom out there. A finger an artist drags below it would press with more newtons than
     floating-point numbers have.
 
-    Parameters
-    ----------
-    pose : ndarray (7,)
-    stroke : float
-        Highest pin top, m; sideways and upwards a thousand strokes are as good as infinitely far.
+    `pose` (7,); `stroke`: highest pin top, m; sideways and upwards a thousand strokes are as good as
+    infinitely far.
     """
     far = 1e3 * stroke
     inside = pose.copy()
@@ -155,19 +133,9 @@ def simulate_path(
 
     A recorded path gives the same states bit for bit, however many periods are done at a time.
 
-    Parameters
-    ----------
-    system : System
-    state : State
-    path : ndarray (t + 1, f, 7)
-        Where the fingers are between the periods, from `interpolate_path`.
-    smoothing : ndarray (t, 4), optional
-        What is smoothed in each period, see `control.smoothing`.
-
-    Yields
-    ------
-    State
-        After each period; valid until the next one is asked for.
+    `path` (t + 1, f, 7), where the fingers are between the periods, from `interpolate_path`; `smoothing` (t,
+    4), what is smoothed in each period, see `control.smoothing`. Yields after each period; valid until the
+    next one is asked for.
     """
     fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
     systems = repeat(system, len(fingers)) if smoothing is None else _order_smoothing(system, smoothing)

@@ -32,11 +32,7 @@ def count_busy_cells(scene: Scene) -> int:
 def check_memory(scene: Scene, rows: Rows) -> None:
     """Refuse a session beyond the memory, before it starts; ParameterError names the remedy.
 
-    Parameters
-    ----------
-    scene : Scene
-    rows : Rows
-        Of its state.
+    `rows`: of its state.
     """
     busy = count_busy_cells(scene)
     refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, measure_available_memory(), busy)
@@ -45,14 +41,8 @@ def check_memory(scene: Scene, rows: Rows) -> None:
 def count_bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
     """Return about how much memory a session takes; compared in tests/unit/test_memory_limit.py.
 
-    Parameters
-    ----------
-    recorder : Recorder or None
-    rows : Rows
-        Of the state.
-    cells, periods : int
-    busy : int, optional
-        Cells that may take part at once, where they are more than those under a finger.
+    `rows`: of the state; `busy`: cells that may take part at once, where they are more than those under a
+    finger.
     """
     held = 8 * rows.count + BYTES_BESIDE
     at_work = BYTES_BUSY
@@ -81,17 +71,8 @@ def refuse_what_cannot_fit(
 ) -> None:
     """Refuse, before it starts, a session that some bytes cannot hold.
 
-    Parameters
-    ----------
-    recorder, rows, cells, periods, busy
-        See `count_bytes_needed`.
-    available : int
-        Bytes.
-
-    Raises
-    ------
-    ParameterError
-        With the numbers, and what to change.
+    `recorder`, `rows`, `cells`, `periods`, `busy`: see `count_bytes_needed`; `available`: bytes. Raises
+    ParameterError: with the numbers, and what to change.
     """
     needed = count_bytes_needed(recorder, rows, cells, periods, busy)
     if needed <= available:

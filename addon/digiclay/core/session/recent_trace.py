@@ -62,29 +62,14 @@ class RecentTrace:
 
 
 def start(period: float, pins: Sequence[int] = ()) -> RecentTrace:
-    """Return an empty trace for a control period, s.
-
-    Parameters
-    ----------
-    period : float
-        s.
-    pins : sequence of int
-        Whose heights are kept.
-    """
+    """Return an empty trace for a control period, s. `period`, s; `pins`: whose heights are kept."""
     return RecentTrace(
         max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), np.empty((0, 3 + PICKED))
     )
 
 
 def pick(trace: RecentTrace, pins: Sequence[int], count: int) -> RecentTrace:
-    """Return a trace that follows other pins; those a bed of `count` cells does not have are left out.
-
-    Parameters
-    ----------
-    trace : Trace
-    pins : sequence of int
-    count : int
-    """
+    """Return a trace that follows other pins; those a bed of `count` cells does not have are left out."""
     kept = tuple(pin for pin in pins if 0 <= pin < count)[:PICKED]
     if kept == trace.pins:
         return trace
@@ -123,16 +108,7 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
 
 
 def sample(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
-    """Return what a trace keeps of a state.
-
-    Parameters
-    ----------
-    system : System
-    state : State
-    set_point : SetPoint or None
-    pins : sequence of int
-        Whose heights are kept.
-    """
+    """Return what a trace keeps of a state. `pins`: whose heights are kept."""
     held = state.active
     heights = [math.nan] * PICKED
     for column, pin in enumerate(pins):
@@ -145,11 +121,7 @@ def sample(system: System, state: State, set_point: SetPoint | None, pins: Seque
 def extend(trace: RecentTrace, rows: list[list[float]]) -> RecentTrace:
     """Return the trace with rows added, each as wide as its own; time may have gone back in between.
 
-    Parameters
-    ----------
-    trace : Trace
-    rows : list of list of float
-        From `sample`.
+    `rows`: from `sample`.
     """
     if not rows:
         return trace

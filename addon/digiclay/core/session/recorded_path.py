@@ -44,17 +44,8 @@ class Recording:
     def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
         """Return a recording that has nothing but its start.
 
-        Parameters
-        ----------
-        snapshot : bytes
-            The state at the start.
-        period : int
-            Its period.
-        pose : ndarray (f, 7)
-            Of the fingertips then.
-        tick : int
-        room : int
-            Rows to have at once; more are added as they are needed.
+        `snapshot`: the state at the start; `period`: its period; `pose` (f, 7), of the fingertips then;
+        `room`: rows to have at once; more are added as they are needed.
         """
         rows = np.empty((room, pose.size + ORDER + 1))
         rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
@@ -79,13 +70,8 @@ class Recording:
     def extend(self, path: Floats, tick: int, smoothing: Floats | None = None) -> Recording:
         """Return the recording with the poses of some more periods, shape (k, f, 7).
 
-        Parameters
-        ----------
-        path : ndarray (k, f, 7)
-            Poses at the ends of the periods.
-        tick : int
-        smoothing : ndarray (k, 4), optional
-            What was smoothed in them; nothing when left out.
+        `path` (k, f, 7), poses at the ends of the periods; `smoothing` (k, 4), what was smoothed in them;
+        nothing when left out.
         """
         end = self.count + len(path)
         rows = self.rows
@@ -100,11 +86,7 @@ class Recording:
     def cut_at_tick(self, tick: int, period: int) -> Recording | None:
         """Return the recording as it was at a moment undo came back to; None when it did not lead there.
 
-        Parameters
-        ----------
-        tick : int
-        period : int
-            Of the state at that tick.
+        `period`: of the state at that tick.
         """
         count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
         return self._first(count) if count and count - 1 == period - self.first else None
@@ -122,12 +104,7 @@ class Recording:
 def make_take(scene: Scene, recording: Recording, end: bytes) -> Take | None:
     """Return what was recorded as a take; None when that is no control period yet.
 
-    Parameters
-    ----------
-    scene : Scene
-    recording : Recording
-    end : bytes
-        The state after its last row, from `snapshot.dump`.
+    `end`: the state after its last row, from `snapshot.dump`.
     """
     if recording.count < 2:
         return None

@@ -88,15 +88,8 @@ class Film(Moving):
     def moments(self, time: Sequence[float] | Floats) -> Floats:
         """Return the simulated time of each frame, s.
 
-        Parameters
-        ----------
-        time : ndarray (t,)
-            The times of a history, s.
-
-        Raises
-        ------
-        ParameterError
-            When the part asked for is not in the session, or makes too many frames.
+        `time` (t,), the times of a history, s. Raises ParameterError when the part asked for is not in the
+        session, or makes too many frames.
         """
         first, last = float(time[0]), float(time[-1])
         stop = min(self.stop, last) if self.stop else last

@@ -122,15 +122,8 @@ def evaluate(
 ) -> Result:
     """Return the result of a session that has come to its end.
 
-    Parameters
-    ----------
-    scene : Scene
-    system : System
-    rows : dict of ndarray
-        From `recorder.HistoryWriter.finish`; empty without a recorder.
-    ended : Ended
-    versions : mapping, optional
-        What else to note as versions the run was made with.
+    `rows`: from `recorder.HistoryWriter.finish`; empty without a recorder; `versions`: what else to note as
+    versions the run was made with.
     """
     if not rows:
         return report(scene, ended, {}, versions)
@@ -160,14 +153,7 @@ def report(
 ) -> Result:
     """Return the result of a session that has come to its end, without a history.
 
-    Parameters
-    ----------
-    scene : Scene
-    ended : Ended
-    found : mapping
-        Metrics of its history.
-    versions : mapping, optional
-        What else to note as versions the run was made with.
+    `found`: metrics of its history; `versions`: what else to note as versions the run was made with.
     """
     simulated = ended.periods * scene.simulation.control_period
     metrics: dict[str, Any] = {
@@ -194,14 +180,7 @@ def report(
 
 
 def select_rows(history: History, start: float, end: float) -> History:
-    """Return the rows of a history from one time to another.
-
-    Parameters
-    ----------
-    history : dict of ndarray
-    start, end : float
-        s.
-    """
+    """Return the rows of a history from one time to another. `start`, `end`, s."""
     moments = history["time"]
     rows = (moments >= start - 1e-9) & (moments <= end + 1e-9)
     return {name: array if name == "position" else array[rows] for name, array in history.items()}

@@ -28,22 +28,10 @@ def run(
 ) -> Result:
     """Run a scene from rest to its end.
 
-    Parameters
-    ----------
-    scene : Scene
-    progress : callable, optional
-        Told after each control period how many are done, and of how many.
-    stopped : callable, optional
-        Asked after each control period; when it says True, the result is what there is so far.
-    versions : mapping, optional
-        What else to note as versions the run was made with.
-
-    Raises
-    ------
-    ParameterError
-        When the session cannot fit in memory.
-    DivergenceError
-        When the integration leaves the finite numbers.
+    `progress`: told after each control period how many are done, and of how many; `stopped`: asked after each
+    control period; when it says True, the result is what there is so far; `versions`: what else to note as
+    versions the run was made with. Raises ParameterError when the session cannot fit in memory. Raises
+    DivergenceError when the integration leaves the finite numbers.
     """
     system = assemble(scene)
     check_memory(scene, system.rows)
@@ -65,15 +53,7 @@ def run(
 def save(result: Result, folder: Path) -> None:
     """Write ``scene.toml``, ``history.npz`` and ``metrics.json`` into an existing folder.
 
-    Parameters
-    ----------
-    result : Result
-    folder : Path
-
-    Raises
-    ------
-    OutputError
-        When the folder cannot be written.
+    Raises OutputError when the folder cannot be written.
     """
     try:
         (folder / "scene.toml").write_text(format_scene(result.scene), encoding="utf-8")

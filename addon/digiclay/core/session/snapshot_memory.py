@@ -20,12 +20,7 @@ def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
 
     A named tuple becomes a list that starts with its name, an array its place among the arrays.
 
-    Parameters
-    ----------
-    memory : object
-        A controller's: numbers, enumerations, arrays, and tuples of them.
-    arrays : list of ndarray
-        Grows.
+    `memory`: a controller's: numbers, enumerations, arrays, and tuples of them; `arrays`: grows.
     """
     if isinstance(memory, np.ndarray):
         arrays.append(np.ascontiguousarray(memory, memory.dtype.newbyteorder("<")))
@@ -41,19 +36,8 @@ def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
 def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
     """Return the memory that `flatten` took apart, in the types of a memory of the same controller.
 
-    Parameters
-    ----------
-    template : object
-        What the controller begins with.
-    kept : object
-        From `flatten`.
-    arrays : list of ndarray
-        Those that were put in, read back.
-
-    Raises
-    ------
-    StateError
-        When the memory is that of another controller, or damaged.
+    `template`: what the controller begins with; `kept`: from `flatten`; `arrays`: those that were put in,
+    read back. Raises StateError when the memory is that of another controller, or damaged.
     """
     try:
         return _rebuild_like(template, kept, arrays)

@@ -77,17 +77,7 @@ def _cells(count: int) -> str:
 def fit_given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
     """Return the shape whose heights stand in the scene itself.
 
-    Parameters
-    ----------
-    shape : Shape
-    grid : Grid
-    actuator : Actuator
-        Its stroke limits the heights.
-
-    Raises
-    ------
-    ParameterError
-        When they are not those of this bed.
+    `actuator`: its stroke limits the heights. Raises ParameterError when they are not those of this bed.
     """
     return _clipped(shape.file or "heights", unpack(shape.heights, grid), _all_covered(grid), actuator)
 
@@ -95,20 +85,8 @@ def fit_given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
 def fit_relief(shape: Shape, relief: Relief, grid: Grid, actuator: Actuator) -> Fitted:
     """Lay a shape onto a bed.
 
-    Parameters
-    ----------
-    shape : Shape
-        How.
-    relief : Relief
-        What.
-    grid : Grid
-    actuator : Actuator
-        Gives rest height and stroke.
-
-    Raises
-    ------
-    ParameterError
-        When it covers no cell, or cannot be fitted the way it is asked for.
+    `shape`: how; `relief`: what; `actuator`: gives rest height and stroke. Raises ParameterError when it
+    covers no cell, or cannot be fitted the way it is asked for.
     """
     at = _placement(shape, relief, grid)
     tops = relief.tops(grid, at)

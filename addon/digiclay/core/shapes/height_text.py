@@ -23,16 +23,8 @@ def pack(heights: Floats) -> str:
 def unpack(text: str, grid: Grid) -> Floats:
     """Return the heights of the cells of a bed, shape (n,), m.
 
-    Parameters
-    ----------
-    text : str
-        From `pack`.
-    grid : Grid
-
-    Raises
-    ------
-    ParameterError
-        When the text is not what `pack` made, or was made for another bed.
+    `text`: from `pack`. Raises ParameterError when the text is not what `pack` made, or was made for another
+    bed.
     """
     wanted = 4 * grid.count
     try:

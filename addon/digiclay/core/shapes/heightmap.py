@@ -50,13 +50,7 @@ class HeightMap:
         return 0.0, 0.0, float(self.pixels[1]), float(self.pixels[0])
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
-        """Return the heights at the pins: bilinear, of the means over a pin's own square of pixels.
-
-        Parameters
-        ----------
-        grid : Grid
-        at : Placement
-        """
+        """Return the heights at the pins: bilinear, of the means over a pin's own square of pixels."""
         across, along = (grid.x - at.x) / at.factor_x, (grid.y - at.y) / at.factor_y
         covered = _within(across, self.pixels[1]) & _within(along, self.pixels[0])
         under_a_pin = min(grid.layout.pitch / at.factor_x, grid.layout.row_spacing / at.factor_y)
@@ -71,18 +65,9 @@ class HeightMap:
 def make_height_map(name: str, values: NDArray[np.generic], value_length: float | None = None) -> HeightMap:
     """Make a map of an array of numbers, the first row at the lowest y.
 
-    Parameters
-    ----------
-    name : str
-        What messages call it.
-    values : ndarray (r, c)
-    value_length : float, optional
-        Meters in the unit of the values; by default they are no lengths.
-
-    Raises
-    ------
-    ParameterError
-        When it is no map: not two-dimensional, smaller than 2 x 2, or with numbers that are not finite.
+    `name`: what messages call it; `values` (r, c); `value_length`: meters in the unit of the values; by
+    default they are no lengths. Raises ParameterError when it is no map: not two-dimensional, smaller than 2
+    x 2, or with numbers that are not finite.
     """
     shown = " x ".join(map(str, values.shape)) or "a single number"
     if values.ndim != 2 or min(values.shape) < 2:
@@ -107,10 +92,7 @@ def make_height_map(name: str, values: NDArray[np.generic], value_length: float 
 def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
     """Return the means over squares of `block` x `block` values; those at the end may be smaller.
 
-    Parameters
-    ----------
-    values : ndarray (r, c)
-    block : int
+    `values` (r, c).
     """
     if block == 1:
         return np.asarray(values, np.float64)

@@ -21,12 +21,7 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
     around: a group that reaches the rim of the bed is what lies beside the shape. The values over it
     are the flattest that join those around it: each becomes the mean of its neighbors.
 
-    Parameters
-    ----------
-    grid : Grid
-    value : ndarray (n,)
-    missing : ndarray (n,) of bool
-        Pins whose value is not that of the surface.
+    `value` (n,); `missing` bool (n,), pins whose value is not that of the surface.
     """
     beside = grid.layout.find_neighbors(corners=False)
     number = np.flatnonzero(missing)

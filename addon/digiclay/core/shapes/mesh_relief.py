@@ -84,11 +84,6 @@ class ShapeMesh:
 
         A closed mesh is passed through once, from its top to its underside; an open one is hit once.
         Small holes of an open one are filled from around.
-
-        Parameters
-        ----------
-        grid : Grid
-        at : Placement
         """
         none = np.empty(0, np.bool_)
         hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), none, none)]
@@ -184,21 +179,9 @@ def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, In
 def make_shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: float) -> ShapeMesh:
     """Make a shape of triangles.
 
-    Parameters
-    ----------
-    name : str
-        What messages call it.
-    vertices : ndarray (v, 3)
-    faces : ndarray of int (f, 3)
-    up : str
-        A key of `request.UPWARDS`.
-    length : float
-        Meters in the vertices' unit.
-
-    Raises
-    ------
-    ParameterError
-        When there is no surface, or a vertex is not finite.
+    `name`: what messages call it; `vertices` (v, 3); `faces` int (f, 3); `up`: a key of `request.UPWARDS`;
+    `length`: meters in the vertices' unit. Raises ParameterError when there is no surface, or a vertex is not
+    finite.
     """
     place, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
     if place.ndim != 2 or place.shape[1:] != (3,) or corners.ndim != 2 or not corners.size:

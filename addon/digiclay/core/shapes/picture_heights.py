@@ -37,10 +37,7 @@ READERS: list[Callable[[Path], Pixels]] = []
 def read_pixels(path: Path) -> Pixels:
     """Return the brightness of a picture's pixels, (rows, columns), the lowest row first.
 
-    Raises
-    ------
-    ParameterError
-        When it cannot be read, or is too large.
+    Raises ParameterError when it cannot be read, or is too large.
     """
     _refuse_by_head(path)
     if READERS:
@@ -83,26 +80,12 @@ def _refuse_by_head(path: Path) -> None:
 
 
 def refuse_too_many(path: Path, width: int, height: int) -> None:
-    """Refuse a picture too large to be read.
-
-    Parameters
-    ----------
-    path : Path
-    width, height : int
-        Pixels.
-    """
+    """Refuse a picture too large to be read. `width`, `height`: pixels."""
     if width * height > MOST:
         raise make_size_error(path, f"{width} x {height}")
 
 
 def make_size_error(path: Path, size: str) -> ParameterError:
-    """Return the error of a picture too large to be read.
-
-    Parameters
-    ----------
-    path : Path
-    size : str
-        What it has.
-    """
+    """Return the error of a picture too large to be read. `size`: what it has."""
     rule = f"must have at most {MOST // 1_000_000} million pixels"
     return ParameterError("shape", "file", rule, f"{path}: {size}", "Make it smaller first.")

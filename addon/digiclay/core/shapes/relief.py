@@ -66,11 +66,5 @@ class Relief(Protocol):
         ...
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
-        """Return its top surface at the pins.
-
-        Parameters
-        ----------
-        grid : Grid
-        at : Placement
-        """
+        """Return its top surface at the pins."""
         ...

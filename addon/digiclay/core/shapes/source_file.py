@@ -37,10 +37,7 @@ def list_shapes() -> list[str]:
 def find_shape(word: str) -> Path:
     """Return the file of a shape: a sample's name, or a file.
 
-    Raises
-    ------
-    SceneError
-        When there is no such file, or sample.
+    Raises SceneError when there is no such file, or sample.
     """
     return find_file(word, list_files(SAMPLES, *KINDS), "sample shape")
 
@@ -48,12 +45,7 @@ def find_shape(word: str) -> Path:
 def fit_shape(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
     """Return the shape of a scene, laid onto its bed; errors as `read` and `fitting.fit_relief`.
 
-    Parameters
-    ----------
-    shape : Shape
-    grid : Grid
-    actuator : Actuator
-        Its stroke limits the heights.
+    `actuator`: its stroke limits the heights.
     """
     if shape.heights:
         return fit_given(shape, grid, actuator)
@@ -63,12 +55,7 @@ def fit_shape(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
 def read(shape: Shape) -> Relief:
     """Read the shape a scene names.
 
-    Raises
-    ------
-    SceneError
-        When there is no such file.
-    ParameterError
-        When it holds no shape.
+    Raises SceneError when there is no such file. Raises ParameterError when it holds no shape.
     """
     try:
         path = find_shape(shape.file)

@@ -98,13 +98,7 @@ class BernoulliPlan:
 def make_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
     """Work out once what all periods share.
 
-    Parameters
-    ----------
-    cell : Cell
-    queue : Queue
-        Commands on their way to the valve.
-    segments : tuple of Segment
-        Physics steps of a period.
+    `queue`: commands on their way to the valve; `segments`: physics steps of a period.
     """
     times, weights, nodes = _gauss_points(queue, segments)
     end = segments[-1].start + segments[-1].length
@@ -146,13 +140,8 @@ def make_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> Bernou
 def _hard(cell: Cell, to_load: float, steepest: float) -> float:
     """Return the exponent from which on some flow may turn turbulent or an exponential overflow.
 
-    Parameters
-    ----------
-    cell : Cell
-    to_load : float
-        Pressure that a unit of tension makes, Pa.
-    steepest : float
-        No step's decay is larger where every flow is laminar.
+    `to_load`: pressure that a unit of tension makes, Pa; `steepest`: no step's decay is larger where every
+    flow is laminar.
     """
     # How far the load may drive up the drop before some flow could turn turbulent.
     spare = cell.flow.knee - cell.supply.largest

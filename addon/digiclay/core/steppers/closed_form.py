@@ -31,18 +31,9 @@ _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 def solve_pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     """Return the relief of cells that stay under load: ``e(1) - e(0) = growth - relief``.
 
-    Parameters
-    ----------
-    grown : ndarray (k,)
-        ``exp(e(0))``.
-    growth, decay : ndarray (k,)
-        Neither may be zero (`TINY` will do); neither exponent may pass `LARGE`.
-
-    Returns
-    -------
-    ndarray (k,)
-        ``log(1 + q)``, ``q = decay exp(e) (exp(growth) - 1)/growth``. The mean of exp(e)
-        over the step is relief / decay.
+    `grown` (k,), ``exp(e(0))``; `growth`, `decay` (k,), neither may be zero (`TINY` will do); neither
+    exponent may pass `LARGE`. Returns (k,), ``log(1 + q)``, ``q = decay exp(e) (exp(growth) - 1)/growth``.
+    The mean of exp(e) over the step is relief / decay.
     """
     q: Floats = np.expm1(growth)
     q /= growth
@@ -57,18 +48,9 @@ def solve_carefully(
 ) -> tuple[Floats, Floats]:
     """Return the load's part of the way, and the mean of exp(e), of cells that stay under load, at any size.
 
-    Parameters
-    ----------
-    exponent : ndarray (k,)
-        e(0).
-    growth, slip, decay, pulp : ndarray (k,)
-        See the module; `decay` not below `TINY`, `growth` not zero (`TINY` will do).
-
-    Returns
-    -------
-    push : ndarray (k,)
-        ``e(1) - e(0) - slip``, never above 0 where e(0) is above ``log(pulp)``.
-    mean : ndarray (k,)
+    `exponent` (k,), e(0); `growth`, `slip`, `decay`, `pulp` (k,), see the module; `decay` not below `TINY`,
+    `growth` not zero (`TINY` will do). Returns `push` (k,), ``e(1) - e(0) - slip``, never above 0 where e(0)
+    is above ``log(pulp)``; `mean` (k,).
     """
     size = np.abs(growth)
     part, log_decay = np.log(-np.expm1(-size) / size), np.log(decay)
@@ -92,20 +74,11 @@ def solve_crossing(
 ) -> tuple[Floats, Floats]:
     """Solve for cells that meet or leave the finger within the step.
 
-    Parameters
-    ----------
-    exponent, slip, decay, pulp : ndarray (k,)
-        See the module. Below ``log(pulp)`` at the start means meeting, above it leaving.
-    deviation : ndarray (k,)
-        Chord deviation of the path without load: its mean above the straight line between its ends.
-
-    Returns
-    -------
-    push : ndarray (k,)
-        ``e(1) - e(0) - slip``, the load's part; the instant of meeting or leaving is found exactly
-        on a straight way, and to second order on a bent one.
-    mean : ndarray (k,)
-        Mean of ``max(exp(e) - 1, 0)``.
+    `exponent`, `slip`, `decay`, `pulp` (k,), see the module. Below ``log(pulp)`` at the start means meeting,
+    above it leaving; `deviation` (k,), chord deviation of the path without load: its mean above the straight
+    line between its ends. Returns `push` (k,), ``e(1) - e(0) - slip``, the load's part; the instant of
+    meeting or leaving is found exactly on a straight way, and to second order on a bent one; `mean` (k,),
+    mean of ``max(exp(e) - 1, 0)``.
     """
     growth = replace_zeros(slip + decay * pulp)
     slip = np.where(np.abs(slip) < _STILL, _STILL, slip)

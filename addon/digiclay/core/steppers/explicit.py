@@ -60,14 +60,8 @@ class Explicit:
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
         """Return how far the rows go in one step, s long.
 
-        Parameters
-        ----------
-        rates : callable
-            Rates of the rows, at rows and a node of the step.
-        y : ndarray (r, n)
-            State rows at the start of the step.
-        step : float
-            s.
+        `rates`: rates of the rows, at rows and a node of the step; `y` (r, n), state rows at the start of the
+        step; `step`, s.
         """
         raise NotImplementedError
 
@@ -78,13 +72,8 @@ class Explicit:
     def advance(self, plan: ExplicitPlan, rows: Floats, under: Floats) -> Floats:
         """Move a block of cells on by one control period, in place; see `interfaces.Movement`.
 
-        Parameters
-        ----------
-        plan : ExplicitPlan
-        rows : ndarray (r + q, n)
-            State rows, then the commands of the queue, oldest first.
-        under : ndarray (p, k)
-            Underside of the finger over the first k cells at the period's instants, m.
+        `rows` (r + q, n), state rows, then the commands of the queue, oldest first; `under` (p, k), underside
+        of the finger over the first k cells at the period's instants, m.
         """
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = rows[: cell.rows], rows[cell.rows :]

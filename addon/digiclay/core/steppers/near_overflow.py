@@ -105,16 +105,8 @@ def find_loaded_path(
 ) -> LoadedPath:
     """Return the paths of cells over a step in which some of them are near overflow.
 
-    Parameters
-    ----------
-    cell : Cell
-    m : float or ndarray (b,)
-        The contact's exponent, 1/m.
-    to_load : float or ndarray (b,)
-        Pressure that a unit of tension makes, Pa.
-    share : float or ndarray (b,)
-        Share of the tension that pushes, the rest being lost to relaxation within the step.
-    start : StepStart
+    `m` (b,), the contact's exponent, 1/m; `to_load` (b,), pressure that a unit of tension makes, Pa; `share`
+    (b,), share of the tension that pushes, the rest being lost to relaxation within the step.
     """
     valve = _Valve(cell, start.openings, start.weights, cell.supply.pressure(start.openings))
     decay, free = _mid_load(valve, m, to_load * share, start)

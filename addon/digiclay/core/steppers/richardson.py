@@ -78,13 +78,9 @@ class Richardson:
 def extrapolate(cell: Cell, fine: Floats, coarse: Floats, reach: tuple[Floats, Floats]) -> None:
     """Take the leading term of the error out of rows, in place, and keep them within what there can be.
 
-    Parameters
-    ----------
-    cell : Cell
-    fine, coarse : ndarray (r, n) or (r, n, b)
-        Rows moved by halved steps and by whole ones, from the same start.
-    reach : (ndarray, ndarray)
-        The lowest and the highest that the pins can be, m; see `physics.Speeds.reach`.
+    `fine`, `coarse` (r, n) or (r, n, b), rows moved by halved steps and by whole ones, from the same start;
+    `reach` (ndarray, ndarray), the lowest and the highest that the pins can be, m; see
+    `physics.Speeds.reach`.
     """
     own, pulp = fine[: cell.rows], fine[cell.pulp_rows]
     np.add(own, (own - coarse[: cell.rows]) / 3.0, out=own)

@@ -93,10 +93,7 @@ class Column:
 def read_axis(said: str) -> Axis:
     """Read what varies, and how: ``control.force_gain=1:10:10``.
 
-    Raises
-    ------
-    ParameterError
-        In one line: key, rule, value.
+    Raises ParameterError: in one line: key, rule, value.
     """
     key, _, values = (part.strip() for part in said.partition("="))
     if not key or not values:
@@ -152,20 +149,9 @@ def make_points(
     A value that no point can have is refused; values that only do not go together with some
     of the other axes' make a point with an error.
 
-    Parameters
-    ----------
-    path : Path
-        The scene's file, which is read once.
-    settings : sequence of Setting
-        What is changed of it at every point.
-    axes : sequence of Axis
-    progress : callable, optional
-        Told how many points are made, and of how many.
-
-    Raises
-    ------
-    ParameterError, SceneError
-        In one line.
+    `path`: the scene's file, which is read once; `settings`: what is changed of it at every point;
+    `progress`: told how many points are made, and of how many. Raises ParameterError, SceneError: in one
+    line.
     """
     keys = [one.key for one in axes]
     for key in keys:
@@ -194,20 +180,9 @@ def place_points(
 ) -> list[Point]:
     """Make the scenes of points anywhere; values that do not go together make a point with an error.
 
-    Parameters
-    ----------
-    path : Path
-        The scene's file, which is read once.
-    settings : sequence of Setting
-        What is changed of it at every point.
-    keys : sequence of str
-        Varied parameters.
-    rows : sequence of tuple of str
-        Their values at each point.
-    first : int, optional
-        Index of the first point.
-    progress : callable, optional
-        Told how many points are made, and of how many.
+    `path`: the scene's file, which is read once; `settings`: what is changed of it at every point; `keys`:
+    varied parameters; `rows`: their values at each point; `first`: index of the first point; `progress`: told
+    how many points are made, and of how many.
     """
     table, known, points = read_table(path), ReadParts(), []
     for index, words in enumerate(rows, first):
@@ -231,14 +206,7 @@ def _refuse_hopeless_values(points: Sequence[Point], axes: Sequence[Axis]) -> No
 
 
 def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
-    """Return the axes in numbers: what the scenes made of their words.
-
-    Parameters
-    ----------
-    points : sequence of Point
-        Of the whole sweep.
-    axes : sequence of Axis
-    """
+    """Return the axes in numbers: what the scenes made of their words. `points`: of the whole sweep."""
     columns = []
     for number, one in enumerate(axes):
         scenes = {point.words[number]: point.scene for point in reversed(points) if point.scene}
@@ -251,15 +219,7 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
 
 
 def find_value(scene: Scene, key: str, word: str) -> Any:
-    """Return what a scene made of a word, if it is a number; else the word.
-
-    Parameters
-    ----------
-    scene : Scene
-    key : str
-        Section and key.
-    word : str
-    """
+    """Return what a scene made of a word, if it is a number; else the word. `key`: section and key."""
     section, _, name = key.partition(".")
     value = getattr(scene.section(section), name, None) if name else None
     number = isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -66,10 +66,7 @@ ALONE = "alone"
 def find_figure(word: str) -> str:
     """Return the full name of a metric, such as ``lag``.
 
-    Raises
-    ------
-    ParameterError
-        When there is none; the nearest is suggested.
+    Raises ParameterError when there is none; the nearest is suggested.
     """
     name = SHORT.get(word, word)
     if name in FIGURES:
@@ -112,12 +109,8 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
     Which stand together depends on the points alone, not on what is done already or how many
     workers there are: the same sweep comes to the same results to the last bit.
 
-    Parameters
-    ----------
-    points : sequence of Point
-        All of the sweep.
-    errors : bool, optional
-        Whether errors are to be estimated: those that judge the points must then be of one structure too.
+    `points`: all of the sweep; `errors`: whether errors are to be estimated: those that judge the points must
+    then be of one structure too.
     """
     alike: dict[object, list[Point]] = {}
     known = Findings()
@@ -179,13 +172,7 @@ def evaluate(
 ) -> Record | None:
     """Run one point; return its record, None when it was stopped.
 
-    Parameters
-    ----------
-    scene : Scene
-    stopped : callable, optional
-        Asked after each control period.
-    errors : bool, optional
-        Estimate `ERRORS` too.
+    `stopped`: asked after each control period; `errors`: estimate `ERRORS` too.
     """
     try:
         result = run(scene, stopped=stopped)
@@ -229,17 +216,8 @@ def evaluate_bundle(
     When a batch fails as a whole, its points are run one by one, and each record says why under
     ``alone``.
 
-    Parameters
-    ----------
-    bundle : sequence of Point
-        One, or several of one batch.
-    stopped, errors
-        As `evaluate` has them.
-
-    Warns
-    -----
-    StackWarning
-        When a batch failed neither for lack of memory nor by an error a user can cause.
+    `bundle`: one, or several of one batch; `stopped`, `errors`: as `evaluate` has them; `StackWarning`: when
+    a batch failed neither for lack of memory nor by an error a user can cause.
     """
     alone = [point for point in bundle if point.scene]
     scenes = [point.scene for point in alone if point.scene]

@@ -71,10 +71,7 @@ class Outputs:
 def make_outputs(table: Mapping[str, Any]) -> Outputs:
     """Read what is made of each run from a table of `KEYS`.
 
-    Raises
-    ------
-    ParameterError
-        Its owner is the section.
+    Raises ParameterError: its owner is the section.
     """
     refuse_unknown("", table, KEYS)
     export = table.get("export", [])

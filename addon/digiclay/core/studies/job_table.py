@@ -69,16 +69,7 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
     Every scene is combined with every method and every setting. A combination whose values do
     not go together makes a job with an error; what no job could have is refused.
 
-    Parameters
-    ----------
-    path : Path
-    more : sequence of str, optional
-        Names of methods besides those of the file.
-
-    Raises
-    ------
-    SceneError
-        One line: file, key, rule, value.
+    `more`: names of methods besides those of the file. Raises SceneError: one line: file, key, rule, value.
     """
     table = read_table(path)
     try:
@@ -102,13 +93,7 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
 
 
 def find_jobs_file(said: str) -> Path:
-    """Return a JOBS file: a sample's name, or a file.
-
-    Raises
-    ------
-    SceneError
-        When there is none.
-    """
+    """Return a JOBS file: a sample's name, or a file. Raises SceneError when there is none."""
     return find_file(said, list_files(BATCHES, ".toml"), "sample batch")
 
 

@@ -75,10 +75,7 @@ def find_interval(values: Sequence[float | None]) -> Interval | None:
 
     ``half = t(0.975, n - 1) s / sqrt(n)`` with the standard deviation s.
 
-    Parameters
-    ----------
-    values : sequence of float or None
-        None and values that are not finite are left out.
+    `values`: none and values that are not finite are left out.
     """
     known = [value for value in values if value is not None and math.isfinite(value)]
     if not known:
@@ -94,11 +91,7 @@ def find_interval(values: Sequence[float | None]) -> Interval | None:
 def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
     """Return a row a method, the smallest mean RFD first; methods without one are last.
 
-    Parameters
-    ----------
-    table : mapping
-    methods : sequence of str
-        The first is the one that the others are compared with.
+    `methods`: the first is the one that the others are compared with.
     """
     seeds = sorted({seed for _, _, seed in table})
     worse = count_worse(table, methods)
@@ -124,13 +117,7 @@ def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
 
 
 def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | None, int]]:
-    """Return on how many trajectories each method has a greater mean RFD than the first one, and of how many.
-
-    Parameters
-    ----------
-    table : mapping
-    methods : sequence of str
-    """
+    """Return on how many trajectories each method has a greater mean RFD than the first one, and of how many."""
     means = {method: _means_by_trajectory(table, method) for method in methods}
     first = means[methods[0]]
     counted: dict[str, tuple[int | None, int]] = {methods[0]: (None, len(first))}

@@ -89,14 +89,7 @@ class _StoppedError(Exception):
 def read_groups(words: Sequence[str]) -> tuple[str, ...]:
     """Return trajectories in the order of `GROUPS`; an unknown one is refused.
 
-    Parameters
-    ----------
-    words : sequence of str
-
-    Raises
-    ------
-    ParameterError
-        In one line, with the nearest name.
+    Raises ParameterError: in one line, with the nearest name.
     """
     if not words:
         raise ParameterError("--trajectories", "", "must name at least one trajectory", "none")
@@ -109,15 +102,7 @@ def read_groups(words: Sequence[str]) -> tuple[str, ...]:
 
 
 def list_trials(groups: Sequence[str], drags: int) -> list[Trial]:
-    """Return the trials of trajectories.
-
-    Parameters
-    ----------
-    groups : sequence of str
-        Among `GROUPS`.
-    drags : int
-        Number of random drags.
-    """
+    """Return the trials of trajectories. `groups`: among `GROUPS`; `drags`: number of random drags."""
     trials: list[Trial] = []
     for group in groups:
         if group == RANDOM:
@@ -130,16 +115,8 @@ def list_trials(groups: Sequence[str], drags: int) -> list[Trial]:
 def place_trial(scene: Scene, trial: Trial) -> tuple[Scene, Callable[[Scene, Stopped], Record | None]]:
     """Return a scene with the trajectory of a trial, and what measures it.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its device and method, and the trajectory of the session.
-    trial : Trial
-
-    Raises
-    ------
-    ParameterError
-        When the bed is too small.
+    `scene`: its device and method, and the trajectory of the session. Raises ParameterError when the bed is
+    too small.
     """
     if trial.group in LIMITS:
         way = LIMITS[trial.group]
@@ -161,15 +138,9 @@ def measure_trial(
 ) -> Record | None:
     """Run a trial, and return its record; None after a stop.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a recorder.
-    stopped : callable, optional
-        Asked after each control period.
-    phase : tuple of float, optional
-        When the judged part starts and ends, s; by default all of it. Then the RFD is that of all rows, and
-        the losses are those of the phase.
+    `scene`: with a recorder; `stopped`: asked after each control period; `phase`: when the judged part starts
+    and ends, s; by default all of it. Then the RFD is that of all rows, and the losses are those of the
+    phase.
     """
     begun = time.thread_time()
     done = run(scene, stopped=stopped)
@@ -195,13 +166,7 @@ def measure_trial(
 def search_limit(scene: Scene, stopped: Stopped = None, *, way: Drag | Lift) -> Record | None:
     """Search the largest speed at which a motion is followed, and return the record; None after a stop.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its device and method.
-    stopped : callable, optional
-        Asked after each speed.
-    way : Drag or Lift
+    `scene`: its device and method; `stopped`: asked after each speed.
     """
 
     def told(_: Follows) -> None:

@@ -47,16 +47,9 @@ def find_nominal(
 ) -> Floats:
     """Return the nominal heights over the bed at rest, shape (n,), m.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a blister.
-    history : mapping
-        ``fingertip`` (t, 7) and ``position`` (n, 2) as in ``history.npz``; all rows count.
-    following : ndarray of int, shape (t,)
-        Number of cells that follow the force.
-    pressed : float, optional
-        How deep the pins press into the fingertip, m.
+    `scene`: with a blister; `history`: ``fingertip`` (t, 7) and ``position`` (n, 2) as in ``history.npz``;
+    all rows count; `following` int (t,), number of cells that follow the force; `pressed`: how deep the pins
+    press into the fingertip, m.
     """
     assert scene.blister is not None
     rest, place, tip = scene.actuator.rest_height, history["position"], history["fingertip"]
@@ -75,15 +68,8 @@ def measure_relief(
 ) -> ReliefError:
     """Return how far the final heights are from the nominal ones.
 
-    Parameters
-    ----------
-    scene : Scene
-    history : mapping
-        The arrays of ``history.npz``.
-    following : ndarray of int, shape (t,)
-        Number of cells that follow the force.
-    pressed : float or None
-        Mean height of what is left behind over the path, the metric ``ridge_offset``, m.
+    `history`: the arrays of ``history.npz``; `following` int (t,), number of cells that follow the force;
+    `pressed`: mean height of what is left behind over the path, the metric ``ridge_offset``, m.
     """
     if scene.blister is None or pressed is None:
         return ReliefError(None, None)
@@ -105,13 +91,7 @@ def measure_relief(
 def measure_reach(scene: Scene, position: Floats, following: NDArray[Any]) -> Floats:
     """Return how far the middles of the cells under the fingertip reach, (t,), m; 0 but for Method II.
 
-    Parameters
-    ----------
-    scene : Scene
-    position : ndarray, shape (n, 2)
-        m.
-    following : ndarray of int, shape (t,)
-        Number of cells that follow the force.
+    `position` (n, 2), m; `following` int (t,), number of cells that follow the force.
     """
     if scene.method != "cell_states":
         return np.zeros(len(following))
@@ -120,14 +100,7 @@ def measure_reach(scene: Scene, position: Floats, following: NDArray[Any]) -> Fl
 
 
 def evaluate_share(blister: Blister, distance: Floats) -> Floats:
-    """Return the profile p(d), 0 outside the blister.
-
-    Parameters
-    ----------
-    blister : Blister
-    distance : ndarray
-        From its middle, m.
-    """
+    """Return the profile p(d), 0 outside the blister. `distance`: from its middle, m."""
     inside = np.maximum(distance, 0.0)
     share: Floats = np.where(inside < blister.radius, np.maximum(blister.evaluate_profile(inside), 0.0), 0.0)
     return share

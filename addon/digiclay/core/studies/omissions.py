@@ -116,11 +116,7 @@ class Fitted:
 def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
     """Give what a scene could do without: parts, physics steps, and cells that creep to their height.
 
-    Parameters
-    ----------
-    scene : Scene
-    budget : float
-        Error of height, m.
+    `budget`: error of height, m.
     """
     simulation = scene.simulation
     steps = simulation.steps
@@ -141,20 +137,9 @@ def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
 def find_omissions(scene: Scene, budget: float, *, told: Callable[[str], None] | None = None) -> Fitted:
     """Leave out of a scene what its results can do without.
 
-    Parameters
-    ----------
-    scene : Scene
-        The full model.
-    budget : float
-        Largest error of any height at any time, m: difference from the full model, and error of
-        the integration.
-    told : callable, optional
-        Told what is tried, before it is.
-
-    Raises
-    ------
-    ParameterError
-        When the budget is not above 0, or below the error of the full scene's own integration.
+    `scene`: the full model; `budget`: largest error of any height at any time, m: difference from the full
+    model, and error of the integration; `told`: told what is tried, before it is. Raises ParameterError when
+    the budget is not above 0, or below the error of the full scene's own integration.
     """
     if not (math.isfinite(budget) and budget > 0.0):
         raise ParameterError("run", "budget", "must be above 0 m", f"{budget:g} m")
@@ -208,12 +193,8 @@ def _with_dead_band(scene: Scene, band: float) -> Scene:
 def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
     """Run two scenes in step.
 
-    Returns
-    -------
-    departure : float
-        Largest difference of a height, m; infinite as soon as it is beyond the budget.
-    work : float
-        Work of the second as a share of the first's.
+    Returns `departure`: largest difference of a height, m; infinite as soon as it is beyond the budget;
+    `work`: work of the second as a share of the first's.
     """
     apart, done = 0.0, np.zeros(2)
     pair = [assemble(full), assemble(less)]

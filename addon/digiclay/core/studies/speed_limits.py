@@ -80,12 +80,7 @@ class Drag(Parameters):
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
         """Return the finger's path, and when it starts and ends to drag, s, for a surface at `rest`, m.
 
-        Parameters
-        ----------
-        speed : float
-            Of the drag, m/s.
-        rest : float
-            Height of the surface, m.
+        `speed`: of the drag, m/s; `rest`: height of the surface, m.
         """
         left, right, down, level = (
             -0.5 * self.length,
@@ -117,12 +112,7 @@ class Lift(Parameters):
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
         """Return the finger's path, and when it starts and ends to lift, s, for a surface at `rest`, m.
 
-        Parameters
-        ----------
-        speed : float
-            The greatest on the way, m/s.
-        rest : float
-            Height of the surface, m.
+        `speed`: the greatest on the way, m/s; `rest`: height of the surface, m.
         """
         down, start = rest - self.press, 2.0
         # A cubic that starts and ends at rest is 1.5 times as fast in the middle as on the whole.
@@ -145,13 +135,7 @@ def _through(points: tuple[tuple[float, float, float], ...], interpolation: str)
 def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result]:
     """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its device and method; its trajectory is left aside.
-    way : Drag or Lift
-    speed : float
-        m/s.
+    `scene`: its device and method; its trajectory is left aside; `speed`, m/s.
     """
     placed, start, end = place_way(scene, way, speed)
     done = run(placed)
@@ -161,18 +145,8 @@ def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result
 def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, float, float]:
     """Return a scene with a drag or a lift as its trajectory, and when the judged phase starts and ends, s.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its device and method; its trajectory is left aside.
-    way : Drag or Lift
-    speed : float
-        m/s.
-
-    Raises
-    ------
-    ParameterError
-        When the bed is smaller than the drag.
+    `scene`: its device and method; its trajectory is left aside; `speed`, m/s. Raises ParameterError when the
+    bed is smaller than the drag.
     """
     _refuse_small(scene, way)
     path, start, end = way.path(speed, scene.actuator.rest_height)
@@ -181,16 +155,7 @@ def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, floa
 
 
 def judge(done: Result, start: float, end: float, speed: float) -> Follows:
-    """Judge a phase of a run.
-
-    Parameters
-    ----------
-    done : Result
-    start, end : float
-        s.
-    speed : float
-        That it was run with, m/s.
-    """
+    """Judge a phase of a run. `start`, `end`, s; `speed`: that it was run with, m/s."""
     part = select_rows(done.history, start, end)
     sums, total = sum_cells(part), part["total_force"]
     ends = find_contact_ends(done.history["time"], done.history["total_force"])
@@ -221,19 +186,8 @@ def _refuse_small(scene: Scene, way: Drag | Lift) -> None:
 def bisect(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
     """Return the largest value known to hold, to within a resolution, by bisection.
 
-    Parameters
-    ----------
-    holds : callable
-        Whether a value holds; up to some value it does, beyond it does not.
-    low, high : float
-        Where to look.
-    resolution : float
-        Above 0.
-
-    Returns
-    -------
-    float or None
-        A value that held; `high` if that does; None if `low` does not.
+    `holds`: whether a value holds; up to some value it does, beyond it does not; `low`, `high`: where to
+    look; `resolution`: above 0. Returns a value that held; `high` if that does; None if `low` does not.
     """
     if not holds(low):
         return None
@@ -257,16 +211,8 @@ def find_largest_speed(
 ) -> float | None:
     """Return the largest speed, m/s, at which a finger is followed, by bisection; see `bisect`.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its device and method; its trajectory is left aside.
-    way : Drag or Lift
-    criterion : Criterion
-    low, high, resolution : float
-        m/s.
-    told : callable, optional
-        Told of every speed tried.
+    `scene`: its device and method; its trajectory is left aside; `low`, `high`, `resolution`, m/s; `told`:
+    told of every speed tried.
     """
 
     def holds(speed: float) -> bool:

@@ -46,15 +46,7 @@ class Folder:
         return records
 
     def keep(self, point: Point, keys: Sequence[str], record: Record) -> None:
-        """Write the file of a finished point, whole or not at all.
-
-        Parameters
-        ----------
-        point : Point
-        keys : sequence of str
-            The varied parameters.
-        record : Record
-        """
+        """Write the file of a finished point, whole or not at all. `keys`: the varied parameters."""
         values = dict(zip(keys, point.words, strict=True))
         write_whole(self.path / POINTS / f"{point.index:06d}.json", format_json({"values": values, **record}))
 
@@ -67,15 +59,8 @@ class Folder:
     ) -> None:
         """Write the files of the finished points of a bundle, and add their records to those of all.
 
-        Parameters
-        ----------
-        bundle : sequence of Point
-        found : sequence of Record or None
-            None for a point that was stopped.
-        keys : sequence of str
-            The varied parameters.
-        records : dict
-            Of all points that are done, by their index; what is there stays.
+        `found`: none for a point that was stopped; `keys`: the varied parameters; `records`: of all points
+        that are done, by their index; what is there stays.
         """
         for point, record in zip(bundle, found, strict=True):
             if record is not None and point.index not in records:
@@ -86,12 +71,7 @@ class Folder:
 def select_done(records: Mapping[int, Record], *, errors: bool) -> dict[int, Record]:
     """Return the records of points that need not be run again.
 
-    Parameters
-    ----------
-    records : mapping of int to Record
-        That are kept.
-    errors : bool
-        Whether errors are asked for: a point without them is not done.
+    `records`: that are kept; `errors`: whether errors are asked for: a point without them is not done.
     """
     return {
         index: record
@@ -107,11 +87,7 @@ def find_unfinished(
 
     Without the others of its batch the results of a point would be others in the last bit.
 
-    Parameters
-    ----------
-    bundles : iterable of sequence of Point
-    records : mapping of int to Record
-        Of the points that are done.
+    `records`: of the points that are done.
     """
     return [bundle for bundle in bundles if any(point.index not in records for point in bundle)]
 
@@ -141,19 +117,8 @@ def hash_points(points: Sequence[Point]) -> str:
 def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str) -> Iterator[Folder]:
     """Make a sweep's folder, or go on with one that holds the same sweep; nobody else works in it meanwhile.
 
-    Parameters
-    ----------
-    path : Path
-    points : sequence of Point
-        All of the sweep.
-    axes : sequence of Axis
-    version : str
-        Of digiclay: another one may come to other figures.
-
-    Raises
-    ------
-    OutputError
-        When it holds anything else, cannot be written, or another process works in it.
+    `points`: all of the sweep; `version`: of digiclay: another one may come to other figures. Raises
+    OutputError when it holds anything else, cannot be written, or another process works in it.
     """
     plan = {
         "digiclay": version,
@@ -204,13 +169,7 @@ def _is_close(one: float | None, other: float | None) -> bool:
 def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) -> NDArray[np.float64]:
     """Return a figure at all points, one dimension an axis; NaN where there is none.
 
-    Parameters
-    ----------
-    records : mapping of int to Record
-        By the index of their point.
-    axes : sequence of Axis
-    name : str
-        A key of `evaluation.FIGURES`.
+    `records`: by the index of their point; `name`: a key of `evaluation.FIGURES`.
     """
     shape = [len(one.words) for one in axes]
     values = np.full(int(np.prod(shape)), np.nan)
@@ -228,16 +187,8 @@ def format_table(
 ) -> str:
     """Return points as CSV: the varied parameters, the metrics, and the error; SI units, in the header.
 
-    Parameters
-    ----------
-    varied : sequence of (str, str)
-        Key and unit of each parameter.
-    rows : iterable of sequence
-        Their values at each point.
-    records : iterable of Record
-        Of each point.
-    names : sequence of str
-        Keys of `evaluation.FIGURES`.
+    `varied` (str, str), key and unit of each parameter; `rows`: their values at each point; `records`: of
+    each point; `names`: keys of `evaluation.FIGURES`.
     """
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")

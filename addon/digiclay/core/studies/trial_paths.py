@@ -21,14 +21,7 @@ DRAG_SEED, TILT = 1, 0.37
 
 
 def with_path(scene: Scene, poses: Sequence[Pose], interpolation: str = "smooth") -> Scene:
-    """Return a scene with a path of its fingertip, as long as that path.
-
-    Parameters
-    ----------
-    scene : Scene
-    poses : sequence of Pose
-    interpolation : {"smooth", "linear"}
-    """
+    """Return a scene with a path of its fingertip, as long as that path."""
     rest = scene.actuator.rest_height
     points = tuple(
         Waypoint(
@@ -125,12 +118,7 @@ def list_paths() -> dict[str, tuple[str, list[Pose]]]:
 
 
 def draw_drags(count: int) -> list[tuple[str, list[Pose]]]:
-    """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, with a fingertip of any turn.
-
-    Parameters
-    ----------
-    count : int
-    """
+    """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, with a fingertip of any turn."""
     random, drags = np.random.default_rng(DRAG_SEED), []
     for number in range(count):
         height, speed = random.uniform(-8.0, 15.0), random.uniform(5.0, 16.0)

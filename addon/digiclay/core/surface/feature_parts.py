@@ -55,11 +55,7 @@ class FeaturePart:
 def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
     """Return the parts of a ridge: itself, and the mounds on it.
 
-    Parameters
-    ----------
-    ridge : Ridge
-    least : float
-        A mound rises above the ridge by this at least, m.
+    `least`: a mound rises above the ridge by this at least, m.
     """
     crests, cores = [], []
     mounds: list[tuple[Floats, float]] = []
@@ -88,11 +84,7 @@ def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
 def measure_distances(places: Floats, every: tuple[FeaturePart, ...] | list[FeaturePart]) -> Floats:
     """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k).
 
-    Parameters
-    ----------
-    places : ndarray (k, 2)
-        m.
-    every : sequence of Part
+    `places` (k, 2), m.
     """
     found = np.empty((len(every), len(places)))
     for number, part in enumerate(every):

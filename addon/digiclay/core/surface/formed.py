@@ -54,18 +54,8 @@ class Formed:
     ) -> Formed:
         """Check and take the arrays.
 
-        Parameters
-        ----------
-        position : array_like (n, 2)
-            Axes of the pins, row by row, m.
-        height : array_like (n,)
-            Pin tops, m.
-        former : array_like (n,) or float
-            The same before the surface was formed, m.
-        force : array_like (n,) or float
-            N.
-        mode : array_like of int (n,) or int
-            Codes of `modes.Mode`.
+        `position` (n, 2), axes of the pins, row by row, m; `height` (n,), pin tops, m; `former` (n,), the
+        same before the surface was formed, m; `force` (n,), N; `mode` int (n,), codes of `modes.Mode`.
         """
         rows, columns = find_grid_shape(position)
         place, top = check_heights(position, height, rows, columns)
@@ -112,21 +102,9 @@ class Formed:
 def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
     """Return one row of a history as a formed surface.
 
-    Parameters
-    ----------
-    history : mapping of arrays
-        `position`, `height`, `force` and `mode` as in ``history.npz``.
-    row : int
-        Negative rows count from the last one.
-    former : int or float
-        The row that tells what was before (an int), or one height of all pins, m (a float).
-
-    Raises
-    ------
-    OutputError
-        When the history has no such row.
-    ParameterError
-        As `Formed`.
+    `history`: `position`, `height`, `force` and `mode` as in ``history.npz``; `row`: negative rows count from
+    the last one; `former`: the row that tells what was before (an int), or one height of all pins, m (a
+    float). Raises OutputError when the history has no such row. Raises ParameterError as `Formed`.
     """
     count = len(history["height"])
     for name, wanted in (("row", row), ("former", former)):

@@ -20,18 +20,9 @@ def relax_membrane(formed: Formed, position: Floats, start: Floats, parts: int, 
 
     Finite elements on the triangles of the skin; the points on a pin's end keep its height.
 
-    Parameters
-    ----------
-    formed : Formed
-        The pins.
-    position : ndarray (rows, columns, 2)
-        The skin's points, m.
-    start : ndarray (rows, columns)
-        Heights to begin with, m, those of the pins at the pins.
-    parts : int
-        Points a pitch.
-    cap : float
-        Radius of a pin's flat end, m.
+    `formed`: the pins; `position` (rows, columns, 2), the skin's points, m; `start` (rows, columns), heights
+    to begin with, m, those of the pins at the pins; `parts`: points a pitch; `cap`: radius of a pin's flat
+    end, m.
     """
     flat = position.reshape(-1, 2)
     height, free = _laid(formed, position, start, parts, cap)

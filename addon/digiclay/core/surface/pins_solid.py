@@ -75,20 +75,9 @@ def make_pins_solid(
 ) -> tuple[Floats, Indices, Codes]:
     """Return the stepped bed, closed.
 
-    Parameters
-    ----------
-    formed : Formed
-    base, base_thickness : float
-        As for `skin_mesh.make_solid`.
-
-    Returns
-    -------
-    vertices : ndarray (v, 3)
-        m; first the middle of each pin's top in their order, to 0.1 µm.
-    faces : ndarray of int (f, 3)
-        Counter-clockwise seen from outside.
-    pin : ndarray of int (f,)
-        Whose top, wall or underside a face is.
+    `base`, `base_thickness`: as for `skin_mesh.make_solid`. Returns `vertices` (v, 3), m; first the middle of
+    each pin's top in their order, to 0.1 µm; `faces` int (f, 3), Counter-clockwise seen from outside; `pin`
+    int (f,), whose top, wall or underside a face is.
     """
     level = find_base_level(formed.height, base=base, base_thickness=base_thickness)
     steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)

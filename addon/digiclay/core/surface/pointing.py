@@ -24,19 +24,10 @@ def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats
     Blender's own function takes the difference of two places near the eye in single precision,
     and is off by up to a pixel.
 
-    Parameters
-    ----------
-    lens : ndarray (4, 4)
-        From the camera's space to the picture's, with perspective or without.
-    seen : ndarray (4, 4)
-        From the wanted space to the camera's, which looks along -z.
-    screen : ndarray (2,)
-        The place: -1 to 1 from left to right and from below to above.
-
-    Returns
-    -------
-    origin, direction : ndarray (3,)
-        In the wanted space and its unit; the direction has length 1.
+    `lens` (4, 4), from the camera's space to the picture's, with perspective or without; `seen` (4, 4), from
+    the wanted space to the camera's, which looks along -z; `screen` (2,), the place: -1 to 1 from left to
+    right and from below to above. Returns `origin`, `direction` (3,), in the wanted space and its unit; the
+    direction has length 1.
     """
     across = np.array([lens[0, 0], lens[1, 1]])
     if lens[3, 2]:
@@ -51,19 +42,9 @@ def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats
 def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:
     """Return where a ray first meets the pins, taken as flat tops that leave no gaps.
 
-    Parameters
-    ----------
-    grid : Grid
-    height : ndarray (n,)
-        Heights of the pin tops, m.
-    origin, direction : ndarray (3,)
-        Of the ray, in the bed's space, m; the direction may have any length.
-
-    Returns
-    -------
-    ndarray (3,) or None
-        A point on a top, exact, or on the side of a pin, to a quarter of a pitch; None when the
-        ray passes by the bed or is no ray at all.
+    `height` (n,), heights of the pin tops, m; `origin`, `direction` (3,), of the ray, in the bed's space, m;
+    the direction may have any length. Returns (3,), a point on a top, exact, or on the side of a pin, to a
+    quarter of a pitch; None when the ray passes by the bed or is no ray at all.
     """
     if not (np.isfinite(origin).all() and np.isfinite(direction).all() and direction.any()):
         return None
@@ -109,13 +90,7 @@ def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tup
 def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
     """Return the mean height of the pins within a radius of a place, m; without any, that of the nearest.
 
-    Parameters
-    ----------
-    grid : Grid
-    height : ndarray (n,)
-        Heights of the pin tops, m.
-    x, y, radius : float
-        m.
+    `height` (n,), heights of the pin tops, m; `x`, `y`, `radius`, m.
     """
     cells = grid.disc(x, y, radius)
     if not cells.size:
@@ -128,20 +103,9 @@ def find_contact_outline(finger: Fingertip, turn: Floats, depth: float, count: i
 
     It is where the finger touches a plane it is pressed into so deep.
 
-    Parameters
-    ----------
-    finger : Fingertip
-    turn : ndarray (4,)
-        Its orientation, quaternion w, x, y, z.
-    depth : float
-        m; beyond the middle of the finger its widest section stays the outline.
-    count : int, optional
-        Number of points.
-
-    Returns
-    -------
-    ndarray (count, 2)
-        Counter-clockwise, m; the lowest point is the origin.
+    `turn` (4,), its orientation, quaternion w, x, y, z; `depth`: m; beyond the middle of the finger its
+    widest section stays the outline; `count`: number of points. Returns (count, 2), Counter-clockwise, m; the
+    lowest point is the origin.
     """
     rotation = make_matrices(np.asarray(turn, np.float64)[None])[0]
     axes = np.array([finger.length, finger.width, finger.height])

@@ -28,12 +28,8 @@ AHEAD = 1.25
 def measure_half_width(beside: Pins, on_bed: Flags) -> int:
     """Return how many rings of pins can be taken off a feature, one at least; arguments as `find_skeleton`.
 
-    Parameters
-    ----------
-    beside : ndarray of int (k, 8 or 6)
-        Neighbors within the feature; -1 where there is none.
-    on_bed : ndarray of bool (k, 8 or 6)
-        Where the bed goes on.
+    `beside` int (k, 8 or 6), neighbors within the feature; -1 where there is none; `on_bed` bool (k, 8 or 6),
+    where the bed goes on.
     """
     inner, count = np.ones(len(beside), bool), 0
     while inner.any():
@@ -48,15 +44,8 @@ def measure_half_width(beside: Pins, on_bed: Flags) -> int:
 def average_neighbors(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
     """Return heights averaged with those of the neighbors, the ground's included, some times.
 
-    Parameters
-    ----------
-    beside : ndarray of int (k, 8 or 6)
-        Neighbors within the feature; -1 where there is none.
-    on_bed : ndarray of bool (k, 8 or 6)
-        Where the bed goes on.
-    off : ndarray (k,)
-        Heights over the ground, m.
-    times : int
+    `beside` int (k, 8 or 6), neighbors within the feature; -1 where there is none; `on_bed` bool (k, 8 or 6),
+    where the bed goes on; `off` (k,), heights over the ground, m.
     """
     count = on_bed.sum(axis=1)
     for _ in range(times):
@@ -68,19 +57,9 @@ def average_neighbors(beside: Pins, on_bed: Flags, off: Floats, times: int) -> F
 def find_skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
     """Return the pins along the top of a feature.
 
-    Parameters
-    ----------
-    beside : ndarray of int (k, 8 or 6)
-        Neighbors within the feature, whose pins are numbered from 0; -1 where there is none.
-    on_bed : ndarray of bool (k, 8 or 6)
-        Where the bed goes on, within the feature or outside it.
-    off : ndarray (k,)
-        How far each pin is off where it was, m, positive.
-
-    Returns
-    -------
-    ndarray of int
-        Ascending; one at least.
+    `beside` int (k, 8 or 6), neighbors within the feature, whose pins are numbered from 0; -1 where there is
+    none; `on_bed` bool (k, 8 or 6), where the bed goes on, within the feature or outside it; `off` (k,), how
+    far each pin is off where it was, m, positive. Returns ascending; one at least.
     """
     # A flat top gets its crest in the middle when it is rounded over its own half width.
     top = average_neighbors(beside, on_bed, off, measure_half_width(beside, on_bed))

@@ -83,15 +83,8 @@ class SurfaceGrid:
 def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceGrid:
     """Return the skin over formed pins.
 
-    Parameters
-    ----------
-    formed : Formed
-    skin_name : str
-        A key of `skins.SKINS`.
-    parts : int
-        Points a pitch; with 1 every skin is the triangles between the pins.
-    cap : float
-        Radius of a pin's flat end, m; of use to the membrane only.
+    `skin_name`: a key of `skins.SKINS`; `parts`: points a pitch; with 1 every skin is the triangles between
+    the pins; `cap`: radius of a pin's flat end, m; of use to the membrane only.
     """
     position = place_points(formed, parts)
     rows, columns = position.shape[:2]

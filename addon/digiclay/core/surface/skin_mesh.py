@@ -37,19 +37,8 @@ BAND = 1 << 16
 def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
     """Return the rows and columns of pins that are ordered row by row.
 
-    Parameters
-    ----------
-    position : array_like, shape (n, 2)
-        Where the pins stand, m.
-
-    Returns
-    -------
-    rows, columns : int
-
-    Raises
-    ------
-    ParameterError
-        When the pins do not fill whole rows.
+    `position` (n, 2), where the pins stand, m. Returns `rows`, `columns`. Raises ParameterError when the pins
+    do not fill whole rows.
     """
     place = _pins(position)
     if not len(place):
@@ -65,25 +54,10 @@ def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
 def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Indices:
     """Return the triangles over the pin tops.
 
-    Parameters
-    ----------
-    position : array_like, shape (n, 2)
-        Where the pins stand, m; ordered row by row.
-    height : array_like, shape (n,)
-        Heights of the pin tops, m.
-    rows, columns : int
-        Pins along y and x, two of each at least; n = rows * columns.
-
-    Returns
-    -------
-    ndarray of int, shape (2 (rows - 1) (columns - 1), 3)
-        Indices of pins, counter-clockwise seen from above.
-
-    Raises
-    ------
-    ParameterError
-        On a single row or column, arrays that do not fit, numbers that are not finite, or
-        pins out of order.
+    `position` (n, 2), where the pins stand, m; ordered row by row; `height` (n,), heights of the pin tops, m;
+    `rows`, `columns`: pins along y and x, two of each at least; n = rows * columns. Returns int (rows - 1) or
+    (columns - 1), indices of pins, counter-clockwise seen from above. Raises ParameterError: on a single row
+    or column, arrays that do not fit, numbers that are not finite, or pins out of order.
     """
     place, top = check_heights(position, height, rows, columns)
     index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
@@ -125,27 +99,12 @@ def make_solid(
     the side walls stand upright. It keeps the bed's coordinates: the origin is the middle
     of the bed's floor.
 
-    Parameters
-    ----------
-    position, height, rows, columns
-        As for `make_skin`.
-    base : float, optional
-        Height of the flat base, m; 0 is the bed's floor. By default `base_thickness` below the
-        lowest pin top.
-    base_thickness : float
-        Material under the lowest pin top, m; not used when `base` is given.
-
-    Returns
-    -------
-    vertices : ndarray, shape (2 n, 3)
-        m; the first n are the pin tops in their order, the others the points below them.
-    faces : ndarray of int, shape (4 (rows - 1) (columns - 1) + 4 (rows + columns - 2), 3)
-        Counter-clockwise seen from outside: first the skin, then the base, then the walls.
-
-    Raises
-    ------
-    ParameterError
-        As `make_skin`; also when the base is not below every pin top.
+    `position`, `height`, `rows`, `columns`: as for `make_skin`; `base`: height of the flat base, m; 0 is the
+    bed's floor. By default `base_thickness` below the lowest pin top; `base_thickness`: material under the
+    lowest pin top, m; not used when `base` is given. Returns `vertices` (2 n, 3), m; the first n are the pin
+    tops in their order, the others the points below them; `faces` int (rows - 1) or (columns - 1) or (rows +
+    columns - 2), Counter-clockwise seen from outside: first the skin, then the base, then the walls. Raises
+    ParameterError as `make_skin`; also when the base is not below every pin top.
     """
     place, top = check_heights(position, height, rows, columns)
     level = find_base_level(top, base=base, base_thickness=base_thickness)
@@ -170,19 +129,8 @@ def find_base_level(
 ) -> float:
     """Return the height of the flat base, m: `base`, or `base_thickness` below the lowest pin top.
 
-    Parameters
-    ----------
-    height : array_like
-        Pin tops, m.
-    base : float, optional
-        m; by default `base_thickness` counts.
-    base_thickness : float
-        m.
-
-    Raises
-    ------
-    ParameterError
-        When the base would not be below every pin top.
+    `height`: pin tops, m; `base`: m; by default `base_thickness` counts; `base_thickness`, m. Raises
+    ParameterError when the base would not be below every pin top.
     """
     lowest = float(np.min(height))
     if base is None:
@@ -212,19 +160,8 @@ def check_heights(
 ) -> tuple[Floats, Floats]:
     """Return positions and one value a pin as arrays, or refuse what cannot carry a skin.
 
-    Parameters
-    ----------
-    position : array_like (n, 2)
-        Axes of the pins, row by row, m.
-    height : array_like (n,)
-        One value a pin.
-    rows, columns : int
-    name : str
-        What the message calls the values.
-
-    Raises
-    ------
-    ParameterError
+    `position` (n, 2), axes of the pins, row by row, m; `height` (n,), one value a pin; `name`: what the
+    message calls the values. Raises ParameterError.
     """
     if rows < 2 or columns < 2:
         raise ParameterError(

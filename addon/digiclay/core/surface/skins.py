@@ -34,11 +34,7 @@ SKINS: dict[str, str] = {
 def place_points(formed: Formed, parts: int) -> Floats:
     """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points a pitch.
 
-    Parameters
-    ----------
-    formed : Formed
-    parts : int
-        Points of the skin in a pitch.
+    `parts`: points of the skin in a pitch.
     """
     grid = formed.position.reshape(formed.rows, formed.columns, 2)
     across = _linear(grid, parts)
@@ -49,18 +45,8 @@ def place_points(formed: Formed, parts: int) -> Floats:
 def interpolate_skin(formed: Formed, height: Floats, skin: str, parts: int, cap: float) -> Floats:
     """Return the heights of a skin over its points, m, row by row.
 
-    Parameters
-    ----------
-    formed : Formed
-        The pins.
-    height : ndarray (n,)
-        Their heights to cover, m.
-    skin : str
-        A key of `SKINS`.
-    parts : int
-        Points a pitch.
-    cap : float
-        Radius of a pin's flat end, m; of use to the membrane only.
+    `formed`: the pins; `height` (n,), their heights to cover, m; `skin`: a key of `SKINS`; `parts`: points a
+    pitch; `cap`: radius of a pin's flat end, m; of use to the membrane only.
     """
     if parts == 1:
         return height
@@ -78,11 +64,7 @@ def interpolate_skin(formed: Formed, height: Floats, skin: str, parts: int, cap:
 def find_nearest_pin(formed: Formed, parts: int) -> NDArray[np.int32]:
     """Return the pin whose row and column each point of a skin is nearest to, row by row.
 
-    Parameters
-    ----------
-    formed : Formed
-    parts : int
-        Points of the skin in a pitch.
+    `parts`: points of the skin in a pitch.
     """
     row, column = (np.arange((count - 1) * parts + 1) for count in (formed.rows, formed.columns))
     nearest = ((row + parts // 2) // parts)[:, None] * formed.columns + (column + parts // 2) // parts
