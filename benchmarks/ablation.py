@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.finger_estimate import Estimate, FingerFilter
 from digiclay.core.control.flow_servo import FlowServo
-from digiclay.core.control.hybrid_controller import HybridControl
-from digiclay.core.control.lead_profile import LeadProfile
+from digiclay.core.control.hybrid import HybridControl
+from digiclay.core.control.led_blister import LeadProfile
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load

@@ -13,7 +13,7 @@ from typing import Any
 from digiclay.commands.cluster import Cluster, open_cluster
 from digiclay.commands.cluster_task import evaluate_on_worker
 from digiclay.commands.executors import finish
-from digiclay.commands.refusals import refuse_without
+from digiclay.commands.stop import refuse_without
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import evaluate_bundle, make_bundles

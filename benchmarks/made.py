@@ -3,19 +3,291 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from digiclay.commands.refusals import refuse_unwritable, refuse_without_blender
-from digiclay.commands.tables import table
+import numpy as np
+from digiclay.commands.progress import table
+from digiclay.commands.stop import refuse_unwritable, refuse_without_blender
+from digiclay.compat import scratch
+from digiclay.core.base.arrays import Floats
+from digiclay.core.base.errors import OutputError
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.render_settings import Still
+from digiclay.device import form, view
+from digiclay.device.instant import CLEARANCE, Instant
+from digiclay.live.recorded_strokes import PointerStroke, play_strokes, read_strokes
+from digiclay.live.sculpting import begin_session
+from digiclay.pictures import stage
+from digiclay.pictures.still import add_picture_scene, apply_style, render_picture
 from digiclay.settings.beds import BEDS
+from digiclay.settings.devices import make_scene
+from numpy.typing import NDArray
 
-from .intended_reliefs import RELIEFS
 from .report import add_kind, kept, made_with, progress
 
-if TYPE_CHECKING:  # Blender is imported when it is needed
-    from .made_things import Made
+Relief = Callable[[Floats, Floats], Floats]
+Corners = Sequence[tuple[float, float]]
+
+#: Letter A without serifs: outlines of its left leg, its right leg and its bar, and its depth.
+LETTER_A: tuple[Corners, ...] = (
+    ((-46.0, -53.0), (-34.0, -53.0), (6.0, 53.0), (-6.0, 53.0)),
+    ((46.0, -53.0), (34.0, -53.0), (-6.0, 53.0), (6.0, 53.0)),
+    ((-28.0, -17.5), (28.0, -17.5), (28.0, -6.5), (-28.0, -6.5)),
+)
+LETTER_DEPTH = 5.0
+#: Half of a torus: radius of its center line, and of its tube.
+RING, TUBE = 45.0, 8.0
+#: Paraboloid of a bowl: radius and depth; its rim: radius, height and half its breadth.
+BOWL, RIM = (44.0, 12.0), (48.0, 5.0, 10.0)
+#: Leaf between two arcs from tip to tip, each so far from the midrib at most; half the breadth of its lines.
+TIPS, BULGE, LINE = ((0.0, -55.0), (0.0, 60.0)), 34.0, 6.0
+#: Heights of outline and midrib, and of the veins; the midrib goes on as a stalk to here.
+OUTLINE_HEIGHT, VEIN_HEIGHT, STALK = 5.0, 3.0, -70.0
+#: Beginnings and ends of the veins on the right.
+VEINS = (((0.0, -30.0), (24.0, -5.0)), ((0.0, -5.0), (24.0, 20.0)), ((0.0, 20.0), (18.0, 40.0)))
+
+
+def find_relief(name: str, x: Floats, y: Floats) -> Floats:
+    """Return the intended heights above rest at some places, m. `name`: one of `RELIEFS`; `x`, `y`, m."""
+    return 1e-3 * RELIEFS[name](1e3 * x, 1e3 * y)
+
+
+def _letter_a(x: Floats, y: Floats) -> Floats:
+    """Cut to one depth within the outlines."""
+    inside = np.any([_lies_inside(part, x, y) for part in LETTER_A], axis=0)
+    return np.where(inside, -LETTER_DEPTH, 0.0)
+
+
+def _lies_inside(corners: Corners, x: Floats, y: Floats) -> NDArray[np.bool_]:
+    """Return whether places are inside a convex polygon."""
+    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
+    turns = [(bx - ax) * (y - ay) - (by - ay) * (x - ax) for (ax, ay), (bx, by) in sides]
+    return np.asarray(np.all(np.array(turns) >= 0.0, axis=0) | np.all(np.array(turns) <= 0.0, axis=0))
+
+
+def _ring(x: Floats, y: Floats) -> Floats:
+    """Upper half of a torus."""
+    return np.sqrt(np.clip(TUBE**2 - (np.hypot(x, y) - RING) ** 2, 0.0, None))
+
+
+def _crater(x: Floats, y: Floats) -> Floats:
+    """Bowl with a round rim."""
+    far, (radius, depth), (at, height, breadth) = np.hypot(x, y), BOWL, RIM
+    bowl = -depth * np.clip(1.0 - (far / radius) ** 2, 0.0, None)
+    return bowl + height * _bump((far - at) / breadth)
+
+
+def _leaf(x: Floats, y: Floats) -> Floats:
+    """Outline, midrib and veins as round lines."""
+    side = np.abs(x)
+    (_, foot), (_, top) = TIPS
+    half, middle = (top - foot) / 2.0, (top + foot) / 2.0
+    radius = (half**2 + BULGE**2) / (2.0 * BULGE)
+    arc = np.abs(np.hypot(side + radius - BULGE, y - middle) - radius)
+    # Beyond the tips the nearest place of the arc is a tip.
+    tips = np.minimum(np.hypot(side, y - foot), np.hypot(side, y - top))
+    arc = np.where((y >= foot) & (y <= top), arc, tips)
+    lines = [OUTLINE_HEIGHT * _bump(arc / LINE)]
+    lines.append(OUTLINE_HEIGHT * _bump(_find_distance((0.0, STALK), TIPS[1], side, y) / LINE))
+    lines += [VEIN_HEIGHT * _bump(_find_distance(*vein, side, y) / LINE) for vein in VEINS]
+    return np.asarray(np.max(lines, axis=0))
+
+
+def _face(x: Floats, y: Floats) -> Floats:
+    """Half an ellipsoid with eyes, nose and mouth."""
+    side = np.abs(x)
+    head = 10.0 * np.sqrt(np.clip(1.0 - (x / 46.0) ** 2 - (y / 56.0) ** 2, 0.0, None))
+    eyes = -5.0 * _bump(np.hypot((side - 17.0) / 10.0, (y - 14.0) / 7.0))
+    nose = 6.0 * _bump(_find_distance((0.0, 12.0), (0.0, -8.0), x, y) / 6.0)
+    smile = np.hypot(x, y + 2.0) - 26.0
+    mouth = -4.0 * _bump(np.hypot(smile / 5.0, np.clip(side - 14.0, 0.0, None) / 5.0)) * (y < -2.0)
+    return np.asarray(head + eyes + nose + mouth)
+
+
+def _bump(far: Floats) -> Floats:
+    """Return a round hill of height 1 that ends at the distance 1."""
+    return np.asarray(0.5 + 0.5 * np.cos(np.pi * np.minimum(np.abs(far), 1.0)))
+
+
+def _find_distance(start: tuple[float, float], end: tuple[float, float], x: Floats, y: Floats) -> Floats:
+    """Return how far places are from a line between two places."""
+    along, across = end[0] - start[0], end[1] - start[1]
+    share = ((x - start[0]) * along + (y - start[1]) * across) / (along**2 + across**2)
+    share = np.clip(share, 0.0, 1.0)
+    return np.hypot(x - start[0] - share * along, y - start[1] - share * across)
+
+
+RELIEFS: dict[str, Relief] = {
+    "letter_a": _letter_a, "ring": _ring, "crater": _crater, "leaf": _leaf, "face": _face,
+}  # fmt: skip
+
+
+#: Folder of the recorded strokes; and the things, each with a file there and an intended relief.
+STROKES = Path(__file__).parent / "strokes"
+THINGS = tuple(RELIEFS)
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """Thing made on a bed.
+
+    Attributes
+    ----------
+    name : str
+        One of `THINGS`.
+    title : str
+        For people.
+    bed, own_bed : str
+        One of `BEDS`: where it was made, and where its strokes were drawn.
+    scene : Scene
+    formed, intended : ndarray (n,)
+        Heights of the pins above rest, m.
+    strokes : int
+    simulated, spent : float
+        Duration of the session, and processor time for it, s.
+    """
+
+    name: str
+    title: str
+    bed: str
+    own_bed: str
+    scene: Scene
+    formed: Floats
+    intended: Floats
+    strokes: int
+    simulated: float
+    spent: float
+
+    @property
+    def correlation(self) -> float:
+        """Pearson's coefficient of formed and intended heights over all pins."""
+        return float(np.corrcoef(self.formed, self.intended)[0, 1])
+
+    @property
+    def slope(self) -> float:
+        """Slope of the regression of formed on intended heights: 1 when nothing is scaled."""
+        formed, intended = self.formed - self.formed.mean(), self.intended - self.intended.mean()
+        return float(formed @ intended / (intended @ intended))
+
+    @property
+    def error(self) -> float:
+        """Root of the mean square of formed less intended heights, m."""
+        return float(np.sqrt(np.mean((self.formed - self.intended) ** 2)))
+
+
+def make(name: str, bed: str | None = None) -> Made:
+    """Play the recorded strokes of a thing on a bed at rest.
+
+    `name`: one of `THINGS`; `bed`: one of `BEDS`; that of the file when left out. Places and sizes are scaled
+    with its width. Raises DigiclayError when the file cannot be read, or a stroke not be formed.
+    """
+    recorded = read_strokes(STROKES / f"{name}.toml")
+    own, other = BEDS[recorded.bed], BEDS[bed or recorded.bed]
+    share = other.columns * other.pitch / (own.columns * own.pitch)
+    layout = Layout(rows=other.rows, columns=other.columns, pitch=other.pitch)
+    scene = make_scene("paper", layout, "virtual_master", other.share)
+    above = np.array([0.0, 0.0, scene.actuator.rest_height + CLEARANCE, *LEVEL])
+    session, _ = begin_session(1, recorded.name, scene, above)
+    started = time.process_time()
+    *_, session = play_strokes(session, rescale(recorded.strokes, share))
+    spent = time.process_time() - started
+    place = session.system.grid.positions.T / share
+    formed = session.state.row(0) - scene.actuator.rest_height
+    return Made(
+        name, recorded.name, bed or recorded.bed, recorded.bed, scene, formed,
+        find_relief(name, place[0], place[1]), len(recorded.strokes),
+        session.state.period * session.system.period, spent,
+    )  # fmt: skip
+
+
+def rescale(strokes: tuple[PointerStroke, ...], share: float) -> tuple[PointerStroke, ...]:
+    """Return strokes on a bed of another width; depths and heights stay."""
+    return tuple(
+        replace(one, moves=tuple((at, share * x, share * y) for at, x, y in one.moves)) for one in strokes
+    )
+
+
+#: Size of one of the two pictures, pixels, and samples a pixel.
+WIDTH, HEIGHT, SAMPLES = 640, 500, 6
+#: Turn of the bed, so that its lower edge is in front, rad; what is kept free around it, by sides.
+TURN, MARGINS = radians(28.0), (0.04, 0.04, 0.05, 0.12)
+#: How far the housing ends below the lowest pin, m.
+CLEAR = 1e-3
+#: Size of the letters, pixels, their distance from the corner, and their color.
+LETTERS, INSET, INK = 20, (16, 12), (26, 31, 38)
+
+
+def draw_made(made: Made, out: Path) -> Path:
+    """Draw a thing as it was formed and as it was intended, and return the picture's path.
+
+    `out`: the JPEG. Raises OutputError when it cannot be written, or Pillow is missing.
+    """
+    words = (
+        f"{made.title}: formed on the bed {made.bed}, correlation {made.correlation:.3f}",
+        f"{made.title}: intended",
+    )
+    lowest = min(float(made.formed.min()), float(made.intended.min()))
+    with tempfile.TemporaryDirectory() as folder:
+        files = [
+            draw_relief(made.scene, height, lowest, Path(folder) / f"{number}.png")
+            for number, height in enumerate((made.formed, made.intended))
+        ]
+        return join(files, words, out)
+
+
+def draw_relief(scene: Scene, relief: NDArray[Any], lowest: float, out: Path) -> Path:
+    """Draw the skin over a bed's pins, without fingertip.
+
+    `relief` (n,), heights of the pins above rest, m; `lowest`: lowest place of a pin's top in the pictures to
+    be compared, above rest, m; `out`: the PNG.
+    """
+    looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
+    rest = Instant.at_rest(scene.layout, scene.actuator)
+    instant = replace(rest, height=rest.height + relief)
+    with scratch():
+        drawn = add_picture_scene("Digital Clay Made Thing", looks)
+        bed = view.build(instant, drawn.collection, scene.actuator.rest_height + lowest - CLEAR)
+        apply_style(bed, looks)
+        form.set_form(bed, "skin")
+        bed.rotation_euler.z = TURN
+        tip = view.fingertip_of(bed)
+        if tip is not None:
+            for part in (tip, *tip.children_recursive):
+                part.hide_render = True
+        points = stage.outline(bed)
+        below = points[points[:, 2] <= points[: len(relief), 2].max()]  # without the fingertip
+        stage.set_up(drawn, bed, instant, points=below, modes=(), margins=MARGINS)
+        render_picture(drawn, out, out)
+    return out
+
+
+def join(files: Sequence[Path], words: Sequence[str], out: Path) -> Path:
+    """Put pictures side by side, with words in the corner of each. `out`: the JPEG."""
+    try:
+        from PIL import Image, ImageDraw, ImageFont
+    except ImportError:
+        raise OutputError("Pictures of made things need Pillow: pip install digiclay[images].") from None
+    whole = Image.new("RGB", (WIDTH * len(files), HEIGHT))
+    pen = ImageDraw.Draw(whole)
+    for number, (file, said) in enumerate(zip(files, words, strict=True)):
+        whole.paste(Image.open(file).convert("RGB"), (number * WIDTH, 0))
+        place = number * WIDTH + INSET[0], INSET[1]
+        pen.text(place, said, INK, ImageFont.load_default(LETTERS))
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        whole.save(out, quality=90)
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
+    return out
+
 
 EXAMPLES = """\
   python -m benchmarks made
@@ -47,7 +319,7 @@ def _thing(text: str) -> str:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Make the things, print the table, and draw them."""
-    from .made_things import make
+    from .made import make
 
     if arguments.pictures is not None:
         refuse_without_blender()
@@ -68,7 +340,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 def _draw(made: Made, folder: Path) -> None:
     """Draw a thing; on another bed than that of its file it is another picture."""
-    from .made_pictures import draw_made
+    from .made import draw_made
 
     suffix = "" if made.bed == made.own_bed else f"_{made.bed}"
     draw_made(made, folder / f"made_{made.name}{suffix}.jpg")

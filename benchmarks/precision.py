@@ -9,7 +9,7 @@ from dataclasses import astuple
 from typing import Any
 
 import numpy as np
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from numpy.typing import NDArray

@@ -9,7 +9,7 @@ import numpy as np
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.conduit import OrificeAndConduit
 from digiclay.core.model.fingertip import JOIN
-from digiclay.core.steppers.bernoulli_plan import POINTS
+from digiclay.core.steppers.bernoulli import POINTS
 from digiclay.core.steppers.closed_form import TINY, solve_crossing
 
 from .peers import ROOT, Line

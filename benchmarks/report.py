@@ -12,9 +12,8 @@ from typing import Any, TextIO
 
 from digiclay.commands.arguments import add_command
 from digiclay.commands.machine import describe_machine as made_with
-from digiclay.commands.progress import Line, draw_share
-from digiclay.commands.refusals import refuse_unwritable
-from digiclay.commands.tables import table
+from digiclay.commands.progress import Line, draw_share, table
+from digiclay.commands.stop import refuse_unwritable
 from digiclay.core.base.errors import OutputError
 
 __all__ = ["add_kind", "kept", "made_with", "progress", "table"]

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.commands.refusals import refuse_without
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
+from digiclay.commands.stop import refuse_without
 from digiclay.core.base.errors import OutputError
 from digiclay.core.model.trajectory import sample_poses
 from digiclay.core.scene.scene_source import find, load

@@ -8,18 +8,19 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.scene.schema import STEPPERS
 
 from .report import add_kind, kept, made_with, progress
-from .stiff_cases import CASES, Case
 from .stiff_runs import (
+    CASES,
     FINE,
     PERIOD,
     ROUGH,
     STEPS,
+    Case,
     Outcome,
     calls_of,
     commands_of,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.arguments import add_scene, scene_of
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
 from digiclay.core.base.arrays import Floats
 from digiclay.core.control.replay import Replay
 from digiclay.core.engine.simulation import begin, periods

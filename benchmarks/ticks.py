@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from digiclay.commands.refusals import refuse_without_blender
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
+from digiclay.commands.stop import refuse_without_blender
 from digiclay.plots.figure import empty
 
 from .plots import STYLE, write

@@ -6,14 +6,13 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from digiclay.commands.refusals import refuse_without_blender
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
+from digiclay.commands.stop import refuse_without_blender
 
 from .report import add_kind, kept, made_with, progress
 
 if TYPE_CHECKING:  # Blender is imported when it is needed
-    from .skin_cost import SkinCost
-    from .viewport_cost import Cost
+    from .viewport_cost import Cost, SkinCost
 
 #: Rows and columns of the beds, and the time a tick of them may take, s.
 BEDS = ((25, 25, 5e-3), (100, 100, 10e-3), (250, 400, 40e-3))
@@ -35,8 +34,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     refuse_without_blender()
     from digiclay.compat import bpy
 
-    from .skin_cost import SHOWN, measure_skin
-    from .viewport_cost import PARTS, measured
+    from .viewport_cost import PARTS, SHOWN, measure_skin, measured
 
     ticks = QUICK if arguments.quick else FULL
     costs, skins = [], []

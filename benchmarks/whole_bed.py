@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
 
 from . import peers, plots
 from .problems import Measured, Problem, ours, problem

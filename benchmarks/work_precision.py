@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
 
 #: Errors of height at which the fastest are compared, m.
 LEVELS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from . import scenes
-from .claim import MM, ONE, SHORT, TWO, Claim, speed, verdict
-from .claims_following import largest_speed, tracking
+from .claim import MM, ONE, SHORT, TWO, Claim, largest_speed, relief, speed, tracking, verdict
 from .claims_force import deviations, onset, reference_force, trade
-from .claims_relief import relief
 from .claims_variants import ahead, escape, gaussian, radius, rise, staggered
 from .relief_sections import LIMITS, blister_section
 from .results import PAPER_SPEED, Results

@@ -10,8 +10,7 @@ from typing import Any, TextIO
 
 from digiclay.commands.arguments import add_command
 from digiclay.commands.progress import Line
-from digiclay.commands.refusals import refuse_without
-from digiclay.commands.stop import Stop
+from digiclay.commands.stop import Stop, refuse_without
 from digiclay.core.base.run_folder import check_folder, write_folder
 
 EXAMPLES = """\

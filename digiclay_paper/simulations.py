@@ -8,13 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.signal import measure_amplitude, measure_frequency, measure_settling_time
+from digiclay.core.metrics.force import measure_amplitude, measure_frequency, measure_settling_time
 from digiclay.core.model.set_point import find_set_point
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session.run_result import Result, select_rows
-from digiclay.core.session.run_scene import run
+from digiclay.core.session.run_scene import Result, run, select_rows
 from digiclay.core.studies.method_trials import find_free_speed, find_unintended_losses
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, find_largest_speed, track
 

@@ -12,7 +12,7 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session.run_result import Result, select_rows
+from digiclay.core.session.run_scene import Result, select_rows
 from digiclay.core.studies.speed_limits import Drag, track
 
 from . import scenes

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from digiclay.core.metrics.finger_path import measure_surface_under, sum_cells
-from digiclay.core.metrics.force import compute_rfd
-from digiclay.core.metrics.signal import compute_deviation, compute_weights
+from digiclay.core.metrics.force import compute_deviation, compute_rfd, compute_weights
 from digiclay.core.model.set_point import find_set_point
-from digiclay.core.session.run_result import Result
+from digiclay.core.session.run_scene import Result
 
 #: Along the ridge and along the valley, s.
 RIDGE, VALLEY = (5.0, 10.0), (18.0, 25.0)

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from digiclay import __version__
-from digiclay.core.base.whole_files import write_whole
+from digiclay.core.base.run_folder import write_whole
 from digiclay.plots.figure import save
 
-from . import figures_blister, figures_limits, figures_session, figures_variants
+from . import figures_session, paper_figures
 from .claims import claims
 from .page import page
 from .panel import curves, letter, table
@@ -58,11 +58,11 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
     pictures: dict[str, tuple[str, Callable[[], Any]]] = {
         "fig04_blisters": (
             "Fig. 4: blisters in section, convex and concave, both profiles and all methods",
-            lambda: figures_blister.blisters(results),
+            lambda: paper_figures.blisters(results),
         ),
         "fig06_freezing": (
             "Fig. 6: sections along a drag at several times, with the frozen cells",
-            lambda: figures_blister.freezing(results),
+            lambda: paper_figures.freezing(results),
         ),
         "fig08_session": (
             f"Fig. 8: heights of selected cells and total force over time{slow}",
@@ -91,15 +91,15 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
         ),
         "oscillation": (
             "Oscillation of the virtual master, and where it sets in",
-            lambda: figures_limits.oscillation(results),
+            lambda: paper_figures.oscillation(results),
         ),
         "tracking": (
             "How fast a finger is followed: RFD and lag against speed",
-            lambda: figures_limits.tracking(results),
+            lambda: paper_figures.tracking(results),
         ),
         "variants": (
             "What the rise, the search radius and Method II's gain do",
-            lambda: figures_variants.variants(results),
+            lambda: paper_figures.variants(results),
         ),
     }
 

@@ -4,14 +4,92 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
-from .door_bed import Bed
-from .finger_lease import HeldError, Lease, claim, release
-from .latest_slot import LatestSlot
-from .order_slot import Order, pack_order
-from .protocol import Frame, Pose, Reset, Status, unpack_frame
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.engine.system import System
+from digiclay.core.scene.schema import Scene
+
+from .latest_slot import LatestSlot, Order, pack_order
+from .protocol import LIMITS, Frame, Limits, Pose, Reset, Status, unpack_frame
+
+#: Most pins whose positions are told: libraries refuse messages of a megabyte.
+MOST_POSITIONS = 10_000
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Bed of the session, sent to a client once.
+
+    Attributes
+    ----------
+    name : str
+        Of the scene.
+    rows, columns : int
+    pitch, stroke : float
+        m.
+    period : float
+        Control period, s.
+    positions : tuple of (float, float)
+        Of the pins, m; none of a bed of more than 10,000.
+    most_force, most_speed : float
+        Largest total force handed out, N, and largest speed of the fingertip, m/s.
+    """
+
+    name: str
+    rows: int
+    columns: int
+    pitch: float
+    stroke: float
+    period: float
+    positions: tuple[tuple[float, float], ...]
+    most_force: float = LIMITS.force
+    most_speed: float = LIMITS.speed
+
+
+def describe_bed(scene: Scene, system: System, limits: Limits) -> Bed:
+    """Return what clients are told of the bed of a scene."""
+    layout, grid = scene.layout, system.grid
+    told = grid.positions if grid.count <= MOST_POSITIONS else grid.positions[:0]
+    return Bed(
+        scene.name, layout.rows, layout.columns, layout.pitch, system.cell.actuator.stroke, system.period,
+        tuple((float(x), float(y)) for x, y in told), limits.force, limits.speed,
+    )  # fmt: skip
+
+
+#: Time after the last pose of a client when another one may move the fingertip, s.
+LEASE = 2.0
+
+
+class HeldError(DigiclayError):
+    """Request of a client while another one moves the fingertip."""
+
+    def __init__(self) -> None:
+        super().__init__(f"Another client moves the fingertip: wait until it is silent for {LEASE:g} s.")
+
+
+@dataclass(frozen=True)
+class Lease:
+    """Client that moves the fingertip, and the end of its lease, s; nobody before the first pose."""
+
+    holder: object = None
+    until: float = 0.0
+
+
+def claim(lease: Lease, client: object, now: float) -> tuple[bool, Lease]:
+    """Return whether a client may move the fingertip now, and the lease after that.
+
+    `client`: anything that is equal for one client only; `now`: by a clock that never goes back, s.
+    """
+    if lease.holder not in (None, client) and now < lease.until:
+        return False, lease
+    return True, Lease(client, now + LEASE)
+
+
+def release(lease: Lease, client: object) -> Lease:
+    """Return the lease after a client has gone."""
+    return Lease() if lease.holder == client else lease
 
 
 class DoorLink:

@@ -18,8 +18,7 @@ from typing import Any
 from digiclay.core.base.errors import DigiclayError, OutputError
 
 from .display_line import Display, open_display
-from .door_bed import Bed
-from .door_link import DoorLink
+from .door_link import Bed, DoorLink
 from .doors import LENGTH
 from .latest_slot import open_slot
 from .osc_door import open_osc

@@ -15,9 +15,8 @@ from typing import Any
 import digiclay
 from digiclay.core.base.errors import OutputError
 
-from .door_bed import Bed
-from .latest_slot import make_slot
-from .order_slot import ORDER_SIZE, Order, unpack_order
+from .door_link import Bed
+from .latest_slot import ORDER_SIZE, Order, make_slot, unpack_order
 
 #: Bytes of the length in front of the settings.
 LENGTH = 8

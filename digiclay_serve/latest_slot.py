@@ -7,11 +7,14 @@ can fill the memory of the other.
 from __future__ import annotations
 
 import mmap
+import struct
 import tempfile
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 #: Bytes before the value: number of the value, twice that and one more while it is written; its checksum.
 HEAD = 16
@@ -81,3 +84,44 @@ def open_slot(path: Path) -> LatestSlot:
     """Return the slot of another process."""
     with path.open("r+b") as file:
         return LatestSlot(mmap.mmap(file.fileno(), 0))
+
+
+#: Pose, its number, whether there is one, resets.
+LAYOUT = struct.Struct("<7dQQQ")
+ORDER_SIZE = LAYOUT.size
+
+
+@dataclass(frozen=True)
+class Order:
+    """Newest requests of the clients.
+
+    Attributes
+    ----------
+    pose : tuple of 7 floats or None
+        Lowest point, m, and unit quaternion; None: none was asked for since the last reset.
+    number : int
+        Of that pose.
+    resets : int
+        Since the start.
+    """
+
+    pose: tuple[float, ...] | None = None
+    number: int = 0
+    resets: int = 0
+
+    @property
+    def target(self) -> NDArray[np.float64] | None:
+        """The pose as an array (7,)."""
+        return None if self.pose is None else np.array(self.pose)
+
+
+def pack_order(order: Order) -> bytes:
+    """Write an order for `LatestSlot`."""
+    pose = order.pose or (0.0,) * 7
+    return LAYOUT.pack(*pose, order.number, order.pose is not None, order.resets)
+
+
+def unpack_order(data: bytes) -> Order:
+    """Read an order."""
+    *pose, number, there, resets = LAYOUT.unpack(data)
+    return Order(tuple(pose) if there else None, number, resets)

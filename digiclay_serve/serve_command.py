@@ -12,20 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from digiclay.commands.arguments import add_command, add_scene, scene_of
-from digiclay.commands.refusals import refuse_unwritable, refuse_without
-from digiclay.commands.stop import Stop
+from digiclay.commands.stop import Stop, refuse_unwritable, refuse_without
 from digiclay.core.base.addresses import describe_exposure
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.whole_files import format_json, write_whole
+from digiclay.core.base.run_folder import format_json, write_whole
 from digiclay.core.scene.scene_source import Setting
 
-from .access_token import VARIABLE, choose_token
-from .door_bed import describe_bed
+from .door_link import describe_bed
 from .doors import Doors, DoorSettings
-from .protocol import LIMITS, Limits, pack_frame
+from .protocol import LIMITS, VARIABLE, Limits, choose_token, pack_frame
 from .real_time_loop import run_session
-from .served_session import begin_session, make_frame
-from .take_parts import PartWriter
+from .served_session import PartWriter, begin_session, make_frame
 
 EXAMPLES = f"""\
 examples:

@@ -16,14 +16,13 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from .access_token import is_token
-from .door_link import DoorLink
-from .finger_lease import HeldError
+from .door_link import DoorLink, HeldError
 from .protocol import (
     LARGEST_REQUEST,
     VERSION,
     format_error,
     format_frame,
+    is_token,
     read_binary,
     read_json,
 )

@@ -12,7 +12,7 @@ from digiclay.core.studies.evaluation import FIGURES
 from digiclay.plots.sweep import read_unit
 
 from .indices import CONFIDENCE, Indices
-from .ranges import Range
+from .point_series import Range
 from .responses import ALLOWED, LOSS, Response
 
 #: Of the table of the outputs.

@@ -10,23 +10,30 @@ from typing import Any
 
 from digiclay import __version__
 from digiclay.commands.arguments import add_command
-from digiclay.commands.exit_codes import STOPPED
 from digiclay.commands.extras import format_command
 from digiclay.commands.progress import Counted, format_duration
-from digiclay.commands.refusals import refuse_without
-from digiclay.commands.stop import Stop
+from digiclay.commands.stop import STOPPED, Stop, refuse_without
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.whole_files import write_whole
+from digiclay.core.base.run_folder import write_whole
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import Bundles, Record, make_bundles
 from digiclay.core.studies.sweep_plan import Folder
 
 from .index_page import Findings, format_index_table, format_page
-from .indices import compute_indices
-from .point_series import UNCHANGED, describe_stop, open_evaluation, open_folder, write_points
+from .indices import compute_indices, count_points, sample_shares
+from .point_series import (
+    UNCHANGED,
+    Subject,
+    add_subject,
+    describe_stop,
+    make_points,
+    open_evaluation,
+    open_folder,
+    read_subject,
+    refuse_too_many,
+    write_points,
+)
 from .responses import LOSS, Response, find_excess_losses, make_response
-from .sampling import count_points, sample_shares
-from .subject import Subject, add_subject, make_points, read_subject, refuse_too_many
 
 EXAMPLES = """\
 examples:
@@ -132,7 +139,7 @@ def _write(
     """Write the files; return lines for a person."""
     from digiclay.plots.figure import save
 
-    from .index_bars import draw_indices
+    from .study_plots import draw_indices
 
     found = [records[point.index] for point in points]
     excess = find_excess_losses(found, records[UNCHANGED])

@@ -11,23 +11,30 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.arguments import add_command
-from digiclay.commands.exit_codes import STOPPED
 from digiclay.commands.progress import format_duration
-from digiclay.commands.refusals import refuse_without
-from digiclay.commands.stop import Stop
+from digiclay.commands.stop import STOPPED, Stop, refuse_without
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.base.whole_files import write_whole
+from digiclay.core.base.run_folder import write_whole
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import FIGURES, Record, find_figure, make_bundles
 from digiclay.core.studies.sweep_plan import Folder
 from digiclay.plots.sweep import read_unit
 
-from .genetic import propose_generations
-from .pareto import find_knee
-from .point_series import UNCHANGED, describe_stop, open_evaluation, open_folder, write_points
-from .subject import Subject, add_subject, make_points, read_count, read_subject, refuse_too_many
-from .trials import judge_trials
+from .point_series import (
+    UNCHANGED,
+    Subject,
+    add_subject,
+    describe_stop,
+    make_points,
+    open_evaluation,
+    open_folder,
+    read_count,
+    read_subject,
+    refuse_too_many,
+    write_points,
+)
+from .trials import find_knee, judge_trials, propose_generations
 
 EXAMPLES = """\
 examples:
@@ -157,7 +164,7 @@ def _write(
     """Write the files; return lines for a person."""
     from digiclay.plots.figure import save
 
-    from .front_plot import draw_front
+    from .study_plots import draw_front
 
     every = (Point(UNCHANGED, (), subject.scene), *points)
     trials = judge_trials(subject.names, [records[point.index] for point in every], records[UNCHANGED])

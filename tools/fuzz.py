@@ -48,7 +48,7 @@ from digiclay.core.session.snapshot import FIRST, START
 from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
 from digiclay.core.surface import features
 from digiclay.core.surface.formed import make_formed
-from digiclay.core.surface.skin_grid import fit_skin
+from digiclay.core.surface.skins import fit_skin
 from numpy.typing import NDArray
 
 #: Numbers at the ends of what there is, and beyond.

@@ -13,8 +13,7 @@ from .compat import bpy
 from .core.base.arrays import Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import Fingertip
-from .device.primitives import Shape
-from .device.roles import ELLIPSOID, ROLE
+from .device.primitives import ELLIPSOID, ROLE, Shape
 from .ui_text import localize
 
 #: Blender units per meter of the device: a millimeter is drawn as a hundredth of a unit,

@@ -10,8 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from .commands.exit_codes import STOPPED, WRONG
-from .commands.stop import defer_interrupt
+from .commands.stop import STOPPED, WRONG, defer_interrupt
 from .core.base.errors import DigiclayError, one_line
 
 #: What tells the libraries behind numpy's products on how many cores to work.

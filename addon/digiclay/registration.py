@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 
 from . import command_line, manual_map, operators, panels, preferences, translations
-from .device import detail, display, unit_watch
+from .device import detail, display, unit
 from .exchange import image_reader
 from .live import handlers
 from .press import brush_presets, tool
@@ -24,7 +24,7 @@ MODULES: tuple[ModuleType, ...] = (
     translations,  # of all that is registered before
     command_line,
     manual_map,
-    unit_watch,
+    unit,
     detail,
     handlers,  # the last to come and the first to go: it ends what runs
 )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from digiclay.device import unit_watch, view
-from digiclay.device.roles import BALL, FINGER, HOUSING, OWNED, ROLE
+from digiclay.device import unit, view
+from digiclay.device.primitives import BALL, FINGER, HOUSING, OWNED, ROLE
 
 
 def done(step: str) -> None:
@@ -18,7 +18,7 @@ def done(step: str) -> None:
 def looked() -> None:
     """Let what waits for an evaluation happen."""
     bpy.context.view_layer.update()
-    unit_watch.settle()
+    unit.settle()
     bpy.context.view_layer.update()
 
 

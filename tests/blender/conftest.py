@@ -11,7 +11,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session import live_periods
-from digiclay.device import unit_watch
+from digiclay.device import unit
 from digiclay.device.instant import Instant
 
 from tests.blender.at_hand import done
@@ -66,10 +66,10 @@ def formed() -> Instant:
 def watched(factory_file: None) -> Iterator[None]:
     """Enable the extension and look after beds as in a window, in an empty scene; take all back."""
     digiclay.register()
-    unit_watch.watch()
+    unit.watch()
     bpy.ops.object.select_all(action="SELECT")
     bpy.ops.object.delete()
     done("Empty")
     yield
-    unit_watch.unregister()
+    unit.unregister()
     digiclay.unregister()

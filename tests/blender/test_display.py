@@ -16,7 +16,7 @@ from digiclay.core.session.accuracy import Errors
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
 from digiclay.overlay import views
-from digiclay.overlay.look import choose_colors
+from digiclay.overlay.picture import choose_colors
 from digiclay.overlay.placement import lay_out
 from digiclay.panels.live_session import error_line
 from digiclay.settings import properties

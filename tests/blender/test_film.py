@@ -18,8 +18,8 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session.render_settings import Film, Turntable
 from digiclay.device.instant import Instant
+from digiclay.pictures import film, still
 from digiclay.pictures import film as films
-from digiclay.pictures import film_file, still
 
 WIDTH, HEIGHT = 160, 100
 SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 8}
@@ -192,10 +192,8 @@ def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any
     path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.2))
     assert path is not None
     data = path.read_bytes()
-    assert film_file.is_whole_film(data)
-    assert not any(
-        film_file.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1)
-    )
+    assert film.is_whole_film(data)
+    assert not any(film.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1))
     path = still.render_still(Instant.of(history), tmp_path / "still.png", width=32, height=20, samples=1)
     picture = path.read_bytes()
     assert is_whole_picture(picture)

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import pytest
 from digiclay.cli import main
-from digiclay.commands.thumbnail import WIDTH
+from digiclay.commands.gallery import WIDTH
 
 JOBS = """
 scenes = ["tap"]

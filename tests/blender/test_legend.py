@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 from digiclay.compat import scratch
 from digiclay.core.base.modes import Mode
-from digiclay.pictures.force_plot import SHARE, draw_force_plot
-from digiclay.pictures.legend import READ, READ_BESIDE, Front, write_force_legend, write_mode_legend
+from digiclay.pictures.legend import (
+    READ,
+    READ_BESIDE,
+    SHARE,
+    Front,
+    draw_force_plot,
+    write_force_legend,
+    write_mode_legend,
+)
 from digiclay.pictures.stage import MARGINS, half_frame
 
 #: Sizes of pictures, pixels, and how large their ordinary letters and those beside them are.

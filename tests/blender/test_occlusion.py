@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay.bridge import SCALE
 from digiclay.device import view
-from digiclay.device.roles import ROLE
+from digiclay.device.primitives import ROLE
 from digiclay.live import running
 from digiclay.press import aim
 from mathutils import Vector

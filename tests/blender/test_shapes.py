@@ -13,7 +13,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
-from digiclay.core.shapes.height_text import unpack as heights_of
+from digiclay.core.shapes.fitting import unpack as heights_of
 from digiclay.core.shapes.source_file import list_shapes
 from digiclay.device import view
 from digiclay.exchange import image_reader

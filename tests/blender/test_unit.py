@@ -12,7 +12,7 @@ from digiclay import bridge
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.device import view
-from digiclay.device.roles import BALL, ROLE
+from digiclay.device.primitives import BALL, ROLE
 from digiclay.exchange import formed_bed
 from digiclay.live import running, tick
 from digiclay.recorded import bake

@@ -10,7 +10,7 @@ import pytest
 from digiclay.core.base.errors import DivergenceError
 
 from benchmarks import stiff_runs as stiff
-from benchmarks.stiff_cases import CASES, EASY
+from benchmarks.stiff_runs import CASES, EASY
 
 
 @pytest.mark.parametrize(

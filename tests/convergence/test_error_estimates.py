@@ -9,8 +9,7 @@ import pytest
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import SHARE, Errors, estimate_errors, has_every_command
-from digiclay.core.session.run_result import History
-from digiclay.core.session.run_scene import run
+from digiclay.core.session.run_scene import History, run
 
 #: Shorter than the longest session, but with a press and a lift in it.
 LASTS = 0.9

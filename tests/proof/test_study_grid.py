@@ -18,9 +18,8 @@ from tests.scene_files import SMALL_BLISTER
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
-from digiclay_study.pareto import find_front
-from digiclay_study.ranges import fit_ranges, read_range
-from digiclay_study.subject import Subject, make_points
+from digiclay_study.point_series import Subject, fit_ranges, make_points, read_range
+from digiclay_study.trials import find_front
 
 Floats = NDArray[np.float64]
 

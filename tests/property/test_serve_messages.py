@@ -14,14 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonosc.osc_message import OscMessage
 
-from digiclay_serve.osc_messages import format_osc_frame, read_osc
-from digiclay_serve.pin_frames import (
+from digiclay_serve.display_line import (
     pack_acknowledgement,
     pack_heights,
     read_acknowledgement,
     read_heights,
     split_frames,
 )
+from digiclay_serve.osc_door import format_osc_frame, read_osc
 from digiclay_serve.protocol import (
     Flag,
     Frame,

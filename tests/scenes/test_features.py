@@ -11,7 +11,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.session.run_scene import run
 from digiclay.core.surface.features import Feature, find
 from digiclay.core.surface.formed import make_formed
-from digiclay.core.surface.skin_grid import fit_skin
+from digiclay.core.surface.skins import fit_skin
 
 
 @pytest.fixture(scope="module")

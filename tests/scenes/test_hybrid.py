@@ -8,16 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.hybrid_parameters import Hybrid
-from digiclay.core.control.master_memory import Phase
+from digiclay.core.control.hybrid import Hybrid
+from digiclay.core.control.master import Phase
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.run_result import Result
-from digiclay.core.session.run_scene import run
+from digiclay.core.session.run_scene import Result, run
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, track
 from digiclay.core.studies.trial_paths import drag_row, with_path
 

@@ -239,7 +239,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
 from digiclay.core.surface.formed import make_formed
-from digiclay.core.surface.pin_lattice import Lattice
+from digiclay.core.surface.formed import Lattice
 from digiclay.core.surface.pins_solid import make_parts
 
 def attempt(make):

@@ -18,7 +18,7 @@ import pytest
 from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from digiclay_serve.pin_frames import pack_acknowledgement, read_heights, split_frames
+from digiclay_serve.display_line import pack_acknowledgement, read_heights, split_frames
 from tests.served import TOKEN, Server, serve
 from tests.timeouts import TIMEOUT, wait_until
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.control.hybrid_controller import HybridControl
+from digiclay.core.control.hybrid import HybridControl
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene

@@ -12,7 +12,7 @@ from types import FrameType
 
 import numpy as np
 import pytest
-from digiclay.commands.tables import table
+from digiclay.commands.progress import table
 from digiclay.core.base.errors import OutputError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble

@@ -15,9 +15,15 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.processes import find_host
-from digiclay.core.base.run_folder import claim_files, claim_folder, find_lock, resolve_inside, write_folder
-from digiclay.core.base.unfinished import remove_abandoned
+from digiclay.core.base.file_lock import find_host
+from digiclay.core.base.run_folder import (
+    claim_files,
+    claim_folder,
+    find_lock,
+    remove_abandoned,
+    resolve_inside,
+    write_folder,
+)
 
 from tests.other_process import dead
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text

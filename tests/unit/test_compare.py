@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands.compare import table
-from digiclay.core.session.run_result import RUN_METRICS
+from digiclay.core.session.run_scene import RUN_METRICS
 from digiclay.plots.comparison import PANELS, comparison
 
 from tests.scene_files import folder_with, scene_text

@@ -11,8 +11,8 @@ from digiclay.core.session import live_periods
 from digiclay.core.session.take import replay
 from digiclay.live import sculpting
 from digiclay.live.running import Running
-from digiclay.live.settling import LIMIT, measure_excess_heights
 from digiclay.live.stroke import Brush
+from digiclay.live.sweep import LIMIT, measure_excess_heights
 from digiclay.recorded.takes import read_recording
 from numpy.typing import NDArray
 

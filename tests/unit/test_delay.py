@@ -11,7 +11,7 @@ from digiclay.core.engine.system import System, make_segments
 from digiclay.core.model.delay import Delay, Queue, split_delay
 from digiclay.core.model.lag import ValveLag
 from digiclay.core.steppers.bernoulli import BernoulliExponential
-from digiclay.core.steppers.runge_kutta import RungeKutta4
+from digiclay.core.steppers.explicit import RungeKutta4
 from scipy.integrate import quad
 
 from tests.assemble import AWAY, one_cell, record, scripted

@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.batch.advance import advance, begin
-from digiclay.core.batch.broadcasting import classify, merge_parts
 from digiclay.core.batch.finger_paths import make_fingers
-from digiclay.core.batch.packing import make_batch
+from digiclay.core.batch.packing import advance, begin, classify, make_batch, merge_parts
 from digiclay.core.batch.padding import compute_reach
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.supply import Supply

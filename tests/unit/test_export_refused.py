@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.base import whole_files
+from digiclay.core.base import run_folder
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, make_bodies
@@ -82,7 +82,7 @@ def test_a_folder_that_is_not_there_is_one_line(solid, tmp_path):
 def test_a_file_that_cannot_be_replaced_leaves_no_temporary_one(tmp_path):
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match=r"^Cannot write \S+taken: "):
-        whole_files.write_whole(tmp_path / "taken", b"content")
+        run_folder.write_whole(tmp_path / "taken", b"content")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
@@ -110,7 +110,7 @@ def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("digiclay.core.mesh_io.stl_writer._normals", stop)
+    monkeypatch.setattr("digiclay.core.mesh_io.mesh_writer._normals", stop)
     with pytest.raises(KeyboardInterrupt):
         mesh_writer.write(solid, tmp_path / "surface.stl")
     assert not list(tmp_path.iterdir())

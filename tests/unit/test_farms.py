@@ -13,13 +13,10 @@ import pytest
 import quickjs
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.session.frame_files import read_range
+from digiclay.core.session.render_settings import read_range
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.job_table import read_jobs
-from digiclay.farms.cuecmd import join_words
-from digiclay.farms.flamenco import SCRIPT
-from digiclay.farms.openjd import LONGEST
-from digiclay.farms.series_plan import plan_series, split_frames
+from digiclay.farms.series_plan import LONGEST, SCRIPT, join_words, plan_series, split_frames
 from openjd.model import (
     StepDependencyGraph,
     StepParameterSpaceIterator,

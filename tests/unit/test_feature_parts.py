@@ -15,7 +15,7 @@ import pytest
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.features import Feature, Finding, find
 from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.skin_grid import fit_skin
+from digiclay.core.surface.skins import fit_skin
 
 #: Pitch in mm; three of a kind that no ridge here fits to.
 BEDS = (("aligned", 3.0), ("staggered", 3.0), ("hexagonal", 3.0), ("aligned", 2.3), ("staggered", 2.3))

@@ -10,7 +10,7 @@ from digiclay.core.mesh_io.export_model import make_feature_solid
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.features import Feature, Finding, find, make_table, summarize
 from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.skin_grid import fit_skin
+from digiclay.core.surface.skins import fit_skin
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 LEVEL = 0.04

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.file_lock import hold_lock, hold_record
-from digiclay.core.base.processes import find_host, find_start, may_have_made
-from digiclay.core.base.unfinished import is_unfinished, name_unfinished, remove_abandoned
+from digiclay.core.base.file_lock import find_host, find_start, hold_lock, hold_record, may_have_made
+from digiclay.core.base.run_folder import is_unfinished, name_unfinished, remove_abandoned
 
 from tests.other_process import dead
 from tests.timeouts import TIMEOUT, wait_until

@@ -10,8 +10,7 @@ import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.shapes.fitting import Fitted, fit_given, fit_relief
-from digiclay.core.shapes.height_text import pack, unpack
+from digiclay.core.shapes.fitting import Fitted, fit_given, fit_relief, pack, unpack
 from digiclay.core.shapes.heightmap import make_height_map
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Shape

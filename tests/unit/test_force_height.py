@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.control.force_height import Reach, find_top, form_heights
-from digiclay.core.control.lead_profile import LeadProfile
-from digiclay.core.control.pulp_estimate import PulpEstimate
+from digiclay.core.control.led_blister import LeadProfile
+from digiclay.core.control.pulp_estimate import PulpEstimate, Reach, find_top, form_heights
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.relaxation import Relaxation

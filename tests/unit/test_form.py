@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.cli import main
-from digiclay.commands.exit_codes import WRONG
+from digiclay.commands.stop import WRONG
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid

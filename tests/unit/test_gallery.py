@@ -9,8 +9,7 @@ from io import BytesIO
 import matplotlib.image
 import numpy as np
 import pytest
-from digiclay.commands.gallery import Card, page
-from digiclay.commands.thumbnail import height_map
+from digiclay.commands.gallery import Card, height_map, page
 from digiclay.core.base.png import encode_png
 
 

@@ -9,8 +9,7 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes import heightmap
-from digiclay.core.shapes.heightmap import average_blocks, make_height_map
-from digiclay.core.shapes.picture_heights import read_pixels
+from digiclay.core.shapes.heightmap import average_blocks, make_height_map, read_pixels
 from digiclay.core.shapes.relief import Placement
 from hypothesis import given
 from hypothesis import strategies as st

@@ -9,8 +9,7 @@ import pytest
 import trimesh
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.shapes.holes import SMALL, fill_holes
-from digiclay.core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
+from digiclay.core.shapes.mesh_relief import SMALL, ShapeMesh, fill_holes, make_shape_mesh
 from digiclay.core.shapes.relief import Placement
 from digiclay.core.shapes.request import Shape
 from digiclay.core.shapes.source_file import fit_shape

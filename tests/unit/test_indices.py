@@ -16,12 +16,9 @@ from digiclay.core.studies.series import finish_here
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
-from digiclay_study.indices import Indices, compute_indices
-from digiclay_study.point_series import Evaluation, open_folder
-from digiclay_study.ranges import Range
+from digiclay_study.indices import Indices, compute_indices, count_points, sample_shares
+from digiclay_study.point_series import Evaluation, Range, Subject, open_folder
 from digiclay_study.responses import find_excess_losses, make_response
-from digiclay_study.sampling import count_points, sample_shares
-from digiclay_study.subject import Subject
 
 #: Ishigami's function sin x1 + A sin² x2 + B x3⁴ sin x1 on [-π, π]³, and its indices by integration.
 A, B = 7.0, 0.1

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.session.frame_files import format_range, list_missing, name_frame, read_range
+from digiclay.core.session.render_settings import format_range, list_missing, name_frame, read_range
 
 JOBS = """
 scenes = ["tap"]

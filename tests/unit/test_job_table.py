@@ -13,8 +13,7 @@ from digiclay.core.scene.scene_source import SAMPLES, load
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.render_settings import Film, Still, Turntable
 from digiclay.core.shapes.source_file import fit_shape
-from digiclay.core.studies.job_outputs import Outputs, make_outputs
-from digiclay.core.studies.job_table import read_jobs, read_outputs
+from digiclay.core.studies.job_table import Outputs, make_outputs, read_jobs, read_outputs
 
 
 def jobs_file(folder: Path, said: str) -> Path:

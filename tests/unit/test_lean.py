@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip, make_matrices
 from digiclay.live import sculpting
-from digiclay.live.lean import TURN, lean_finger, mirror_turn, turn_toward
 from digiclay.live.stroke import SYMMETRIES, draw, start
-from digiclay.live.stroke_motion import follow
+from digiclay.live.stroke_motion import TURN, follow, lean_finger, mirror_turn, turn_toward
 from digiclay.live.stroke_queue import drop_strokes, find_stroke, queue_stroke
 
 from tests.hand import TICK, started

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.control.master import Master, Phase
-from digiclay.core.control.master_cell import make_master_cell
+from digiclay.core.control.master import Master, Phase, make_master_cell
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.fluid import Fluid

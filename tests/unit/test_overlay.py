@@ -8,8 +8,16 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import COLORS, Mode
 from digiclay.device import heat
-from digiclay.overlay.look import LETTERS, LINES, choose_colors, contrast
-from digiclay.overlay.picture import Box, Picture, round_axis, scale_curve
+from digiclay.overlay.picture import (
+    LETTERS,
+    LINES,
+    Box,
+    Picture,
+    choose_colors,
+    contrast,
+    round_axis,
+    scale_curve,
+)
 from digiclay.overlay.placement import COMPACT, CORNERS, FULL, Content, find_room, lay_out
 from digiclay.overlay.sections import Readings
 from hypothesis import given

@@ -18,7 +18,7 @@ from digiclay.core.batch.run_together import run_together
 from digiclay.core.control.methods import METHODS, find_method, list_added, remove_method
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
-from digiclay.plugins import method_source
+from digiclay.plugins import method_loader
 from digiclay.plugins.method_loader import load_method, name_method
 
 from tests.own_methods import HEAD, PAD, forgotten, small, write_method
@@ -100,8 +100,8 @@ def test_an_installed_package_offers_a_method_by_its_name(
     (here / "padpackage.py").write_text(PAD + "\n# another\n", encoding="utf-8")
     with pytest.raises(MethodError, match=r"The method pad must be that of pads 1.2 here too"):
         pickle.loads(packed)
-    monkeypatch.setattr(method_source, "entry_points", lambda **_: [
-        EntryPoint("pad", "one:Pad", method_source.GROUP), EntryPoint("pad", "two:Pad", method_source.GROUP)
+    monkeypatch.setattr(method_loader, "entry_points", lambda **_: [
+        EntryPoint("pad", "one:Pad", method_loader.GROUP), EntryPoint("pad", "two:Pad", method_loader.GROUP)
     ])  # fmt: skip
     with pytest.raises(MethodError, match=r"one installed package \(got one:Pad, two:Pad\)"):
         load_method("pad")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import MethodError
-from digiclay.core.control.guarded import Pace
 from digiclay.core.control.methods import list_added
+from digiclay.core.control.own_method import Pace
 from digiclay.core.session.run_scene import run
 from digiclay.plugins.method_loader import load_method
 

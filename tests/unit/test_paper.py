@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.base.modes import MEANINGS
-from digiclay.core.control.transitions import BY_FORCE, BY_PLACE
+from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result
@@ -15,9 +15,8 @@ from digiclay.core.studies.method_trials import find_free_speed, find_unintended
 from digiclay.core.studies.speed_limits import Follows
 
 from digiclay_paper import scenes
-from digiclay_paper.claim import Claim, verdict
+from digiclay_paper.claim import Claim, largest_speed, tracking, verdict
 from digiclay_paper.claims import carried_out
-from digiclay_paper.claims_following import largest_speed, tracking
 from digiclay_paper.claims_force import DEVIATIONS, WINDOWED, deviations, onset, trade
 from digiclay_paper.figures_session import details, heights_and_force
 from digiclay_paper.page import page

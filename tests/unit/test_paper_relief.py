@@ -11,7 +11,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result
 from numpy.typing import NDArray
 
-from digiclay_paper.claims_relief import relief
+from digiclay_paper.claim import relief
 from digiclay_paper.relief_sections import LIMITS, asked_for, blister_section, sections
 from digiclay_paper.results import SESSION, Results, Session
 from digiclay_paper.scenes import METHODS

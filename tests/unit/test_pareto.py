@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
-from digiclay_study.genetic import Outcome, propose_generations
-from digiclay_study.pareto import find_front, find_knee
+from digiclay_study.trials import Outcome, find_front, find_knee, propose_generations
 
 POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]])
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.metrics.perception import BORDER, SPATIAL_RESOLUTION, find_weber_fractions, perceive
+from digiclay.core.metrics.force import BORDER, SPATIAL_RESOLUTION, find_weber_fractions, perceive
 
 
 @pytest.mark.parametrize("force", [0.5, 0.76, 2.5, 10.0])

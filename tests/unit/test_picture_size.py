@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.base.picture_size import read_size
-from digiclay.core.shapes.picture_heights import read_pixels
+from digiclay.core.shapes.heightmap import read_pixels, read_size
 from PIL import Image
 
 

@@ -8,7 +8,7 @@ import pytest
 from digiclay.core.base.errors import DigiclayError, ParameterError
 from digiclay.core.scene.scene_source import Setting, find
 
-from digiclay_study.ranges import Range, fit_ranges, read_range
+from digiclay_study.point_series import Range, fit_ranges, read_range
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,7 @@ from digiclay.live.stroke import Brush
 from digiclay.settings.beds import BEDS, FIRST
 from digiclay.settings.devices import make_scene
 
-from benchmarks.intended_reliefs import RELIEFS, find_relief
-from benchmarks.made_things import STROKES, make
+from benchmarks.made import RELIEFS, STROKES, find_relief, make
 from tests.hand import heights
 
 ALONG = ((0.0, -9e-3, 0.0), (0.1, 0.0, 0.0), (0.2, 9e-3, 0.0))

@@ -13,19 +13,24 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.recorded_path import make_take
-from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
+from digiclay.core.session.take import Take, from_bytes, make_take, replay, to_bytes
 
-from digiclay_serve.access_token import VARIABLE, choose_token, is_token
-from digiclay_serve.deadlines import Schedule, TimeCounts, plan_periods
-from digiclay_serve.finger_lease import LEASE, Lease, claim, release
-from digiclay_serve.latest_slot import make_slot, open_slot
-from digiclay_serve.order_slot import Order, pack_order, unpack_order
-from digiclay_serve.pin_frames import LOST, WINDOW, Ledger, acknowledge, expire, send, split_frames
-from digiclay_serve.pin_frames import pack_acknowledgement as acknowledged
-from digiclay_serve.protocol import LIMITS, Flag, Limits
-from digiclay_serve.served_session import Session, begin_session, follow, make_frame, record, reset
-from digiclay_serve.take_parts import PartWriter, join_parts
+from digiclay_serve.display_line import LOST, WINDOW, Ledger, acknowledge, expire, send, split_frames
+from digiclay_serve.display_line import pack_acknowledgement as acknowledged
+from digiclay_serve.door_link import LEASE, Lease, claim, release
+from digiclay_serve.latest_slot import Order, make_slot, open_slot, pack_order, unpack_order
+from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token
+from digiclay_serve.real_time_loop import Schedule, TimeCounts, plan_periods
+from digiclay_serve.served_session import (
+    PartWriter,
+    Session,
+    begin_session,
+    follow,
+    join_parts,
+    make_frame,
+    record,
+    reset,
+)
 
 PERIOD = 1e-3
 SMALL = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.metrics.signal import (
+from digiclay.core.metrics.force import (
     WINDOW,
     compute_deviation,
     compute_mean,

@@ -8,8 +8,7 @@ import scipy.sparse
 from digiclay.core.base.spline import interpolate_monotone
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.skin_grid import SurfaceGrid, fit_skin
-from digiclay.core.surface.skins import SKINS
+from digiclay.core.surface.skins import SKINS, SurfaceGrid, fit_skin
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator, RegularGridInterpolator
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay

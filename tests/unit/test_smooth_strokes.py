@@ -13,8 +13,7 @@ from digiclay.core.session import live_periods, snapshot
 from digiclay.core.session.live_periods import simulate_path
 from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
-from digiclay.live.stroke import SYMMETRIES, Brush, draw
-from digiclay.live.stroke_path import lay_line, lay_path, lay_ring
+from digiclay.live.stroke import SYMMETRIES, Brush, draw, lay_line, lay_path, lay_ring
 from digiclay.live.stroke_queue import change_stroke, queue_stroke
 from digiclay.live.sweep import find_radius
 from digiclay.recorded.takes import read_recording

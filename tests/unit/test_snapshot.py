@@ -15,8 +15,7 @@ from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.snapshot import START
-from digiclay.core.session.snapshot_memory import flatten
+from digiclay.core.session.snapshot import START, flatten
 
 from tests.assemble import path
 

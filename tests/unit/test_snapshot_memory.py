@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from digiclay.core.base.errors import StateError
-from digiclay.core.session.snapshot_memory import flatten, rebuild
+from digiclay.core.session.snapshot import flatten, rebuild
 from numpy.typing import NDArray
 
 

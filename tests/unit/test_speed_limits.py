@@ -10,8 +10,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.metrics.force import find_contact_ends
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.run_result import RUN_METRICS, Result, select_rows
-from digiclay.core.session.run_scene import run
+from digiclay.core.session.run_scene import RUN_METRICS, Result, run, select_rows
 from digiclay.core.studies.speed_limits import (
     Criterion,
     Drag,

@@ -10,8 +10,7 @@ import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.live.stroke import DEEPEST, SYMMETRIES, Stroke, deepen, draw, start
-from digiclay.live.stroke_motion import APPROACH, SPEED, follow
-from digiclay.live.stroke_travel import DRAG
+from digiclay.live.stroke_motion import APPROACH, DRAG, SPEED, follow
 from numpy.typing import NDArray
 
 CELLS = make_grid(Layout(rows=20, columns=20))

@@ -14,7 +14,7 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io import mesh_limits, mesh_writer, threemf_reader
 from digiclay.core.mesh_io.mesh_reader import read
-from digiclay.core.mesh_io.threemf_writer import CORE, HEAD, RELATIONS, TYPES
+from digiclay.core.mesh_io.mesh_writer import CORE, HEAD, RELATIONS, TYPES
 from digiclay.core.surface.body import Body
 
 #: A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.transitions import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, follow_arrows
+from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, follow_arrows
 
 #: Fig. 5, written down from the paper: from, to, when. VS is any cell on a virtual spring.
 FIGURE_5 = [

@@ -10,12 +10,9 @@ import pytest
 if sys.platform == "win32":
     pytest.skip("the server runs on Linux and macOS", allow_module_level=True)
 
-from digiclay_serve import finger_lease, websocket_door
-from digiclay_serve.door_bed import Bed
-from digiclay_serve.door_link import DoorLink
-from digiclay_serve.finger_lease import HeldError
-from digiclay_serve.latest_slot import make_slot
-from digiclay_serve.order_slot import Order, pack_order
+from digiclay_serve import door_link, websocket_door
+from digiclay_serve.door_link import Bed, DoorLink, HeldError
+from digiclay_serve.latest_slot import Order, make_slot, pack_order
 from digiclay_serve.protocol import Pose, pack_pose
 from digiclay_serve.websocket_door import open_websocket
 from tests.served import TOKEN, frame_message
@@ -67,7 +64,7 @@ def test_a_client_that_answers_no_ping_is_closed_and_leaves_the_fingertip(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(websocket_door, "PING", 0.1)
-    monkeypatch.setattr(finger_lease, "LEASE", 1e9)  # nobody else may by silence alone
+    monkeypatch.setattr(door_link, "LEASE", 1e9)  # nobody else may by silence alone
     link = make_link()
     sent = REQUEST.encode() + frame_message(pack_pose(POSE))
     assert UNANSWERED in asyncio.run(connect(link, sent))

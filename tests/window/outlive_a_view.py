@@ -98,7 +98,7 @@ def counted(blender: Any, name: str) -> None:
 
 def looked(blender: Any, name: str) -> Iterator[float | None]:
     """Wait until Blender has done what was asked for and it was looked at; count."""
-    watch, tick = blender.part("device.unit_watch"), blender.part("live.running").list_sessions
+    watch, tick = blender.part("device.unit"), blender.part("live.running").list_sessions
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
     if tick():

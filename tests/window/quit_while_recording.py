@@ -16,7 +16,7 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.look("loaded")
     yield from blender.open_sidebar()
     blender.shot("closed_file")
-    left = blender.part("live.recovery").file_path()
+    left = blender.part("live.handlers").file_path()
     bpy.ops.wm.recover_auto_save("EXEC_DEFAULT", filepath=str(left))
     yield 1.0
     blender.SEEN["recovered"] = takes(blender)

@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.settings.beds import BEDS
 
-from benchmarks.intended_reliefs import find_relief
+from benchmarks.made import find_relief
 from tests.window.blender_window import played
 
 REST = 40.0

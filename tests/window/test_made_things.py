@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.made_things import THINGS, make
+from benchmarks.made import THINGS, make
 
 
 @pytest.mark.parametrize("name", THINGS)

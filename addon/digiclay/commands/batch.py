@@ -12,15 +12,13 @@ from typing import Any
 
 from ..core.base.errors import one_line
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
-from ..plugins.method_copy import find_word
+from ..plugins.method_loader import find_word
 from .arguments import add_command, load_by_option
 from .batch_folder import Folder, open_batch
 from .evaluation_pool import read_count
-from .exit_codes import FAILED, STOPPED
-from .job_log import PROGRESS, find_error, read_fraction, read_tail
-from .job_steps import check_outputs
+from .job_steps import PROGRESS, check_outputs, find_error, read_fraction, read_tail
 from .progress import Counted, format_duration
-from .stop import Stop
+from .stop import FAILED, STOPPED, Stop
 from .submit import add_options, refuse_alone, write_farm_files
 from .worker import Process, Processes, count_cores
 

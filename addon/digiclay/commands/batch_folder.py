@@ -12,19 +12,15 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
-from ..core.base.run_folder import lock_name, resolve_inside
-from ..core.base.unfinished import remove_abandoned
-from ..core.base.whole_files import read_json, write_whole
+from ..core.base.run_folder import lock_name, read_json, remove_abandoned, resolve_inside, write_whole
 from ..core.scene.toml_table import format_scene
-from ..core.studies.job_outputs import Outputs
-from ..core.studies.job_table import JOB, SCENE, Job, JobSeries
+from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series
-from ..plugins.method_copy import write_code
-from .gallery import Card, page
-from .job_log import ERROR, find_error, read_tail
+from ..plugins.method_loader import write_code
+from .gallery import NAMES, Card, page
+from .job_steps import ERROR, find_error, read_tail
 from .progress import format_duration
 from .run_state import RUNS, TIMING, is_done
-from .thumbnail import NAMES
 
 #: The file by which a folder is known as a batch's, its other folders, and its page.
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"

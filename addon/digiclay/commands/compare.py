@@ -12,24 +12,21 @@ from typing import Any
 
 from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
-from ..core.base.run_folder import check_folder, write_folder
-from ..core.base.safe_names import find_name
+from ..core.base.run_folder import check_folder, find_name, write_folder
 from ..core.control.methods import list_methods
 from ..core.metrics.finger_path import sum_cells
 from ..core.model.set_point import find_set_point
 from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
-from ..core.session.run_result import RUN_METRICS, Result
-from ..core.session.run_scene import run
+from ..core.session.run_scene import RUN_METRICS, Result, run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
-from ..plugins.method_source import find_installed, is_file_word
+from ..plugins.method_loader import find_installed, is_file_word
 from .arguments import METHOD, add_command, add_scene, load_by_option, settings_of
 from .progress import Bar
-from .refusals import refuse_without
-from .stop import allow_interrupt
+from .progress import table as aligned
+from .stop import allow_interrupt, refuse_without
 from .suite import add_suite, list_suite_methods, run_suite
-from .tables import table as aligned
 
 EXAMPLES = """\
 examples:

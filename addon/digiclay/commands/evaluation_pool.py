@@ -14,7 +14,7 @@ from ..core.studies.evaluation import Pool, Record, evaluate_bundle
 from ..core.studies.series import finish_here
 from ..core.studies.sweep_plan import Folder, find_unfinished, select_done
 from .progress import Counted
-from .refusals import refuse_without
+from .stop import refuse_without
 from .worker import count_cores, in_blender
 
 #: The most processes of a command.

@@ -11,9 +11,9 @@ from ..core.session.finished_run import read_run
 from ..core.surface.features import make_table, summarize
 from ..core.surface.formed import make_formed
 from .arguments import add_run, seconds
-from .refusals import refuse_what_has_no_surface
-from .surface_options import add_surface, finding_of, former_of, model_of, row_of
-from .tables import table as aligned
+from .export import add_surface, finding_of, former_of, model_of, row_of
+from .progress import table as aligned
+from .stop import refuse_what_has_no_surface
 
 EXAMPLES = """\
 examples:

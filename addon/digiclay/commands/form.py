@@ -14,24 +14,20 @@ import numpy as np
 
 from .. import __version__
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import check_folder, claim_folder
-from ..core.base.safe_names import find_name
+from ..core.base.run_folder import check_folder, claim_folder, find_name
 from ..core.model.layout import make_grid
 from ..core.scene.assembly import assemble
 from ..core.scene.forming import GESTURES, make_forming_scene
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import Result, run, save
-from ..core.shapes.fitting import Fitted
-from ..core.shapes.height_text import pack
+from ..core.shapes.fitting import Fitted, pack
 from ..core.shapes.source_file import find_shape, fit_shape, import_reader, list_shapes
 from .arguments import add_command, add_scene, scene_of
-from .exit_codes import STOPPED
 from .export import formats
 from .extras import Extra, make_extras, plan_meshes, tell_left_out
 from .progress import Bar
-from .refusals import refuse_what_has_no_surface
-from .stop import Stop, allow_interrupt, defer_interrupt
+from .stop import STOPPED, Stop, allow_interrupt, defer_interrupt, refuse_what_has_no_surface
 
 EXAMPLES = f"""\
 examples:

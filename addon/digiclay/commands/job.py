@@ -16,21 +16,16 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import BusyError, DigiclayError, OutputError, one_line
-from ..core.base.run_folder import claim_folder
-from ..core.base.whole_files import format_json, write_whole
+from ..core.base.run_folder import claim_folder, format_json, write_whole
 from ..core.scene.scene_source import load
-from ..core.studies.job_outputs import MOVING, Outputs
-from ..core.studies.job_table import JOB, SCENE, read_outputs
-from ..plugins.method_copy import CODE, resolve_word
+from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
+from ..plugins.method_loader import CODE, resolve_word
 from .arguments import add_command, load_by_option
 from .batch_folder import note_failure, refresh_page
-from .exit_codes import STOPPED, WRONG
-from .job_films import make_film, make_frames
-from .job_log import ERROR, PROGRESS
-from .job_steps import Tell, check_outputs, make_outputs
+from .job_steps import ERROR, PROGRESS, Tell, check_outputs, make_film, make_frames, make_outputs
 from .progress import Counted
 from .run_state import FILES, RUNS, TIMING, RunState, judge_run, list_lacking
-from .stop import Stop
+from .stop import STOPPED, WRONG, Stop
 
 EXAMPLES = """\
 examples:

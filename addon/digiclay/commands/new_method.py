@@ -10,11 +10,11 @@ from string import Template
 from typing import Any
 
 from ..core.base.errors import OutputError
-from ..core.base.whole_files import write_whole
+from ..core.base.run_folder import write_whole
 from ..core.control.methods import METHODS
 from ..plugins.method_loader import name_method
 from .arguments import add_command
-from .refusals import refuse_unwritable
+from .stop import refuse_unwritable
 
 EXAMPLES = """\
 examples:

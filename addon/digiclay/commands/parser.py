@@ -28,7 +28,7 @@ from . import (
     sweep,
 )
 from .arguments import Help
-from .exit_codes import WRONG
+from .stop import WRONG
 
 EXAMPLES = """\
 examples:

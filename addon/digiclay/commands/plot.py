@@ -13,7 +13,7 @@ from ..core.base.run_folder import claim_files
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, read_run
 from .arguments import add_run
-from .refusals import refuse_unwritable, refuse_what_has_no_surface, refuse_without
+from .stop import refuse_unwritable, refuse_what_has_no_surface, refuse_without
 
 EXAMPLES = """\
 examples:

@@ -18,10 +18,8 @@ from ..core.scene.schema import Scene
 from ..core.session.finished_run import find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size, told_as_options
-from .exit_codes import STOPPED
 from .progress import Counted
-from .refusals import refuse_file, refuse_without_blender
-from .stop import Stop
+from .stop import STOPPED, Stop, refuse_file, refuse_without_blender
 
 if TYPE_CHECKING:
     from ..pictures.film import Shots

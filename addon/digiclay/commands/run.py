@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..core.base.errors import OutputError, ParameterError, SceneError
-from ..core.base.run_folder import claim_folder
-from ..core.base.safe_names import find_name
+from ..core.base.run_folder import claim_folder, find_name
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import Result, run, save
-from ..plugins.method_copy import describe_origin, write_code
-from .arguments import add_command, add_scene, length, scene_of
-from .budget import noted, within
-from .exit_codes import STOPPED
+from ..core.studies.omissions import Fitted, find_omissions
+from ..plugins.method_loader import describe_origin, write_code
+from .arguments import add_command, add_scene, length, scene_of, told_as_options
 from .export import formats
 from .extras import (
     Extra,
@@ -29,9 +29,58 @@ from .extras import (
     tell_left_out,
     tell_stopped_before,
 )
-from .progress import Bar
-from .refusals import refuse_what_has_no_surface, refuse_without, refuse_without_blender
-from .stop import Stop
+from .progress import Bar, Line, table
+from .stop import STOPPED, Stop, refuse_what_has_no_surface, refuse_without, refuse_without_blender
+
+
+def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
+    """Leave out of a scene what a budget of height error, m, allows; print what that is.
+
+    `budget`, m; `quiet`: print nothing.
+    """
+    with Line(sys.stderr) as line:
+        told = None if quiet else lambda said: line.draw(f"trying: {said}")
+        with told_as_options("run"):
+            found = find_omissions(scene, budget, told=told)
+    if not quiet:
+        print("\n".join(report(found)))
+    return found
+
+
+def noted(found: Fitted) -> dict[str, Any]:
+    """Return what ``metrics.json`` holds of it."""
+    return {
+        "allowed": found.budget,
+        "measured": found.error,
+        "departure": found.departure,
+        "own_error": found.own_error,
+        "work": found.work,
+        "left_out": found.left_out,
+        "units": {"allowed": "m", "measured": "m", "departure": "m", "own_error": "m", "work": "1"},
+    }
+
+
+def report(found: Fitted) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield f"What {found.scene.name} can do without, within {found.budget * 1e6:g} µm of height:"
+    rows = [
+        [
+            one.said,
+            f"> {found.budget * 1e6:g}" if math.isinf(one.departure) else f"{one.departure * 1e6:.3g}",
+            "" if math.isnan(one.work) else f"{100 * one.work:.0f} %",
+            "left out" if one.kept else "",
+        ]
+        for one in found.tried
+    ]
+    yield from table(("it would have", "off by, µm", "work left", ""), rows)
+    said = "; ".join(found.left_out) or "nothing: all of it is needed"
+    yield f"Left out: {said}."
+    yield (
+        f"Measured then: {found.error * 1e6:.3g} µm "
+        f"({found.departure * 1e6:.3g} µm from the full model, {found.own_error * 1e6:.3g} of integration), "
+        f"for {100 * found.work:.0f} % of its work."
+    )
+
 
 EXAMPLES = """\
 examples:

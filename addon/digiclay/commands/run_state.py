@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import DigiclayError
-from ..core.base.run_folder import lock_name
-from ..core.base.whole_files import format_json, read_json, write_whole
+from ..core.base.run_folder import format_json, lock_name, read_json, write_whole
 from ..core.scene.scene_source import load, load_recorded
 from ..core.session.finished_run import has_files, is_whole
-from ..core.studies.job_outputs import MOVING, Outputs
-from ..core.studies.job_table import JOB, SCENE, read_outputs
-from ..plugins.method_copy import CODE
+from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
+from ..plugins.method_loader import CODE
 
 #: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.
 RUNS, TIMING, FILES = "runs", "timing.json", "files"

@@ -12,10 +12,8 @@ from pathlib import Path, PureWindowsPath
 from typing import NamedTuple
 
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import resolve_inside
-from ..core.base.safe_names import make_safe_name
-from ..core.base.whole_files import write_whole
-from ..farms import cuecmd, flamenco, openjd
+from ..core.base.run_folder import make_safe_name, resolve_inside, write_whole
+from ..farms import series_plan
 from ..farms.series_plan import Task, plan_series, split_frames
 from .batch_folder import Folder
 from .evaluation_pool import read_count
@@ -35,7 +33,7 @@ class Submission(NamedTuple):
 
     def show(self, *words: str) -> str:
         """Return a command as it is typed into a terminal."""
-        return cuecmd.join_words(words, windows=os.name == "nt")
+        return series_plan.join_words(words, windows=os.name == "nt")
 
     def find(self, name: str) -> str:
         """Return the path of a file in the folder of the series."""
@@ -49,8 +47,8 @@ Written = tuple[dict[str, str], list[str]]
 def _write_openjd(made: Submission) -> Written:
     """Return the job template."""
     name = "openjd.json"
-    template = openjd.format_template(made.name, made.tasks, made.program[1:])
-    given = ["-p", f"{openjd.name_program(made.program[1:])}={made.program[0]}"]
+    template = series_plan.format_template(made.name, made.tasks, made.program[1:])
+    given = ["-p", f"{series_plan.name_program(made.program[1:])}={made.program[0]}"]
     return {name: template}, [
         f"check: {made.show('openjd', 'check', made.find(name))}",
         f"run on this machine: {made.show('openjd', 'run', made.find(name), *given)}",
@@ -59,10 +57,10 @@ def _write_openjd(made: Submission) -> Written:
 
 def _write_flamenco(made: Submission) -> Written:
     """Return the job type and the job."""
-    script, job = f"flamenco/{flamenco.SCRIPT.name}", "flamenco/job.json"
+    script, job = f"flamenco/{series_plan.SCRIPT.name}", "flamenco/job.json"
     files = {
-        script: flamenco.SCRIPT.read_text(encoding="utf-8"),
-        job: flamenco.format_job(made.name, made.tasks, made.program, made.series),
+        script: series_plan.SCRIPT.read_text(encoding="utf-8"),
+        job: series_plan.format_job(made.name, made.tasks, made.program, made.series),
     }
     post = ("curl", "--header", "Content-Type: application/json", "--data-binary", f"@{made.find(job)}")
     return files, [
@@ -73,7 +71,7 @@ def _write_flamenco(made: Submission) -> Written:
 
 def _write_cuecmd(made: Submission) -> Written:
     """Return the lists of commands."""
-    lists = cuecmd.format_lists(made.tasks, made.program, made.series)
+    lists = series_plan.format_lists(made.tasks, made.program, made.series)
     files = {f"cuecmd/{name}": text for name, text in lists.items()}
     said = [made.show("cuecmd", made.find(name)) for name in files]
     return files, ["submit each when the one before has ended:", *said]

@@ -13,8 +13,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError
-from ..core.base.safe_names import find_name
-from ..core.base.whole_files import write_whole
+from ..core.base.run_folder import find_name, write_whole
 from ..core.control.methods import METHODS, find_method
 from ..core.scene.scene_source import Setting, find, load
 from ..core.studies.axes import Point
@@ -32,11 +31,9 @@ from ..core.studies.sweep_plan import POINTS, Folder, hash_points
 from ..plugins.method_loader import OwnRow
 from .arguments import METHOD, settings_of
 from .evaluation_pool import add_pool, finish_points
-from .exit_codes import STOPPED
 from .extras import format_command
 from .machine import describe_machine
-from .refusals import refuse_without
-from .stop import Stop
+from .stop import STOPPED, Stop, refuse_without
 from .suite_page import (
     Provenance,
     format_league,

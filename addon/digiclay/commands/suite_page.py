@@ -15,7 +15,7 @@ from ..core.studies.evaluation import Record
 from ..core.studies.league import KIND, Interval, Row, Table, find_interval
 from ..core.studies.method_trials import LIMITS, LOW, OUTCOMES
 from .gallery import wrap
-from .tables import table as aligned
+from .progress import table as aligned
 
 #: Columns of the league: measure, heading, factor to the unit shown, that unit, and the one of the CSV.
 COLUMNS: tuple[tuple[str, str, float, str, str], ...] = (

@@ -11,7 +11,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError
-from ..core.base.whole_files import write_whole
+from ..core.base.run_folder import write_whole
 from ..core.scene.scene_source import Setting, find
 from ..core.studies.axes import Axis, Column, make_columns, make_points, read_axis
 from ..core.studies.evaluation import (
@@ -24,9 +24,8 @@ from ..core.studies.evaluation import (
 from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
 from .arguments import add_scene, name_methods, settings_of
 from .evaluation_pool import add_pool, finish_points
-from .exit_codes import STOPPED
 from .progress import Counted
-from .stop import Stop
+from .stop import STOPPED, Stop
 
 EXAMPLES = """\
 examples:

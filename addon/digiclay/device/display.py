@@ -18,6 +18,7 @@ from ..overlay import views
 from ..settings import properties
 from . import form, heat, view
 from .node_tree import LENGTH
+from .skin_lattice import KINDS
 
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
@@ -83,7 +84,7 @@ def _set_form(display: Any, code: int) -> None:
 
 
 def _skin(display: Any) -> int:
-    return form.KINDS.index(form.read_kind(display.id_data))
+    return KINDS.index(form.read_kind(display.id_data))
 
 
 def _set_skin(display: Any, code: int) -> None:

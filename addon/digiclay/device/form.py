@@ -6,14 +6,27 @@ from typing import Any
 
 from ..compat import node_setting, set_node_setting
 from ..core.base.errors import DigiclayError
-from .bed_modifier import find_modifier, require_modifier
-from .node_tree import FAR, FORM, MEMBRANE
+from .node_tree import ARROWS, FAR, FORM, MEMBRANE
 from .skin_lattice import KINDS
 
-__all__ = [
-    "BEFORE", "FORMS", "KINDS", "can_show_skin", "is_far", "is_skin_shown", "read_form", "read_kind",
-    "set_far", "set_form", "set_kind",
-]  # fmt: skip
+
+def find_modifier(bed: Any) -> Any | None:
+    """Return the modifier that draws the pins, or None when the user has removed or changed it."""
+    for modifier in bed.modifiers:
+        tree = modifier.node_group if modifier.type == "NODES" else None
+        if tree is not None and ARROWS in tree.interface.items_tree:
+            return modifier
+    return None
+
+
+def require_modifier(bed: Any) -> Any:
+    """Return the modifier that draws the pins, or refuse a bed without. Raises DigiclayError."""
+    found = find_modifier(bed)
+    if found is None:
+        rule = "must have the geometry nodes modifier that draws its pins (got none)"
+        raise DigiclayError(f"{bed.name} {rule}. Undo its removal.")
+    return found
+
 
 #: Forms, in the order of the numbers in the settings of the geometry nodes.
 FORMS = ("automatic", "pins", "skin", "both")

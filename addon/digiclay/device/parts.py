@@ -12,7 +12,7 @@ from ..compat import bpy, shader_nodes
 from ..core.base.modes import COLORS, Mode
 from . import heat, primitives
 from .instant import Instant
-from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
+from .primitives import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 from .skin_lattice import choose_parts, make_lattice
 from .skin_nodes import SkinMeshes, make_meshes
 

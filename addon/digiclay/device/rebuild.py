@@ -12,7 +12,7 @@ from ..live import bed_state
 from ..settings import properties
 from . import view
 from .instant import Instant, find_ellipsoid
-from .roles import FINGER
+from .primitives import FINGER
 
 
 def rebuild(bed: Any) -> Scene:

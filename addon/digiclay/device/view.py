@@ -22,11 +22,11 @@ from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
 from . import parts
-from .bed_modifier import find_modifier, require_modifier
+from .form import find_modifier, require_modifier
 from .instant import Instant
 from .node_tree import ARROW_LENGTH, ARROWS, CASE, COLOR_BY_FORCE, SOURCES, TOP_FORCE, bed_nodes
 from .parts import is_linked, material
-from .roles import BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, ROLE
+from .primitives import BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, ROLE
 
 __all__ = [
     "BED", "COLORINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "add_modifier", "arrow_length",

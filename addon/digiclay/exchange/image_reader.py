@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..compat import bpy
 from ..core.base.errors import ParameterError
-from ..core.shapes.picture_heights import READERS, refuse_too_many
+from ..core.shapes.heightmap import READERS, refuse_too_many
 
 #: Most pixels that are handed over: Blender gives four 32-bit numbers for each. More are scaled down by it.
 MOST = 4_000_000

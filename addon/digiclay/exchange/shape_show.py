@@ -18,8 +18,7 @@ from ..core.scene.assembly import assemble
 from ..core.scene.forming import compute_display_time, find_display, find_touch_height
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
-from ..core.shapes.fitting import Fitted, fit_relief
-from ..core.shapes.height_text import pack
+from ..core.shapes.fitting import Fitted, fit_relief, pack
 from ..core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
 from ..core.shapes.relief import Relief
 from ..core.shapes.request import Shape

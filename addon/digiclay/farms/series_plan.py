@@ -6,12 +6,19 @@ last. Each task is a command of digiclay that does nothing, with exit code 0, wh
 
 from __future__ import annotations
 
+import json
+import os
+import re
+import shlex
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError
-from ..core.studies.job_outputs import MOVING, Outputs
-from ..core.studies.job_table import Job, JobSeries
-from ..plugins.method_copy import find_word
+from ..core.studies.job_table import MOVING, Job, JobSeries, Outputs
+from ..plugins.method_loader import find_word
 
 #: The option that takes a range of frames.
 FRAME_OPTION = "--frames"
@@ -124,3 +131,136 @@ def split_frames(tasks: tuple[Task, ...]) -> tuple[Task, ...]:
         parts[task.name] = tuple(part.name for part in own)
         found += own
     return tuple(found)
+
+
+#: Characters of a step's name, and seconds a task gets to stop by itself.
+LONGEST, GRACE = 64, 30
+#: Names of the parameter that is the program, by the first of its arguments: the others fit that kind alone.
+PROGRAMS = {"-m": "Python", "--background": "Blender", "": "Digiclay"}
+
+
+def format_template(name: str, tasks: Sequence[Task], leading: Sequence[str]) -> str:
+    """Return the template of a series; `leading` are the program's arguments before those of digiclay."""
+    steps, program = name_steps(tasks), name_program(leading)
+    template = {
+        "specificationVersion": "jobtemplate-2023-09",
+        "name": name,
+        "description": "A series of digiclay: runs, frames, films and the page.",
+        "parameterDefinitions": [
+            {
+                "name": "Series", "type": "PATH", "default": ".",
+                "objectType": "DIRECTORY", "dataFlow": "INOUT",
+                "description": "The folder of the series, on a drive that all machines share.",
+            },
+            {
+                "name": program, "type": "PATH", "objectType": "FILE", "dataFlow": "NONE",
+                "description": f"The path of {program}; it is started with: {' '.join([*leading, 'job'])}",
+            },
+        ],
+        "steps": [_make_step(task, steps, program, leading) for task in tasks],
+    }  # fmt: skip
+    return json.dumps(template, indent=1, ensure_ascii=False) + "\n"
+
+
+def name_program(leading: Sequence[str]) -> str:
+    """Return the name of the parameter that is the program, by its arguments before those of digiclay."""
+    return PROGRAMS[leading[0] if leading else ""]
+
+
+def name_steps(tasks: Sequence[Task]) -> dict[str, str]:
+    """Return the names of steps by those of their tasks: a long one is cut and gets a number."""
+    steps = {}
+    for number, task in enumerate(tasks, 1):
+        mark = f" #{number}"
+        long = len(task.name) > LONGEST
+        steps[task.name] = f"{task.name[: LONGEST - len(mark)]}{mark}" if long else task.name
+    return steps
+
+
+def _make_step(task: Task, steps: dict[str, str], program: str, leading: Sequence[str]) -> dict[str, Any]:
+    """Return a step, with a parameter space where it draws frames."""
+    arguments = [*leading, *task.list_arguments("{{Param.Series}}")]
+    step: dict[str, Any] = {"name": steps[task.name]}
+    if task.needs:
+        step["dependencies"] = [{"dependsOn": steps[need]} for need in task.needs]
+    if task.frames:
+        span = f"0-{task.frames.count - 1}:{task.frames.chunk}"
+        step["parameterSpace"] = {
+            "taskParameterDefinitions": [{"name": "Frame", "type": "INT", "range": span}]
+        }
+        arguments += [FRAME_OPTION, f"{{{{Task.Param.Frame}}}}+{task.frames.chunk}"]
+    stop = {"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": GRACE}
+    run = {"command": f"{{{{Param.{program}}}}}", "args": arguments, "cancelation": stop}
+    return {**step, "script": {"actions": {"onRun": run}}}
+
+
+#: The job type's script; its name without ending, with - for _, is the type's.
+SCRIPT = Path(__file__).with_name("digiclay_series.js")
+#: Flamenco's names of systems.
+PLATFORMS = {"win32": "windows", "darwin": "darwin"}
+
+
+def format_job(name: str, tasks: Sequence[Task], program: Sequence[str], series: str) -> str:
+    """Return a job as the Manager takes it.
+
+    `tasks`: each after those it needs; `program`: path of the program, and its arguments before those of
+    digiclay; `series`: folder of the series.
+    """
+    parts = split_frames(tuple(tasks))
+    places = {part.name: number for number, part in enumerate(parts)}
+    plan = [
+        {
+            "name": part.name, "type": "blender" if part.blender else "misc", "command": part.command,
+            "folder": part.folder, "options": part.options, "needs": [places[need] for need in part.needs],
+        }
+        for part in parts
+    ]  # fmt: skip
+    settings = {
+        "program": program[0],
+        "program_args": json.dumps(program[1:], ensure_ascii=False),
+        "series": series,
+        "tasks": json.dumps(plan, ensure_ascii=False),
+    }
+    job = {
+        "name": name,
+        "type": SCRIPT.stem.replace("_", "-"),
+        "priority": 50,
+        "submitter_platform": PLATFORMS.get(sys.platform, "linux"),
+        "metadata": {"project": "digiclay"},
+        "settings": settings,
+    }
+    return json.dumps(job, indent=1, ensure_ascii=False) + "\n"
+
+
+def format_lists(tasks: Sequence[Task], program: Sequence[str], series: str) -> dict[str, str]:
+    """Return the lists by their names, in the order in which they are to be submitted.
+
+    `tasks`: each after those it needs; `program`: path of the program, and its arguments before those of
+    digiclay; `series`: folder of the series. Raises OutputError when a path cannot stand in a line.
+    """
+    depth: dict[str, int] = {}
+    lists: dict[tuple[int, str], list[str]] = {}
+    for task in split_frames(tuple(tasks)):
+        depth[task.name] = 1 + max((depth[need] for need in task.needs), default=0)
+        line = join_words([*program, *task.list_arguments(series)], windows=os.name == "nt")
+        lists.setdefault((depth[task.name], task.stage), []).append(line)
+    return {
+        f"{number}-{stage}.txt": "\n".join(lines) + "\n" for (number, stage), lines in sorted(lists.items())
+    }
+
+
+def join_words(words: Sequence[str], *, windows: bool) -> str:
+    """Return a command as one line of a shell.
+
+    `windows`: for cmd.exe, where double quotes protect all but themselves and percent signs. Raises
+    OutputError when a word cannot stand in a line.
+    """
+    for word in words:
+        if re.search(r"[\x00-\x1f\x7f]", word) or (windows and re.search('[%"]', word)):
+            raise OutputError(
+                f"{word!r} cannot stand in a line of a command list: choose another folder with --out."
+            )
+    if not windows:
+        return shlex.join(words)
+    quoted = (re.sub(r"(\\+)$", r"\1\1", word) for word in words)
+    return " ".join(word if re.fullmatch(r"[\w.:\\/+-]+", word) else f'"{word}"' for word in quoted)

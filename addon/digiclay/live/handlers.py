@@ -6,14 +6,69 @@ The handlers are there only while a session runs.
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
 from ..overlay import views
+from ..recorded import takes
 from ..ui_text import localize
-from . import loop, recovery, running, selection, tick
+from . import loop, running, selection, tick
 from .running import Running
 from .stroke_queue import drop_strokes
+from .waiting import find_bed
+
+#: Takes that stand in beds for the moment of saving: uid and name of the bed, number of the take.
+_WRITTEN: list[tuple[int, str, str]] = []
+
+
+def write_recovery() -> None:
+    """Put what is being recorded into the beds, as takes: the file is about to be saved."""
+    clear_recovery()
+    for session in running.list_sessions():
+        bed, take = find_bed(session.uid, session.name), takes.read_recording(session)
+        if bed is not None and take is not None:
+            _WRITTEN.append((session.uid, session.name, takes.add(bed, take).number))
+
+
+def clear_recovery(path: str = "") -> None:
+    """Take it out of the beds again, since the recordings go on.
+
+    `path`: the file that has been saved; empty when that has failed, or is not known.
+    """
+    while _WRITTEN:
+        uid, name, number = _WRITTEN.pop()
+        bed = find_bed(uid, name)
+        if bed is None or number not in [entry.number for entry in takes.list_takes(bed)]:
+            continue  # undone in the meantime
+        takes.remove(bed, number)
+        session = running.find(bed)
+        # A copy saved elsewhere is not the file Blender asks about before it closes it.
+        if session and session.recording and path and path == bpy.data.filepath:
+            keep = replace(session.recording, saved=session.recording.count)
+            running.put(replace(session, recording=keep))
+
+
+def has_unsaved() -> bool:
+    """Return whether something was recorded that the file does not have."""
+    return any(
+        session.recording is not None and session.recording.unsaved for session in running.list_sessions()
+    )
+
+
+def file_path() -> Path:
+    """Return the file that is left; the next one replaces it."""
+    return Path(bpy.app.tempdir).parent / "digiclay_recording.blend"
+
+
+def save_copy() -> str:
+    """Leave the open file, as it is now, for recovery; return words about it."""
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(file_path()), copy=True, check_existing=False)
+    except RuntimeError as error:
+        return localize("It could not be left for recovery: {}", str(error).removeprefix("Error: ").strip())
+    return localize("It can be had back with File > Recover > Auto Save: {}", file_path().name)
+
 
 #: Ticks until the state undo has put into a bed is taken up, that one included.
 STALE = 2
@@ -46,19 +101,19 @@ def reload_states(*_: Any) -> None:
 @bpy.app.handlers.persistent
 def write_recordings(*_: Any) -> None:
     """Have the file that is about to be saved hold what is being recorded."""
-    recovery.write_recovery()
+    write_recovery()
 
 
 @bpy.app.handlers.persistent
 def finish_saving(path: str, *_: Any) -> None:
     """Go on recording after the file was saved. `path`: of the file; `_`: what else Blender hands over."""
-    recovery.clear_recovery(path)
+    clear_recovery(path)
 
 
 @bpy.app.handlers.persistent
 def cancel_saving(*_: Any) -> None:
     """Go on recording after the file could not be saved."""
-    recovery.clear_recovery()
+    clear_recovery()
 
 
 @bpy.app.handlers.persistent
@@ -80,7 +135,7 @@ def end(how: str, *sessions: Running) -> None:
     `how`: what is told of them, after their names; `sessions`: all that run if none is given. The last one
     takes loop and handlers along.
     """
-    recovery.clear_recovery()
+    clear_recovery()
     sessions = sessions or running.list_sessions()
     words = [localize("The session of {} {}", ", ".join(session.name for session in sessions), localize(how))]
     try:
@@ -107,10 +162,10 @@ def end_all(how: str) -> None:
 
 def end_with_file(how: str) -> None:
     """End all sessions since their file goes away; what it does not have of a recording can be recovered."""
-    unsaved = recovery.has_unsaved()
+    unsaved = has_unsaved()
     end(how)
     if unsaved:
-        running.set_message(f"{running.last_message()}. {recovery.save_copy()}")
+        running.set_message(f"{running.last_message()}. {save_copy()}")
 
 
 def unwatch() -> None:

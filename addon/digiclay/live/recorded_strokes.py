@@ -26,8 +26,7 @@ from ..settings.beds import BEDS
 from ..settings.devices import change_finger
 from .running import Running
 from .sculpting import change_scene, follow_finger
-from .stroke import DEEPEST, SHALLOWEST, SYMMETRIES, Brush, Stroke, draw
-from .stroke_path import lay_line, lay_path, lay_ring, pull
+from .stroke import DEEPEST, SHALLOWEST, SYMMETRIES, Brush, Stroke, draw, lay_line, lay_path, lay_ring, pull
 from .stroke_queue import change_stroke, find_stroke, queue_stroke
 from .tracking import find_tracking
 

@@ -12,7 +12,7 @@ from ..core.scene.schema import Scene
 from ..core.session.accuracy import ErrorMonitor, Errors
 from ..core.session.live_periods import Clock
 from ..core.session.recent_trace import RecentTrace
-from ..core.session.recorded_path import Recording
+from ..core.session.take import Recording
 from .stroke import Stroke
 
 __all__ = [

@@ -22,10 +22,148 @@ from ..core.base.arrays import Floats
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid
 from ..core.surface.pointing import find_ground_height
-from .lean import advance_turn
-from .stroke import ABOVE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
-from .stroke_travel import CLEARANCE, DRAG, LIFT, NEAR, SPAN, Place, cross, drag, finish_image, run_clock
+from .stroke import ABOVE, DONE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Mirror, Stroke
 from .tracking import Tracking
+
+#: Lowest point of the finger, m.
+Place = tuple[float, float, float]
+
+#: How fast it leaves, m/s: well above any pin's free speed, so that no blister follows it up; and how fast
+#: it crosses the bed above all pins.
+LIFT, CROSS = 0.4, 1.0
+#: Fastest drag, m/s. On the paper's device a valley is as even at 100 mm/s as at 20 mm/s; at 200 mm/s
+#: the master is left behind, and its depth grows from 4 to 11 mm along 60 mm.
+DRAG = 0.1
+#: Fastest drag of a finger that presses, in its half widths a second: on the bed "design", half as wide, 6 mm
+#: deep, it leaves a valley uneven by 0.7 mm at 100 mm/s, by 0.05 mm at 60 mm/s.
+SPAN = 30.0
+#: How far above the highest pin the finger passes over the bed, m.
+CLEARANCE = 4e-3
+#: Heights that differ by less count as equal, m.
+NEAR = 1e-9
+#: How far a session slower than the wall's clock may fall behind the hand's times, s: what a hand does
+#: in seconds is not to take minutes. The path stays whole, since the finger drags no faster than `DRAG`.
+LATE = 0.5
+
+
+def run_clock(stroke: Stroke, period: float, now: float) -> Stroke:
+    """Return the stroke with its clock a control period on. `period`, s; `now`: time by the wall, s."""
+    # It waits for moves that may have been made, or it would stop short and then make haste.
+    if stroke.held and stroke.clock >= stroke.known:
+        return stroke
+    return replace(stroke, clock=max(stroke.clock + period, now - stroke.began - LATE))
+
+
+def cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[Stroke, Place]:
+    """Go up to a safe height, then over to the path's first place.
+
+    `place` (float, float, float), of the finger, m; `safe`, m; `period`, s.
+    """
+    x, y, z = place
+    if z < safe - NEAR:
+        return stroke, (x, y, min(safe, z + LIFT * period))
+    to_x, to_y = stroke.place(0)
+    far, length = math.hypot(to_x - x, to_y - y), CROSS * period
+    if far > length:
+        return stroke, (x + (to_x - x) * length / far, y + (to_y - y) * length / far, z)
+    return replace(stroke, phase=PRESSING), (to_x, to_y, z)
+
+
+def drag(stroke: Stroke, x: float, y: float, length: float) -> tuple[Stroke, float, float]:
+    """Return the stroke and the place after a length of its path, never ahead of the hand.
+
+    `x`, `y`: where the finger is, m; `length`, m.
+    """
+    reached, samples = stroke.reached, stroke.samples
+    while reached + 1 < len(samples):
+        last, aim = samples[reached], samples[reached + 1]
+        (last_x, last_y), (aim_x, aim_y) = stroke.place(reached), stroke.place(reached + 1)
+        passed = aim.time <= stroke.clock
+        # On the way to a move yet to come the finger is no farther than the hand was.
+        part = 1.0 if passed else (stroke.clock - last.time) / (aim.time - last.time)
+        to_x, to_y = last_x + part * (aim_x - last_x), last_y + part * (aim_y - last_y)
+        far = math.hypot(to_x - x, to_y - y)
+        if far > length:
+            x, y = x + length / far * (to_x - x), y + length / far * (to_y - y)
+            break
+        x, y, length = to_x, to_y, length - far
+        if not passed:
+            break
+        reached += 1
+    return replace(stroke, reached=reached), x, y
+
+
+def finish_image(stroke: Stroke) -> Stroke:
+    """Return the stroke with its next mirror image begun; without one it is done."""
+    if stroke.image + 1 < len(stroke.mirrors):
+        return replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, climb=0.0)
+    return replace(stroke, phase=DONE)
+
+
+#: How fast the finger turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt read in
+#: coarse steps does not jerk it.
+TURN = 3.0
+
+
+def lean_finger(turn: Floats, lean: tuple[float, float]) -> Floats:
+    """Return the orientation of a finger that leans over from another orientation.
+
+    `turn` (4,), unit quaternion w, x, y, z of the finger that does not lean; `lean` (float, float), how far
+    its top leans towards x and towards y of the bed, rad: the angle is the length.
+    """
+    angle = math.hypot(*lean)
+    if angle == 0.0:
+        return turn
+    # The axis is level, and square to the direction in which the top goes.
+    share = math.sin(0.5 * angle) / angle
+    return _multiply(np.array([math.cos(0.5 * angle), -lean[1] * share, lean[0] * share, 0.0]), turn)
+
+
+def mirror_turn(turn: Floats, mirror: Mirror) -> Floats:
+    """Return the orientation of an ellipsoid's mirror image.
+
+    `turn` (4,), unit quaternion w, x, y, z; `mirror` (float, float), factors of x and y, 1 or -1.
+    """
+    along, across = mirror
+    # M R M for M = diag(along, across, 1): the axis of a rotation is mirrored the other way round.
+    return np.asarray(turn * [1.0, across, along, along * across])
+
+
+def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:
+    """Return an orientation turned towards another, by an angle at most.
+
+    `turn`, `aim` (4,), unit quaternions w, x, y, z; `angle`, rad.
+    """
+    dot = float(turn @ aim)
+    # The two quaternions of an orientation are opposite: the nearer one is meant.
+    aim = aim if dot >= 0.0 else -aim
+    far = 2.0 * math.atan2(float(np.linalg.norm(aim - abs(dot) * turn)), abs(dot))
+    if far <= angle:
+        return aim
+    part, half = angle / far, 0.5 * far
+    between: Floats = (math.sin((1.0 - part) * half) * turn + math.sin(part * half) * aim) / math.sin(half)
+    return between / np.linalg.norm(between)
+
+
+def advance_turn(stroke: Stroke, turn: Floats, clear: bool, period: float) -> Floats:
+    """Return the finger's orientation after a control period on a stroke, (4,).
+
+    `stroke`: begun; a finished one leaves the finger as it was before; `turn` (4,), the finger's before;
+    `clear`: whether it is above all pins, where it turns at once; `period`, s.
+    """
+    assert stroke.turn is not None
+    if stroke.done:
+        return stroke.turn
+    leaning = lean_finger(stroke.turn, stroke.samples[stroke.reached].lean)
+    aim = mirror_turn(leaning, stroke.mirrors[stroke.image])
+    return aim if clear else turn_toward(turn, aim, TURN * period)
+
+
+def _multiply(first: Floats, second: Floats) -> Floats:
+    """Return the rotation of a second quaternion followed by a first one."""
+    a, u, b, v = first[0], first[1:], second[0], second[1:]
+    return np.concatenate([[a * b - u @ v], a * v + b * u + np.cross(u, v)])
+
 
 #: How fast the finger comes down to the surface, and presses, m/s. Pressed faster, it runs into pins whose
 #: valves have not opened yet: 2 N at 20 mm/s on the paper's device, 24 N at 50 mm/s.

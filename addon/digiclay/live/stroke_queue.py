@@ -11,10 +11,9 @@ from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..device.instant import find_ellipsoid
 from .running import Gesture, Running
-from .settling import begin_settling, settle
 from .stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
 from .stroke_motion import follow
-from .sweep import find_radius, sweep
+from .sweep import begin_settling, find_radius, settle, sweep
 from .tracking import find_tracking
 
 

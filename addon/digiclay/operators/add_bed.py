@@ -10,7 +10,7 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
 from ..device import palettes, rebuild, view
 from ..device.instant import Instant, find_ellipsoid
-from ..device.roles import BALL
+from ..device.primitives import BALL
 from ..device.view import bed_of
 from ..live import running
 from ..press.free_place import find_free_place

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..compat import bpy
 from ..live import running
-from ..live.stroke import SYMMETRIES, Brush
-from ..live.stroke_path import lay_line, lay_path, lay_ring
+from ..live.stroke import SYMMETRIES, Brush, lay_line, lay_path, lay_ring
 from ..live.stroke_queue import change_stroke, last_place, queue_stroke
 from ..press import aim, brush, marks
 from ..ui_text import localize

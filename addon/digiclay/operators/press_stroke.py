@@ -10,8 +10,7 @@ from ..core.base.errors import DigiclayError
 from ..core.control.methods import METHODS
 from ..device import view
 from ..live import loop, running, selection, tick
-from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw
-from ..live.stroke_path import pull
+from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw, pull
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..live.tracking import find_tracking
 from ..press import aim, brush, pen

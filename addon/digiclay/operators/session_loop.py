@@ -10,7 +10,7 @@ import time
 from typing import Any
 
 from ..compat import bpy
-from ..live import handlers, loop, recovery, running, tick
+from ..live import handlers, loop, running, tick
 from ..ui_text import localize
 from .action import Action, Polled
 
@@ -163,13 +163,13 @@ def _resume_later(token: int, window: Any) -> None:
     Until then the file has what is being recorded, in case Blender saves it.
     """
     loop.step_aside()
-    recovery.write_recovery()
+    handlers.write_recovery()
     pointer = window.as_pointer()
 
     def go_on() -> None:
         if token != loop.token():
             return
-        recovery.clear_recovery()
+        handlers.clear_recovery()
         windows = bpy.context.window_manager.windows
         found = next((one for one in windows if one.as_pointer() == pointer), None)
         if found is None:

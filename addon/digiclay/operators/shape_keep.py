@@ -5,7 +5,7 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.shapes.height_text import pack
+from ..core.shapes.fitting import pack
 from ..core.shapes.request import Shape
 from ..device.view import bed_of
 from ..settings import properties

@@ -5,11 +5,11 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
-from ..core.base.whole_files import write_whole
+from ..core.base.run_folder import write_whole
 from ..core.scene.toml_table import format_scene
 from ..core.session.take import to_scene
 from ..device.view import bed_of
-from ..live import recovery, running, sculpting
+from ..live import handlers, running, sculpting
 from ..recorded import takes
 from ..ui_text import localize
 from .action import Action, FileAction
@@ -65,7 +65,7 @@ class KeepTake(Action, bpy.types.Operator):
 
     def perform(self, context: Any) -> set[str] | None:
         """Keep it."""
-        recovery.clear_recovery()
+        handlers.clear_recovery()
         bed = bed_of(context)
         session = running.find(bed)
         assert session is not None  # so says the poll

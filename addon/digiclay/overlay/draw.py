@@ -12,8 +12,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..core.base.arrays import Floats
-from .look import Color
-from .picture import Box, Dot, Line, Picture, Words
+from .picture import Box, Color, Dot, Line, Picture, Words
 
 #: Corners of a dot.
 CORNERS = 20

@@ -16,8 +16,7 @@ from ..core.base.modes import Mode
 from ..core.model.finger_range import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
 from ..ui_text import localize
-from .look import Color, Look
-from .picture import Box, Dot, Line, Picture, Words, round_axis, scale_curve
+from .picture import Box, Color, Dot, Line, Look, Picture, Words, round_axis, scale_curve
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0

@@ -19,8 +19,7 @@ from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
 from ..live import running
 from ..press.aim import project
-from .look import Look, choose_colors
-from .picture import Dot, Picture
+from .picture import Dot, Look, Picture, choose_colors
 from .placement import COMPACT, FULL, Room, find_room, lay_out
 from .sections import Readings
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.metrics.perception import find_weber_fractions
+from ..core.metrics.force import find_weber_fractions
 from ..core.studies.league import find_interval
 from .figure import INK, LINES, MM, SHADE, canvas, legend_above
 

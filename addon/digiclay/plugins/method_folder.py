@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 from ..core.base.errors import MethodError
 from ..core.control.methods import list_added
-from .method_loader import add_class, name_method, run_code
-from .method_rules import list_classes
-from .method_source import read_file
+from .method_loader import add_class, list_classes, name_method, read_file, run_code
 
 
 class FolderMethods(NamedTuple):

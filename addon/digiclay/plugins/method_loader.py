@@ -6,22 +6,216 @@ import builtins
 import copy
 import copyreg
 import dataclasses
+import hashlib
 import importlib
+import importlib.util
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.abc import ExecutionLoader
 from importlib.machinery import ModuleSpec
+from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec
+from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple, NoReturn
 
 from ..core.base.errors import MethodError, ParameterError
-from ..core.control.guarded import Guarded, describe_failure, guard
+from ..core.base.quantity import Quantity
+from ..core.base.run_folder import write_whole
+from ..core.control.blister import Blister
 from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
-from .method_rules import check_class, list_classes
-from .method_source import MethodSource, read_source
+from ..core.control.own_method import MOST_ROWS, Guarded, OwnMethod, describe_failure, guard
+from ..core.model.set_point import SetPoint
+from ..core.scene.schema import Scene
+
+#: The group of entry points by which installed packages offer methods.
+GROUP = "digiclay.methods"
+#: Bytes of the largest file that is read as code.
+LARGEST = 1_000_000
+
+
+class MethodSource(NamedTuple):
+    """Origin of a method's code, and the code: all that another process needs to have it too.
+
+    Attributes
+    ----------
+    label : str
+        For messages: ``mine.py:Mine``, or the name of an installed method.
+    file : str
+        As tracebacks have it.
+    attribute : str
+        Name of the class.
+    text : str
+        The code; empty for that of an installed package, which is imported.
+    package : str
+        Name and version of the installed package; empty for a file.
+    module : str
+        To import; empty for a file.
+    digest : str
+        SHA-256 of the code: methods of one digest are the same.
+    """
+
+    label: str
+    file: str
+    attribute: str
+    text: str
+    package: str
+    module: str
+    digest: str
+
+
+def is_file_word(word: str) -> bool:
+    """Return whether a word of the command line names a file of code."""
+    return ":" in word or word.endswith(".py")
+
+
+def read_source(word: str) -> MethodSource | None:
+    """Return the code that a word of the command line names; None where no package offers such a method.
+
+    `word`: ``path/to/mine.py:Mine``, or the name of an installed method. Raises MethodError: in one line:
+    file and rule.
+    """
+    return _read_file_word(word) if is_file_word(word) else find_installed(word)
+
+
+def _read_file_word(word: str) -> MethodSource:
+    """Read a file named with its class."""
+    name, colon, attribute = word.rpartition(":")
+    if not colon or name == "" or not re.fullmatch(r"[^\W\d]\w*", attribute):
+        example = f"{Path(word).name.partition(':')[0] or 'mine.py'}:Mine"
+        raise MethodError(f"{word} must be a file and a class in it, such as {example}.")
+    return read_file(Path(name), attribute)
+
+
+def read_file(path: Path, attribute: str) -> MethodSource:
+    """Return the code of a file. `attribute`: class in it. Raises MethodError."""
+    try:
+        data = path.read_bytes()
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise MethodError(f"{path} cannot be read as a control method: {why}.") from None
+    if len(data) > LARGEST:
+        raise MethodError(
+            f"{path} must have at most {LARGEST // 1_000_000} MB of code (got {len(data) / 1e6:.3g})."
+        )
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MethodError(f"{path} must be UTF-8 text (byte {error.start} is not).") from None
+    label = f"{path.name}:{attribute}" if attribute else path.name
+    return MethodSource(label, str(path), attribute, text, "", "", hashlib.sha256(data).hexdigest())
+
+
+def find_installed(name: str) -> MethodSource | None:
+    """Return the code of an installed method, without importing it; None where no package offers it.
+
+    `name`: of the entry point. Raises MethodError when several packages offer it.
+    """
+    found: dict[str, EntryPoint] = {point.value: point for point in entry_points(group=GROUP, name=name)}
+    if not found:
+        return None
+    if len(found) > 1:
+        owners = ", ".join(sorted(found))
+        raise MethodError(f"The method {name} must be offered by one installed package (got {owners}).")
+    (point,) = found.values()
+    owner = f"{point.dist.name} {point.dist.version}" if point.dist else point.module
+    try:
+        spec = importlib.util.find_spec(point.module)
+        file = (spec and spec.origin) or ""
+        digest = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    except (ImportError, OSError, ValueError) as error:
+        raise MethodError(f"The method {name} of {owner} cannot be imported: {error}.") from None
+    return MethodSource(name, file, point.attr, "", owner, point.module, digest)
+
+
+#: Names that are no parameters: in the section [control] of a scene file, among a method's functions, and
+#: among those of Blender's properties.
+TAKEN = (
+    "method", "begin", "blister", "build", "check", "command", "locate", "recovers", "rows", "set_point",
+    "bl_rna", "get", "id_data", "items", "keys", "name", "pop", "rna_type", "values",
+)  # fmt: skip
+Refuse = Callable[..., NoReturn]
+#: Types of a parameter's default.
+KINDS = (bool, int, float, str, tuple)
+
+
+def list_classes(module: ModuleType) -> list[type]:
+    """Return the control methods that a module defines itself."""
+    return [
+        one
+        for one in vars(module).values()
+        if isinstance(one, type) and issubclass(one, ControlParameters) and one.__module__ == module.__name__
+    ]
+
+
+def check_class(label: str, kind: Any) -> None:
+    """Refuse a class that is no control method."""
+
+    def refuse(rule: str, got: object = "") -> NoReturn:
+        raise MethodError(f"{label}: {rule}{f' (got {got})' if got != '' else ''}.")
+
+    if not isinstance(kind, type) or not issubclass(kind, ControlParameters):
+        what = kind.__name__ if isinstance(kind, type) else type(kind).__name__
+        refuse("the class must derive from OwnMethod of digiclay.core.control.own_method", what)
+    params = vars(kind).get("__dataclass_params__")
+    if params is None or not params.frozen:
+        refuse("the class must be decorated with @dataclass(frozen=True)")
+    for field in dataclasses.fields(kind):
+        _check_field(field, refuse)
+    if not callable(getattr(kind, "build", None)):
+        refuse("the class must have a function build(self, device), or derive from OwnMethod")
+    if _owner(kind, "build") is OwnMethod and _owner(kind, "command") is OwnMethod:
+        refuse("the class must have a function command(self, memory, cells, device)")
+    _check_settings(kind, refuse)
+    try:
+        asked = getattr(kind(), "set_point", None)
+        if not (asked is None or isinstance(asked, SetPoint)):
+            refuse("set_point must be a SetPoint or None", type(asked).__name__)
+    except ParameterError as error:
+        name = f"the default of {error.field}" if error.field else "the class"
+        refuse(f"{name} {error.rule}", error.value)
+    except (MethodError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        refuse(f"the class {describe_failure(error, '')}")
+
+
+def _owner(kind: type, name: str) -> type | None:
+    """Return the class that defines a function of a class."""
+    return next((one for one in kind.__mro__ if name in vars(one)), None)
+
+
+def _check_field(field: dataclasses.Field[Any], refuse: Refuse) -> None:
+    """Refuse a field that is no declared parameter."""
+    known = field.metadata.get("quantity")
+    if not isinstance(known, Quantity):
+        refuse(f"the field {field.name} must be declared with quantity(default, meaning, unit=...)")
+    if field.name in TAKEN or field.name.startswith("_"):
+        refuse(f"a field must not begin with an underscore, nor be called {', '.join(TAKEN)}", field.name)
+    if not isinstance(field.default, KINDS):
+        kinds = ", ".join(kind.__name__ for kind in KINDS)
+        refuse(f"the default of {field.name} must be a {kinds}", type(field.default).__name__)
+    if not known.doc.strip():
+        refuse(f"the meaning of {field.name} must be given")
+
+
+def _check_settings(kind: type, refuse: Refuse) -> None:
+    """Refuse settings of the class, which are no fields, that are none."""
+    rows = getattr(kind, "rows", 0)
+    if isinstance(rows, int) and not 0 <= rows <= MOST_ROWS:
+        refuse(f"rows must be from 0 to {MOST_ROWS}", rows)
+    blister = getattr(kind, "blister", None)
+    if blister is None:
+        return
+    if not isinstance(blister, Mapping):
+        refuse("blister must be None or a dictionary of defaults", type(blister).__name__)
+    try:
+        Blister(**blister)
+    except (TypeError, ParameterError) as error:
+        refuse(f"blister must hold values of the section [blister]: {error}".rstrip("."))
+
 
 #: The package that this module is part of, in Blender another one than ``digiclay``.
 PACKAGE = __package__.rpartition(".")[0]
@@ -191,3 +385,49 @@ def _import_for_methods(
         if one != "*" and not hasattr(module, one):
             importlib.import_module(f"{full}.{one}")
     return module if wanted else sys.modules[PACKAGE]
+
+
+#: The file of a method's code beside a scene file.
+CODE = "method.py"
+
+
+def find_code(scene: Scene) -> MethodSource | None:
+    """Return the code of a scene's method; None for a built-in one, or without control."""
+    row = list_added().get(scene.method) if scene.control is not None else None
+    return row.source if isinstance(row, OwnRow) else None
+
+
+def describe_origin(scene: Scene) -> dict[str, str]:
+    """Return what metrics.json keeps of the origin of a method of one's own; nothing for a built-in one."""
+    source = find_code(scene)
+    if source is None:
+        return {}
+    return {"method": f"{source.package or source.label} sha256:{source.digest}"}
+
+
+def write_code(scene: Scene, folder: Path) -> None:
+    """Write the code of a scene's method, where it is a file of one's own; else remove a former one."""
+    source = find_code(scene)
+    if source is not None and not source.module:
+        write_whole(folder / CODE, source.text.encode())
+    else:
+        (folder / CODE).unlink(missing_ok=True)
+
+
+def find_word(scene: Scene) -> str:
+    """Return what --method takes for a scene's method of one's own in a folder with its code.
+
+    The name of an installed one; empty for a built-in one.
+    """
+    source = find_code(scene)
+    if source is None:
+        return ""
+    return scene.method if source.module else f"{CODE}:{source.attribute}"
+
+
+def resolve_word(word: str, folder: Path) -> str:
+    """Return a word of --method from the working folder, where it names a file of another folder.
+
+    `folder`: where the file may be.
+    """
+    return str(folder / word) if (folder / word.rpartition(":")[0]).is_file() else word

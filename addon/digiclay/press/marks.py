@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core.base.modes import COLORS, Mode
-from ..overlay.look import Color
-from ..overlay.picture import Line, Words
+from ..overlay.picture import Color, Line, Words
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 

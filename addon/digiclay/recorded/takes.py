@@ -14,8 +14,7 @@ from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
 from ..core.session.live_periods import simulate_path
-from ..core.session.recorded_path import make_take
-from ..core.session.take import Take, from_bytes, to_bytes
+from ..core.session.take import Take, from_bytes, make_take, to_bytes
 from ..live.running import Running
 from ..ui_text import localize
 

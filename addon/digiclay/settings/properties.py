@@ -6,21 +6,50 @@ A scene is made of them and of nothing else, so what the panels show is what is 
 from __future__ import annotations
 
 import json
+import re
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from .. import bridge
 from ..compat import bpy, read_stored
 from ..core.base.errors import ParameterError
-from ..core.base.quantity import Parameters
-from ..core.control.methods import METHODS, find_method
+from ..core.base.quantity import Parameters, list_quantities
+from ..core.control.methods import METHODS, find_method, list_methods
 from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, resolve
 from .chosen_method import find_group, method_of
+from .declared import title
 from .groups import CLASSES, SETTINGS
-from .messages import relabel
+from .shown_units import convert_units
 from .table import Notes, read, write
+
+_NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
+
+
+def relabel(error: ParameterError) -> ParameterError:
+    """Return an error of the core with its owner, field, rule and value as the panels show them.
+
+    ``layout.pitch must be at least actuator.bore, 0.002 m (got 0.001 m)`` becomes
+    ``Layout: Pitch must be at least Actuator: Bore, 2 mm (got 1 mm)``.
+    """
+
+    def labeled(found: re.Match[str]) -> str:
+        return f"{title(found[1])}: {title(found[2])}" if found[2] in _known(found[1]) else found[0]
+
+    owner, field = error.owner, title(error.field)
+    if owner in SECTIONS:
+        owner = f"{title(owner)}: {field}" if field else title(owner)
+        field = ""
+    rule = convert_units(_NAME.sub(labeled, error.rule))
+    return ParameterError(owner, field, rule, convert_units(error.value), error.hint)
+
+
+def _known(section: str) -> set[str]:
+    """Return the names of a section's parameters."""
+    methods = list_methods() if section == "control" else ("virtual_master",)
+    return {name for method in methods for name in list_quantities(import_parameters(section, method))}
+
 
 #: How far a pin may stand from its place before the bed counts as another one, m: more than 32 bits lose on
 #: a bed of meters, less than any change of pitch worth making.

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from digiclay.device import view
 from digiclay.live import follow, running
-from digiclay.live.follow_messages import pack_subscription, parse_address, read_pose
+from digiclay.live.follow import pack_subscription, parse_address, read_pose
 
 from tests.blender.session.live import FLOAT32, TICK, Clock, exact, started
 from tests.timeouts import TIMEOUT

@@ -11,7 +11,7 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay.live import handlers, recovery, running
+from digiclay.live import handlers, running
 from digiclay.live.running import Recording
 from digiclay.recorded import takes
 
@@ -102,38 +102,38 @@ def test_a_file_that_cannot_be_saved_leaves_the_recording_as_it_was(recording: A
     with pytest.raises(RuntimeError):
         save(tmp_path / "nowhere" / "saved.blend")
     assert seconds(recording) == []
-    assert recovery.has_unsaved()
+    assert handlers.has_unsaved()
 
 
 def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(
     recording: Any, clock: Clock
 ) -> None:
     for _ in range(2):
-        recovery.write_recovery()
+        handlers.write_recovery()
         assert seconds(recording) == [SECONDS]
-    recovery.clear_recovery()
+    handlers.clear_recovery()
     assert seconds(recording) == []
 
 
 def test_a_session_that_ends_while_blender_may_save_by_itself_keeps_one_take(recording: Any) -> None:
-    recovery.write_recovery()
+    handlers.write_recovery()
     bpy.ops.digiclay.session_stop()
     assert seconds(recording) == [SECONDS]
 
 
 def test_a_take_kept_while_blender_may_save_by_itself_is_the_only_one_and_the_first(recording: Any) -> None:
-    recovery.write_recovery()
+    handlers.write_recovery()
     bpy.ops.digiclay.take_keep()
-    recovery.clear_recovery()
+    handlers.clear_recovery()
     assert [entry.name for entry in takes.list_takes(recording)] == ["Take 1"]
 
 
 def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording: Any, clock: Clock) -> None:
     bpy.ops.ed.undo_push(message="Before")
-    recovery.write_recovery()
+    handlers.write_recovery()
     bpy.ops.ed.undo_push(message="After")
     bpy.ops.ed.undo()
-    recovery.clear_recovery()
+    handlers.clear_recovery()
     assert seconds(only_bed()) == []
 
 
@@ -145,25 +145,25 @@ def test_another_file_leaves_the_former_one_with_its_take_to_be_recovered(
     bpy.ops.wm.read_homefile(use_empty=True)
     told = "Take 1 (1.0 s). It can be had back with File > Recover > Auto Save: digiclay_recording.blend"
     assert running.last_message().endswith(told)
-    assert recovery.file_path().parent == tmp_path / "temporary"
-    bpy.ops.wm.recover_auto_save(filepath=str(recovery.file_path()))
+    assert handlers.file_path().parent == tmp_path / "temporary"
+    bpy.ops.wm.recover_auto_save(filepath=str(handlers.file_path()))
     assert seconds(only_bed()) == [2 * SECONDS]
 
 
 def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, tmp_path: Path) -> None:
     save(tmp_path / "saved.blend")
     assert seconds(load(tmp_path / "saved.blend")) == [SECONDS]
-    assert not recovery.file_path().exists()
+    assert not handlers.file_path().exists()
 
 
 def test_a_copy_that_was_saved_does_not_count_as_the_file(
     recording: Any, clock: Clock, tmp_path: Path
 ) -> None:
     save(tmp_path / "saved.blend")
-    assert not recovery.has_unsaved()
+    assert not handlers.has_unsaved()
     recorded_on(recording, clock)
     save(tmp_path / "copy.blend", copy=True)
-    assert recovery.has_unsaved()
+    assert handlers.has_unsaved()
 
 
 def test_what_is_recorded_anew_after_undo_is_not_what_was_saved() -> None:
@@ -178,7 +178,7 @@ def test_nothing_is_left_where_nothing_is_recorded(bed: Any, clock: Clock) -> No
     started(bed)
     recorded_on(bed, clock)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not recovery.file_path().exists()
+    assert not handlers.file_path().exists()
 
 
 def test_what_cannot_be_left_is_told(recording: Any, tmp_path: Path) -> None:

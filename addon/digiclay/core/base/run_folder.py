@@ -2,16 +2,160 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
+import re
 import shutil
+import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, BinaryIO
 
 from .errors import OutputError
-from .file_lock import hold_lock
-from .unfinished import name_unfinished, remove_abandoned
+from .file_lock import find_host, hold_lock, may_have_made
+
+#: Bytes of a name in UTF-8; file systems take 255, of which what is unfinished needs some.
+LONGEST = 120
+#: Names that stand for devices in Windows, whatever follows behind a full stop.
+DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|conout\$)", re.IGNORECASE)
+
+
+def make_safe_name(text: str) -> str:
+    """Return a text as the name of a folder: a word of letters, digits and ``. _ + -``.
+
+    It does not begin or end with a full stop, is no device in Windows, and is short enough.
+    """
+    name = re.sub(r"[^\w.+-]", "_", unicodedata.normalize("NFC", text))
+    name = name.lstrip(".-").rstrip(".") or "scene"
+    if DEVICES.fullmatch(name.partition(".")[0]):
+        name = f"_{name}"
+    if len(name.encode(errors="replace")) <= LONGEST:
+        return name
+    digest = hashlib.sha256(name.encode(errors="replace")).hexdigest()[:8]
+    kept = name.encode(errors="replace")[: LONGEST - 9].decode(errors="ignore")
+    return f"{kept}-{digest}"
+
+
+def find_name(path: Path, general: str = "scene.toml") -> str:
+    """Return the name of a file's content: its stem, or its folder's name for a generic stem.
+
+    `path`: however it leads to the file: its own name and its folder's real one count; `general`: the name of
+    a file that says nothing.
+    """
+    full = Path(os.path.abspath(path))
+    name = full.parent.name if full.name == general else full.stem
+    return name if name.strip(". ") else "scene"
+
+
+def fold_name(name: str) -> str:
+    """Return what names have in common that some file systems take for one: ``a`` and ``A``."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def make_unique_names(texts: Sequence[str]) -> list[str]:
+    """Return safe names of texts, in their order; where several would be alike, the later get numbers."""
+    names = [make_safe_name(text) for text in texts]
+    taken = {fold_name(name) for name in names}
+    given: set[str] = set()
+    for place, name in enumerate(names):
+        number, chosen = 1, name
+        while fold_name(chosen) in given or (number > 1 and fold_name(chosen) in taken):
+            number += 1
+            chosen = make_safe_name(f"{name[:LONGEST]}-{number}")
+        names[place] = chosen
+        given.add(fold_name(chosen))
+    return names
+
+
+#: ``.NAME.PID@HOST.KIND``: what becomes NAME, what NAME was, a film's frames. Older versions name no host.
+UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)")
+
+
+def name_unfinished(target: Path, kind: str = "part") -> Path:
+    """Return the name under which this process prepares a file or folder, beside it.
+
+    `kind`: what becomes the target; what the target was; the frames of a film.
+    """
+    return target.with_name(f".{target.name}.{os.getpid()}@{find_host()}.{kind}")
+
+
+def is_unfinished(path: Path) -> bool:
+    """Return whether a name is that of an unfinished file or folder."""
+    return UNFINISHED.fullmatch(path.name) is not None
+
+
+def remove_abandoned(folder: Path, name: str = "") -> None:
+    """Take away what processes of this machine that are gone have left unfinished.
+
+    What was moved aside to be replaced is put back when nothing has come in its place. What other
+    machines prepare on a shared drive stays: nothing here tells whether they are at it.
+
+    `folder`: nothing happens when there is none; `name`: of what it was to become; by default anything.
+    """
+    try:
+        found = sorted(folder.iterdir())
+    except OSError:
+        return
+    for path in found:
+        known = UNFINISHED.fullmatch(path.name)
+        if known is None or (name and known["name"] != name) or known["host"] not in (None, find_host()):
+            continue
+        with suppress(OSError):
+            if may_have_made(int(known["pid"]), path.lstat().st_mtime):
+                continue
+            target = path.with_name(known["name"])
+            if known["kind"] == "old" and not os.path.lexists(target):
+                path.rename(target)
+            elif path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink()
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all: to a temporary name beside it, then renamed.
+
+    Raises OutputError when the file cannot be written.
+    """
+    with open_whole(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def open_whole(path: Path) -> Iterator[BinaryIO]:
+    """Open a file under a temporary name to write into; it becomes `path` when the block ends without error.
+
+    Raises OutputError when the file cannot be written.
+    """
+    part = name_unfinished(path)
+    try:
+        with part.open("wb") as file:
+            yield file
+        part.replace(path)
+    except BaseException as error:
+        with suppress(OSError):  # what went wrong first is what the user has to hear
+            part.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
+        raise
+
+
+def read_json(path: Path) -> dict[str, Any] | None:
+    """Return the content of a small JSON file; None where it cannot be read."""
+    try:
+        read = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return read if isinstance(read, dict) else None
+
+
+def format_json(value: object) -> bytes:
+    """Return a value as JSON with a line's end."""
+    return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
 
 #: The file by which a folder is known as a run's.
 MARK = "metrics.json"

@@ -2,21 +2,296 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any, cast
+import math
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, TypeVar, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Floats
+from ..base.errors import DivergenceError
+from ..control.runs import BatchControl
+from ..engine.simulation import find_divergence, simulate_period
+from ..engine.state import State, make_initial_state
 from ..engine.system import System
-from ..model.interfaces import Stepper
+from ..model.control_interface import Commands, Controller, Measurement
+from ..model.interfaces import Movement, Stepper
 from ..model.layout import Grid, make_grid
+from ..model.null_parts import Uncontrolled
 from ..scene.assembly import Motion, count_rows, make_motion
 from ..scene.schema import Scene
-from ..steppers.bernoulli_plan import BernoulliPlan
-from .advance import Batch
-from .broadcasting import classify, list_numbers, merge_parts
-from .movement import BatchStepper
+from ..steppers.bernoulli import BernoulliPlan
+from .finger_paths import Fingers
 from .padding import OwnSelection, PaddedSelection
-from .run_by_run import join_controllers
+
+Part = TypeVar("Part")
+
+
+def classify(value: Any) -> Any:
+    """Return all of a part but its numbers: parts of one kind can be merged.
+
+    `value`: a dataclass, and in its fields dataclasses, numbers, tuples, texts or None.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        return type(value), *(classify(getattr(value, field.name)) for field in fields(value))
+    if isinstance(value, tuple):
+        return tuple(classify(one) for one in value)
+    return float if isinstance(value, float) else value
+
+
+def merge_parts(parts: Sequence[Part]) -> Part:
+    """Return a part that stands for those of all runs; the first one itself where all are alike.
+
+    `parts`: of one `classify`. What is the same in all of them stays as it is; a number that is not becomes
+    an array (b,), and arrays get one axis more, the last; parts within the parts likewise. The rules of
+    parameters are not checked again.
+    """
+    first: Any = parts[0]
+    own = {field.name: _one([getattr(one, field.name) for one in parts]) for field in fields(first)}
+    if all(value is getattr(first, name) for name, value in own.items()):
+        return parts[0]
+    part: Any = object.__new__(type(first))
+    for name, value in own.items():
+        object.__setattr__(part, name, value)
+    stands_for_all: Part = part
+    return stands_for_all
+
+
+def _one(values: list[Any]) -> Any:
+    """Return what stands for a value in all runs."""
+    first = values[0]
+    if isinstance(first, np.ndarray):
+        alike = all(value is first or np.array_equal(value, first) for value in values)
+        return first if alike else np.stack(values, axis=-1)
+    if is_dataclass(first):
+        return merge_parts(values)
+    if isinstance(first, tuple):
+        own = tuple(_one(list(several)) for several in zip(*values, strict=True))
+        return first if all(map(operator.is_, own, first)) else own
+    return first if all(value is first or value == first for value in values) else np.array(values)
+
+
+def list_numbers(values: Sequence[float]) -> Floats:
+    """Return a number of each run, shape (b,)."""
+    return np.array(values, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class RunByRun:
+    """Asks each run's own controller in turn: right for every method, and as slow as they are.
+
+    What it asks about are the cells that take part in the run; the others get no orders.
+
+    Attributes
+    ----------
+    controllers : tuple of Controller
+    """
+
+    controllers: tuple[Controller, ...]
+
+    def locate(self, memory: list[Any], touched: Measurement) -> tuple[list[Any], list[Any]]:
+        """Let each take in its cells."""
+        found = [
+            controller.locate(known, _take_run(touched, run))
+            for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
+        ]
+        return [known for known, _ in found], [disc for _, disc in found]
+
+    def command(self, memory: list[Any], seen: Measurement) -> tuple[list[Any], Commands]:
+        """Let each give its orders."""
+        given = [
+            controller.command(known, _take_run(seen, run))
+            for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
+        ]
+        targets, modes, commands = seen.target.copy(), seen.mode.copy(), np.zeros(seen.target.shape)
+        for run, (_, orders) in enumerate(given):
+            own = slice(orders.target.size)
+            targets[own, run], modes[own, run], commands[own, run] = orders
+        return [known for known, _ in given], Commands(targets, modes, commands)
+
+
+def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any:
+    """Return one controller for all runs: the method's own where its formulas hold for many at once.
+
+    `by_set`: see `System.by_set`.
+    """
+    first = controllers[0]
+    if isinstance(first, BatchControl) and not by_set:
+        merged = merge_parts(controllers)
+        parts = {part.name: getattr(merged, part.name) for part in fields(merged)}
+        return merged.batch_class(**parts | {"runs": tuple(controllers)})
+    return first if isinstance(first, Uncontrolled) else RunByRun(tuple(controllers))
+
+
+def _take_run(seen: Measurement, run: int) -> Measurement:
+    """Return what is measured of one run."""
+    own = slice(seen.present[run] if seen.present else None)
+    rows: Any = seen[:-1]
+    basis, *others = (one[..., own, run] for one in rows)
+    return Measurement(np.ascontiguousarray(basis), *others)
+
+
+#: Cells moved at a time: as many as stay in a core's cache, and few enough for the matrix products to stay
+#: on one core (waking a second one takes longer than the product).
+PIECE = 2048
+#: Cells of a run out of the finger's reach are moved by so many at a time, or a multiple: workspaces of few
+#: sizes serve for any number of them.
+GROUP = 8
+
+
+@dataclass(frozen=True, eq=False)
+class BatchStepper:
+    """The runs' own stepper, for the cells of many runs; see `interfaces.Stepper`.
+
+    Attributes
+    ----------
+    stepper : Stepper
+    alike : bool
+        The cells of all runs are alike, so they are moved as those of one large bed.
+    valve : int
+        From this row on there is what moves a pin without a finger: its opening and its commands.
+    """
+
+    stepper: Stepper
+    alike: bool
+    valve: int
+
+    def prepare(self, plan: Any, rows: Floats, near: int) -> BatchMovement:
+        """Prepare to move one set of cells of all runs; see `interfaces.Stepper`."""
+        return BatchMovement(self, plan, rows, near)
+
+
+class BatchMovement:
+    """Moves one set of cells of b runs, period by period.
+
+    Parameters
+    ----------
+    batch : BatchStepper
+    plan, rows, near
+        See `interfaces.Stepper.prepare`.
+    """
+
+    def __init__(self, batch: BatchStepper, plan: Any, rows: Floats, near: int) -> None:
+        self._stepper, self._plan, self._alike = stepper, plan, alike = batch.stepper, plan, batch.alike
+        self._rows, self._near, self._valves = rows, near, rows[batch.valve :, near:]
+        own = self._beds(rows)
+        count = near * rows.shape[2] if alike else near
+        parts = _pieces(count, 1 if alike else rows.shape[2])
+        self._touched = [
+            (part, stepper.prepare(plan, own[:, part], part.stop - part.start)) for part in parts
+        ]
+        self._others: dict[int, tuple[Floats, Movement]] = {}
+
+    def _beds(self, values: Floats) -> Floats:
+        """Return values (r, n, b) as the stepper takes them: (r, n b) where all cells are alike."""
+        return values.reshape(len(values), -1) if self._alike else values
+
+    def __call__(self, under: Floats) -> Floats:
+        """Move the cells on by one control period, in place; return the force on the near ones, (k, b), N.
+
+        `under` are the undersides of the fingers over them, (p, k, b), m.
+        """
+        force = np.empty((1, *under.shape[1:]))
+        own, seen = self._beds(force)[0], self._beds(under)
+        for part, move in self._touched:
+            own[part] = move(seen[:, part])
+        # Beyond the fingers nothing moves whose valve is shut, with no command on its way: squares sum to 0.
+        awake = self._near + np.flatnonzero(np.einsum("rwb,rwb->w", self._valves, self._valves))
+        for part in _pieces(awake.size, force.shape[2]):
+            self._move_others(awake[part], under[:, :0])
+        felt: Floats = force[0]
+        return felt
+
+    def _move_others(self, cells: Any, none: Floats) -> None:
+        """Move some cells out of the fingers' reach, each of all runs."""
+        size = -(-cells.size // GROUP) * GROUP
+        if size not in self._others:
+            rows = np.zeros((len(self._rows), size, self._rows.shape[2]))
+            self._others[size] = rows, self._stepper.prepare(self._plan, self._beds(rows), 0)
+        rows, move = self._others[size]
+        rows[:, : cells.size] = self._rows[:, cells]
+        move(self._beds(none))
+        self._rows[:, cells] = rows[:, : cells.size]
+
+
+def _pieces(count: int, runs: int) -> Iterator[slice]:
+    """Cut some cells of each run into pieces of about one size, none larger than `PIECE` in all runs."""
+    pieces = -(-count * runs // PIECE)
+    for i in range(pieces):
+        yield slice(count * i // pieces, count * (i + 1) // pieces)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch(System):
+    """All that does not change in b sessions on one layout.
+
+    Attributes
+    ----------
+    systems : tuple of System
+        Those of the runs.
+    """
+
+    systems: tuple[System, ...]
+
+
+def begin(batch: Batch) -> State:
+    """Return the state before the sessions."""
+    memory = [system.controller.begin() for system in batch.systems]
+    heights = list_numbers([system.cell.actuator.rest_height for system in batch.systems])
+    return make_initial_state(batch.rows, batch.grid.count, heights, memory)
+
+
+def advance(batch: Batch, state: State, coming: Fingers | None) -> State:
+    """Simulate one control period of all runs in the arrays of `state`, which is used up.
+
+    `coming`: how the fingers come in some periods, this one among them.
+    """
+    return simulate_period(batch, state, coming and coming.at(state.period))
+
+
+def find_diverged(state: State) -> NDArray[np.bool_]:
+    """Return which runs, (b,), hold numbers that are not finite."""
+    block = state.active.block
+    # One sum tells that all is well, as it nearly always is.
+    if math.isfinite(np.add.reduce(block, axis=None)):
+        return np.zeros(block.shape[2], np.bool_)
+    finite: NDArray[np.bool_] = np.isfinite(block.sum(axis=(0, 1)))
+    return ~finite
+
+
+def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceError:
+    """Return the error that a run with a number that is not finite ends in.
+
+    `state`: after the control period; `run`: its index on the last axis.
+    """
+    held = state.active
+    error = find_divergence(batch.systems[run], held.cells[:, run], held.block[..., run], state.period - 1)
+    assert error is not None
+    return error
+
+
+def select_runs(state: State, runs: Sequence[int]) -> State:
+    """Return the state of some of the runs. `runs`: their indices on the last axis."""
+    chosen, held = np.array(runs, np.intp), state.active
+    # The discs are not worth keeping: the set is made anew.
+    active = replace(
+        held,
+        cells=held.cells[:, chosen],
+        block=held.block[..., chosen],
+        mode=held.mode[:, chosen],
+        quadratic_basis=held.quadratic_basis[..., chosen],
+        peak=held.peak[chosen],
+        until=0,
+        own=tuple(held.own[run] for run in runs) if held.own else (),
+    )
+    several = (state.rows, state.modes, state.aged)
+    rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
+    memory = [state.memory[run] for run in runs]
+    return State(state.period, rows, modes, aged, state.peak[chosen], active, memory)
+
 
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")

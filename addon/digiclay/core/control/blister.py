@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..base.arrays import Constants, Floats
+from ..base.arrays import Constants, Flags, Floats
 from ..base.errors import ParameterError
+from ..base.modes import Mode
 from ..base.quantity import Parameters, quantity
+from ..model.control_interface import Measurement
+from ..model.layout import ON_THE_SIDE
+from .travel import ABEAM, measure_offsets
 
 
 @dataclass(frozen=True)
@@ -66,3 +71,120 @@ class Blister(Parameters):
     def _flat(self) -> Constants:
         """The radius of the flat top, m."""
         return Constants((self.flat_radius,))
+
+
+#: Share of the radius of the flat top within which no cell freezes when the blister sinks into uneven ground.
+HELD = 0.4
+#: It is freed when it lies less far behind than this share of the cosine from which cells freeze.
+FREED = 0.3
+CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
+
+
+class BlisterCells(NamedTuple):
+    """Cells about the middle of a blister.
+
+    Attributes
+    ----------
+    distance, ahead : ndarray (m,) or (m, b)
+        From it, and ahead of it, m.
+    inside, ring : ndarray of bool (m,) or (m, b)
+        In the blister, and in the ring around it.
+    """
+
+    distance: Floats
+    ahead: Floats
+    inside: Flags
+    ring: Flags
+
+
+@dataclass(frozen=True, eq=False)
+class BlisterRule:
+    """Rule that divides the cells of a blister into those inside, on the edge, touched and frozen.
+
+    Attributes
+    ----------
+    blister : Blister
+    behind : float or ndarray (b,)
+        Cosine below which a cell lies behind the fingertip.
+    release : float or ndarray (b,)
+        Force that releases a frozen cell, N.
+    felt : float or ndarray (b,)
+        Force above which a cell is touched, N.
+    """
+
+    blister: Blister
+    behind: Any
+    release: Any
+    felt: Any
+
+    def divide(self, pose: tuple[Any, Any, Any, Any], basis: Floats) -> BlisterCells:
+        """Return the cells about the middle of a blister.
+
+        `pose` (b,), x, y of the middle, m, and the direction of travel, a unit vector; `basis` (6, m) or (6,
+        m, b), rows 1, x, y, x², x y, y² of the cells.
+        """
+        distance, ahead = measure_offsets(*pose, basis)
+        _, radius, edge_radius, *_ = self._limits[distance.shape]
+        inside = distance <= radius
+        ring = distance <= edge_radius
+        ring ^= inside
+        return BlisterCells(distance, ahead, inside, ring)
+
+    def find_edge(self, cells: BlisterCells) -> Flags:
+        """Return which cells give the height of the surface: while a fingertip travels, those ahead of it.
+
+        The finished ridge behind is no edge.
+        """
+        facing: Flags = cells.ahead >= self._limits[cells.ahead.shape][0]
+        facing &= cells.ring
+        return facing
+
+    def find_frozen(self, cells: BlisterCells, seen: Measurement, uneven: Any = False) -> Flags:
+        """Return which cells are left behind, and which of those left before stay so: none that is pressed.
+
+        `seen`: gives the modes of the last period, and the forces; `uneven` bool (m,) or (m, b), cells that
+        sink into uneven ground: they freeze nearer to the fingertip, and are freed when they lie ahead of it
+        again.
+        """
+        *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
+        limit = behind * cells.distance
+        frozen: Flags = cells.ahead < limit
+        froze = seen.mode == CODES[seen.mode.shape][2]
+        if uneven is not False and np.any(uneven):
+            flat_radius = np.where(uneven, HELD, 1.0) * flat_radius
+            froze &= (cells.ahead < FREED * limit) | ~np.asarray(uneven)
+        frozen &= cells.distance > flat_radius
+        frozen |= froze
+        frozen &= cells.inside
+        frozen &= seen.force < release
+        return frozen
+
+    def set_modes(
+        self, mode: NDArray[np.int8], cells: BlisterCells, force: Floats, touched_mode: Any, frozen: Flags
+    ) -> None:
+        """Set the modes of the blister's cells, in place.
+
+        `mode` int (m,) or (m, b); `force` (m,) or (m, b), N; `touched_mode` (b,), mode of touched cells;
+        `frozen` bool (m,) or (m, b).
+        """
+        edge, formed, froze = CODES[mode.shape]
+        touched = force > self._limits[force.shape][-1]
+        touched &= cells.inside
+        np.putmask(mode, cells.inside, formed)
+        np.copyto(mode, touched_mode, "unsafe", touched)
+        np.putmask(mode, cells.ring, edge)
+        np.putmask(mode, frozen, froze)
+
+    @cached_property
+    def _limits(self) -> Constants:
+        """Thresholds of the cells.
+
+        How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N. Circles are widened by a
+        billionth, for the sake of cells exactly on them.
+        """
+        blister = self.blister
+        wider = (
+            radius * (1.0 + ON_THE_SIDE)
+            for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
+        )
+        return Constants((-ABEAM, *wider, self.behind, self.release, self.felt))

@@ -13,12 +13,111 @@ from ..base.arrays import Floats, any_true, count_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
-from .blister import Blister
-from .blister_cells import BlisterCells, BlisterRule
+from .blister import Blister, BlisterCells, BlisterRule
+from .finger_estimate import STATES, Estimate
 from .ground import EdgeGround
-from .hybrid_memory import Follower
-from .lead_profile import LeadProfile
-from .master_memory import Phase
+from .master import Master, Phase
+from .travel import Heading
+
+#: A finger slower than this has no direction, m/s.
+SLOWEST = 1e-3
+#: Slope where pins are not led: it puts them below every surface.
+STEEP = 1e9
+
+
+@dataclass(frozen=True)
+class LeadProfile:
+    """Slopes of the heights around the finger.
+
+    Attributes
+    ----------
+    level : float
+        Radius within which pins are level with the top, m.
+    rise, fall : float
+        Speeds of free pins that are counted on, m/s.
+    skirt : float
+        Speed of the drags expected from rest, m/s; 0: no skirt.
+    """
+
+    level: float
+    rise: float
+    fall: float
+    skirt: float
+
+    def find_reach(self, height: float, speed: float) -> float:
+        """Return the radius within which pins may be led, m.
+
+        `height`: of the top over the surface around, m; negative below; `speed`: of the finger in the plane,
+        m/s.
+        """
+        quickest = max(speed, self.skirt)
+        return self.level + abs(height) * quickest / (self.rise if height > 0.0 else self.fall)
+
+    def find_drop(self, distance: Floats, ahead: Floats, speed: float, *, raised: bool) -> Floats:
+        """Return how far below the top (above it, in a valley) pins may stand at most, (m,), m.
+
+        `distance` (m,), from the finger, m; `ahead` (m,), how far ahead of it, m; `speed`: of the finger in
+        the plane, m/s; `raised`: whether the top is above the surface around it.
+        """
+        free = self.rise if raised else self.fall
+        around = free / self.skirt if self.skirt else STEEP
+        forward = free / speed if speed >= SLOWEST else STEEP
+        drop: Floats = distance - self.level
+        np.maximum(drop, 0.0, out=drop)
+        drop *= np.where(ahead > 0.0, forward, around) if forward < around else around
+        return drop
+
+
+class Follower(NamedTuple):
+    """Memory of the controller.
+
+    Attributes
+    ----------
+    phase : Phase
+        IDLE or SHAPING.
+    period : int
+        Control periods so far.
+    estimate : Estimate
+        The finger.
+    top, edge : float
+        Heights of the blister's top and of the surface around it, m.
+    heading : Heading
+        Which way the finger travels.
+    trim : float
+        Slow correction of the set point, N.
+    felt : float
+        Top when the finger was last felt, m.
+    alone : int
+        Control periods since then.
+    losses : int
+        How often the finger was lost.
+    led_x, led_y, led_radius : float
+        Disc within which pins may stand where they will not be left, m; a radius of 0: none does.
+    due : tuple of float
+        Total forces predicted for this and the next periods, N; below 0: none is.
+    doubt : float
+        Mean square by which those of the last periods were off, N².
+    master : Master
+        Memory of Method I while it takes over; IDLE: it does not.
+    """
+
+    phase: Phase = Phase.IDLE
+    period: int = 0
+    estimate: Estimate = Estimate(np.zeros(STATES), np.zeros((STATES, STATES)))
+    top: float = 0.0
+    edge: float = 0.0
+    heading: Heading = Heading()
+    trim: float = 0.0
+    felt: float = 0.0
+    alone: int = 0
+    losses: int = 0
+    led_x: float = 0.0
+    led_y: float = 0.0
+    led_radius: float = 0.0
+    due: tuple[float, ...] = ()
+    doubt: float = 0.0
+    master: Master = Master()
+
 
 #: Surface from which the blister rises.
 GROUND = EdgeGround()

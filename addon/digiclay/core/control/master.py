@@ -4,20 +4,177 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
+from ..model.delay import Queue
+from ..model.interfaces import Flow
+from ..model.physics import GAUSS, Cell
 from ..model.set_point import SetPoint
 from .blister import Blister
-from .master_cell import MasterCell
-from .master_memory import LossRule, Master, Phase
 from .runs import BatchControl
 from .servo import Tracking
 from .travel import Heading, update_heading
 
-__all__ = ["Master", "MasterControl", "Phase", "VirtualMaster"]
+
+class Phase(IntEnum):
+    """Phase of the master."""
+
+    IDLE = 0
+    SPRING = 1
+    SHAPING = 2
+
+
+@dataclass(frozen=True)
+class LossRule:
+    """Rule by which a fingertip that is no longer felt is given up.
+
+    Attributes
+    ----------
+    period : float
+        Control period, s.
+    time : float
+        Time without force until a loss, s.
+    """
+
+    period: float
+    time: float
+
+    def is_given_up(self, alone: int) -> bool:
+        """Tell whether a fingertip not felt for some control periods has been away for the loss time."""
+        return alone * self.period >= self.time * (1.0 - 1e-9)
+
+    def wait(self, memory: Any) -> Any:
+        """Count a period without a fingertip in a `Master` or `Follower`; give it up after the loss time."""
+        if memory.phase is Phase.IDLE:
+            return memory
+        if not self.is_given_up(memory.alone):
+            return memory._replace(alone=memory.alone + 1)
+        lost = memory.phase is Phase.SHAPING
+        return memory._replace(phase=Phase.IDLE, losses=memory.losses + lost)
+
+
+class Master(NamedTuple):
+    """Memory of the controller.
+
+    Attributes
+    ----------
+    phase : Phase
+    x, y, height : float
+        Where the master is, m.
+    opening : float
+        Of its own valve.
+    reference : float
+        Surface height at first touch, from which the virtual spring is pressed down, m.
+    edge : float
+        Height of the surface around the blister, m.
+    heading : Heading
+        Which way it travels.
+    felt : float
+        Its height when the finger was last felt, m.
+    alone : int
+        Control periods since the finger was last felt.
+    losses : int
+        How often the finger was lost while shaping.
+    """
+
+    phase: Phase = Phase.IDLE
+    x: float = 0.0
+    y: float = 0.0
+    height: float = 0.0
+    opening: float = 0.0
+    reference: float = 0.0
+    edge: float = 0.0
+    heading: Heading = Heading()
+    felt: float = 0.0
+    alone: int = 0
+    losses: int = 0
+
+    # What changes every period is written out: `_replace` takes nearly twice as long.
+
+    def move_to(self, x: float, y: float, heading: Heading) -> Master:
+        """Return the master where it has felt the finger. `x`, `y`, m."""
+        phase, _, _, height, opening, reference, edge, _, felt, _, losses = self
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, 0, losses)
+
+    def lead(self, phase: Phase, height: float, opening: float) -> Master:
+        """Return the master after a period, with its valve's opening.
+
+        `height`, m; `opening`: of its valve.
+        """
+        _, x, y, _, _, reference, edge, heading, felt, alone, losses = self
+        felt = height if alone == 0 else felt
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
+
+    def with_edge(self, edge: float) -> Master:
+        """Return the master in a surface of this height."""
+        phase, x, y, height, opening, reference, _, heading, felt, alone, losses = self
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
+
+
+@dataclass(frozen=True)
+class MasterCell:
+    """One unloaded cell in plain numbers: exact valve opening, averaged flow.
+
+    Attributes
+    ----------
+    openings : tuple of (float, float)
+        The opening at the Gauss points of a control period, then at its end, as
+        ``a K + b K_com``.
+    flow : Flow
+        The law of valve and conduit.
+    laminar : bool
+        No unloaded valve is turbulent.
+    up, down : float
+        Pressures of the reservoirs over the area of a pin, Pa/m².
+    area : float
+        Of a pin, m².
+    stroke : float
+        Upper end stop, m.
+    period : float
+        Control period, s.
+    """
+
+    openings: tuple[tuple[float, float], ...]
+    flow: Flow
+    laminar: bool
+    up: float
+    down: float
+    area: float
+    stroke: float
+    period: float
+
+    def advance(self, height: float, opening: float, command: float) -> tuple[float, float]:
+        """Return height, m, and opening after one period of a held command. `height`, m."""
+        (a, b), (c, d), (e, f) = self.openings
+        first, second = a * opening + b * command, c * opening + d * command
+        speed = 0.5 * (self.speed(first) + self.speed(second))
+        return min(max(height + self.period * speed, 0.0), self.stroke), e * opening + f * command
+
+    def speed(self, opening: float) -> float:
+        """Return the speed of the unloaded pin, m/s."""
+        drive = self.up if opening > 0.0 else self.down
+        if self.laminar:
+            speed: float = self.flow.laminar_conductance(opening) * drive
+            return speed
+        return float(self.flow.conductance(np.array(opening), np.array(drive * self.area))) * drive
+
+
+def make_master_cell(cell: Cell, period: float) -> MasterCell:
+    """Make the master's cylinder and valve like those of the real cells. `period`: control period, s."""
+    nodes = cell.lag.response(Queue(), [node * period for node in GAUSS] + [period])
+    # Without a lag there is no column for the opening at the start.
+    openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())
+    laminar = cell.flow.knee > cell.supply.largest
+    area, stroke = cell.actuator.area, cell.actuator.stroke
+    up, down = cell.supply.high / area, cell.supply.low / area
+    return MasterCell(openings, cell.flow, laminar, up, down, area, stroke, period)
 
 
 #: Where an idle master of a batch stands, m: so far away that no cell is in its blister.

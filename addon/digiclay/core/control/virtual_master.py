@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 from ..base.arrays import Constants, Floats, any_true, count_true
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
-from .blister_cells import BlisterRule
+from .blister import BlisterRule
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .ground import GROUNDS, EdgeGround, OwnGround
-from .master import Master, MasterControl, Phase, VirtualMaster
-from .master_cell import make_master_cell
+from .master import Master, MasterControl, Phase, VirtualMaster, make_master_cell
 from .runs import decide_by_any, decide_by_run, gather_by_run, sum_weighted
 from .servo import lock_overloaded
 from .travel import measure_excess

@@ -14,9 +14,8 @@ from ..surface.body import NO_PIN, Body, Indices
 from ..surface.features import Feature, Finding, find
 from ..surface.formed import Formed
 from ..surface.pins_solid import make_pins_solid
-from ..surface.skin_grid import SurfaceGrid, fit_skin
 from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
-from ..surface.skins import SKINS
+from ..surface.skins import SKINS, SurfaceGrid, fit_skin
 
 #: Kinds of mesh, by name, with what is said of them in the help.
 KINDS: dict[str, str] = {

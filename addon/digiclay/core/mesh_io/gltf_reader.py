@@ -21,8 +21,14 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
-from .mesh_limits import make_refusal, refuse_many_triangles, refuse_size
-from .placed_meshes import IDENTITY, join_meshes, nest_placement
+from .mesh_limits import (
+    IDENTITY,
+    join_meshes,
+    make_refusal,
+    nest_placement,
+    refuse_many_triangles,
+    refuse_size,
+)
 
 Indices = NDArray[np.int64]
 

@@ -17,8 +17,7 @@ from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from . import gltf_reader, obj_reader, threemf_reader
 from .axes import find_axes, make_axes
-from .head_checks import check_off, check_ply, check_stl, stl_is_text
-from .mesh_limits import refuse_size
+from .mesh_limits import check_off, check_ply, check_stl, refuse_size, stl_is_text
 
 Indices = NDArray[np.int64]
 

@@ -2,16 +2,277 @@
 
 from __future__ import annotations
 
+import json
+import zipfile
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, Any, BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
-from ..base.whole_files import open_whole
-from ..surface.body import Body
-from . import glb_writer, obj_writer, ply_writer, stl_writer, threemf_writer
-from .axes import UP, make_axes
+from ..base.run_folder import open_whole
+from ..surface.body import NO_PIN, Body, Indices, split_pieces
+from .axes import UP, find_forward, make_axes
+
+#: One triangle of a binary file.
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+TEXT = "facet normal {:.6e} {:.6e} {:.6e}\nouter loop\n" + 3 * "vertex {:.9g} {:.9g} {:.9g}\n"
+TEXT += "endloop\nendfacet\n"
+
+
+def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
+    """Write all bodies as one list of triangles, lengths in 1 / `factor` m.
+
+    `factor`: units of the file in a meter.
+    """
+    # The first word must not be "solid": by it readers know the text form.
+    file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
+    file.write(np.uint32(sum(len(body.faces) for body in bodies)).astype("<u4").tobytes())
+    for body in bodies:
+        for some in split_pieces(len(body.faces)):
+            corners = _corners(body, some, factor)
+            table = np.zeros(len(corners), TRIANGLE)
+            table["corners"], table["normal"] = corners, _normals(corners)
+            file.write(table.tobytes())
+
+
+def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
+    """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was.
+
+    `factor`: units of the file in a meter.
+    """
+    for body in bodies:
+        file.write(f"solid {body.name}\n".encode())
+        for some in split_pieces(len(body.faces)):
+            corners = _corners(body, some, factor)
+            table = np.concatenate([_normals(corners), corners.reshape(-1, 9)], axis=1)
+            file.write("".join(TEXT.format(*row) for row in table.tolist()).encode())
+        file.write(f"endsolid {body.name}\n".encode())
+
+
+def _corners(body: Body, some: slice, factor: float) -> NDArray[np.float32]:
+    """Return the corners of some triangles, shape (k, 3, 3)."""
+    corners: NDArray[np.float32] = (body.vertices[body.faces[some]] * factor).astype(np.float32)
+    return corners
+
+
+def _normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return unit normals, shape (k, 3), of the triangles as they are written."""
+    exact = corners.astype(np.float64)
+    normal = np.cross(exact[:, 1] - exact[:, 0], exact[:, 2] - exact[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    unit: NDArray[np.float32] = (normal / np.where(length > 0.0, length, 1.0)).astype(np.float32)
+    return unit
+
+
+#: Modes are whole numbers of the common size, because some readers know no smaller one.
+VERTEX = np.dtype(
+    [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("height", "<f4"), ("force", "<f4"), ("mode", "<i4")]
+)
+FACE = np.dtype([("count", "u1"), ("vertices", "<i4", 3)])
+
+
+def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
+    """Write the bodies one after the other, lengths in 1 / `factor` m, forces in N.
+
+    `factor`: units of the file in a meter.
+    """
+    unit = "mm" if factor > 1.0 else "m"
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment digiclay, lengths and height in {unit}, z up",
+    ]
+    lines += [f"comment force in N, pressing down is positive; mode {NO_PIN}: no pin"]
+    lines += [
+        f"comment {body.name}: {len(body.vertices)} vertices, {len(body.faces)} faces" for body in bodies
+    ]
+    lines += [f"element vertex {sum(len(body.vertices) for body in bodies)}"]
+    lines += [f"property float {name}" for name in ("x", "y", "z", "height", "force")]
+    lines += ["property int mode", f"element face {sum(len(body.faces) for body in bodies)}"]
+    lines += ["property list uchar int vertex_indices", "end_header", ""]
+    file.write("\n".join(lines).encode())
+    for body in bodies:
+        for some in split_pieces(len(body.vertices)):
+            file.write(_vertices(body, some, factor).tobytes())
+    first = 0
+    for body in bodies:
+        for some in split_pieces(len(body.faces)):
+            table = np.empty(len(body.faces[some]), FACE)
+            table["count"], table["vertices"] = 3, body.faces[some] + first
+            file.write(table.tobytes())
+        first += len(body.vertices)
+
+
+def _vertices(body: Body, some: slice, factor: float) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    """Return some vertices as the file holds them; one without values is of no pin and bears no force."""
+    place = body.vertices[some] * factor
+    table = np.zeros(len(place), VERTEX)
+    table["x"], table["y"], table["z"] = place.T
+    if body.values:
+        table["height"] = body.values["height"][some] * factor
+        table["force"], table["mode"] = body.values["force"][some], body.values["mode"][some]
+    else:
+        table["height"], table["mode"] = place[:, 2], NO_PIN
+    return table
+
+
+def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = UP, forward: str = "") -> None:
+    """Write the bodies, lengths in 1 / `factor` m to the nearest nanometer; faces of no group come first."""
+    axes, unit = make_axes(up, forward), "mm" if factor > 1.0 else "m"
+    line = "v {0} {0} {0}\n".format("%.6f" if factor > 1.0 else "%.9f")
+    file.write(f"# digiclay, lengths in {unit}, {up} up, {forward or find_forward(up)} forward\n".encode())
+    first = 1
+    for body in bodies:
+        file.write(f"o {body.name}\n".encode())
+        for some in split_pieces(len(body.vertices)):
+            block = body.vertices[some] @ (axes * factor)
+            file.write(((line * len(block)) % tuple(block.ravel().tolist())).encode())
+        if body.groups:
+            for number, name in enumerate(("rest", *body.groups)):
+                file.write(f"g {name}\n".encode())
+                _faces(file, body.faces[body.group == number], first)
+        else:
+            _faces(file, body.faces, first)
+        first += len(body.vertices)
+
+
+def _faces(file: BinaryIO, faces: Indices, first: int) -> None:
+    """Write triangles whose vertex 0 is number `first` of the file."""
+    for some in split_pieces(len(faces)):
+        block = faces[some].astype(np.int64) + first
+        file.write((("f %d %d %d\n" * len(block)) % tuple(block.ravel().tolist())).encode())
+
+
+FLOAT, UNSIGNED = 5126, 5125
+VERTICES, INDICES = 34962, 34963
+#: A file's length is a 32-bit number.
+LARGEST = 2**32 - 1
+
+
+def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
+    """Write the bodies; `factor` is not used, since the unit is given.
+
+    Raises OutputError when the file would be too large for the format.
+    """
+    told = _description(bodies)
+    size = told["buffers"][0]["byteLength"]
+    text = json.dumps(told, separators=(",", ":")).encode()
+    text = text.ljust(-(-len(text) // 4) * 4)
+    whole = 12 + 8 + len(text) + 8 + size
+    if whole > LARGEST:
+        raise OutputError(f"A GLB holds at most 4 GiB (got {whole / 2**30:.3g} GiB): choose ply.")
+    file.write(b"glTF" + np.array([2, whole], "<u4").tobytes())
+    file.write(np.array([len(text)], "<u4").tobytes() + b"JSON" + text)
+    file.write(np.array([size], "<u4").tobytes() + b"BIN\0")
+    for body in bodies:
+        for some in split_pieces(len(body.vertices)):
+            file.write(_upright(body.vertices[some]).astype("<f4").tobytes())
+        for some in split_pieces(len(body.faces)):
+            file.write(body.faces[some].astype("<u4").tobytes())
+
+
+def _description(bodies: Sequence[Body]) -> dict[str, Any]:
+    """Return the JSON part: where in the binary part the vertices and faces of each body are."""
+    views: list[dict[str, int]] = []
+    accessors: list[dict[str, Any]] = []
+    start = 0
+    for body in bodies:
+        for count, target in ((len(body.vertices), VERTICES), (len(body.faces), INDICES)):
+            views.append({"buffer": 0, "byteOffset": start, "byteLength": 12 * count, "target": target})
+            start += 12 * count
+        # The bounds must be those of the numbers as they are stored.
+        low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
+        low, high = _upright(np.array([[low[0], high[1], low[2]], [high[0], low[1], high[2]]]))
+        bounds = {"min": low.astype("<f4").tolist(), "max": high.astype("<f4").tolist()}
+        known = {"bufferView": len(views) - 2, "componentType": FLOAT, "count": len(body.vertices)}
+        accessors.append({**known, "type": "VEC3", **bounds})
+        known = {"bufferView": len(views) - 1, "componentType": UNSIGNED, "count": 3 * len(body.faces)}
+        accessors.append({**known, "type": "SCALAR"})
+    order = range(len(bodies))
+    return {
+        "asset": {"version": "2.0", "generator": "digiclay"},
+        "scene": 0,
+        "scenes": [{"nodes": list(order)}],
+        "nodes": [{"mesh": i, "name": bodies[i].name} for i in order],
+        "meshes": [
+            {
+                "name": bodies[i].name,
+                "primitives": [{"attributes": {"POSITION": 2 * i}, "indices": 2 * i + 1, "material": 0}],
+            }
+            for i in order
+        ],
+        "materials": [{"name": "clay", "pbrMetallicRoughness": {"metallicFactor": 0.0}}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": start}],
+    }
+
+
+def _upright(place: Floats) -> NDArray[np.float64]:
+    """Return places with y up: x stays, and the bed's y runs away from who looks along minus z."""
+    return np.stack([place[:, 0], place[:, 2], -place[:, 1]], axis=1)
+
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+PACKAGE = "http://schemas.openxmlformats.org/package/2006"
+HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
+TYPES = (
+    f'{HEAD}<Types xmlns="{PACKAGE}/content-types">'
+    '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>'
+    "</Types>\n"
+)
+RELATIONS = (
+    f'{HEAD}<Relationships xmlns="{PACKAGE}/relationships">'
+    '<Relationship Id="model" Target="/3D/3dmodel.model" '
+    'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>\n'
+)
+#: The same in every file, so that the same mesh gives the same bytes.
+MOMENT = (1980, 1, 1, 0, 0, 0)
+
+
+def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
+    """Write the bodies, lengths in 1 / `factor` m. `factor`: units of the file in a meter."""
+    unit = "millimeter" if factor > 1.0 else "meter"
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):
+            archive.writestr(zipfile.ZipInfo(name, MOMENT), text)
+        model = zipfile.ZipInfo("3D/3dmodel.model", MOMENT)
+        model.compress_type = zipfile.ZIP_DEFLATED
+        with archive.open(model, "w", force_zip64=True) as part:
+            part.write(f'{HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{CORE}">\n<resources>\n'.encode())
+            for number, body in enumerate(bodies, 1):
+                # Only what encloses a volume may be a "model".
+                kind = "model" if body.closed else "surface"
+                part.write(f'<object id="{number}" type="{kind}" name="{body.name}"><mesh>\n'.encode())
+                _mesh(part, body, factor)
+                part.write(b"</mesh></object>\n")
+            part.write(b"</resources>\n<build>\n")
+            for number in range(1, len(bodies) + 1):
+                part.write(f'<item objectid="{number}"/>\n'.encode())
+            part.write(b"</build>\n</model>\n")
+
+
+def _mesh(part: IO[bytes], body: Body, factor: float) -> None:
+    """Write vertices to the nearest nanometer, and triangles."""
+    number = "%.6f" if factor > 1.0 else "%.9f"
+    vertex = f'<vertex x="{number}" y="{number}" z="{number}"/>\n'
+    part.write(b"<vertices>\n")
+    for some in split_pieces(len(body.vertices)):
+        block = body.vertices[some] * factor
+        part.write(((vertex * len(block)) % tuple(block.ravel().tolist())).encode())
+    part.write(b"</vertices>\n<triangles>\n")
+    triangle = '<triangle v1="%d" v2="%d" v3="%d"/>\n'
+    for some in split_pieces(len(body.faces)):
+        faces = body.faces[some]
+        part.write(((triangle * len(faces)) % tuple(faces.ravel().tolist())).encode())
+    part.write(b"</triangles>\n")
+
 
 #: File formats, by name, with what is said of them in the help.
 FORMATS: dict[str, str] = {
@@ -23,12 +284,12 @@ FORMATS: dict[str, str] = {
     "3mf": "3MF, which names its unit",
 }
 WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
-    "stl": stl_writer.write_binary,
-    "stl_ascii": stl_writer.write_ascii,
-    "obj": obj_writer.write,
-    "ply": ply_writer.write,
-    "glb": glb_writer.write,
-    "3mf": threemf_writer.write,
+    "stl": write_binary,
+    "stl_ascii": write_ascii,
+    "obj": write_obj,
+    "ply": write_ply,
+    "glb": write_glb,
+    "3mf": write_3mf,
 }
 
 #: Lengths a file can be written in: how many of them make a meter.
@@ -70,7 +331,7 @@ def write(
     """
     target = Path(path)
     named = find_format(target.suffix if kind is None else kind)
-    writer = partial(obj_writer.write, up=up, forward=forward) if named == "obj" else WRITERS[named]
+    writer = partial(write_obj, up=up, forward=forward) if named == "obj" else WRITERS[named]
     make_axes(up, forward)  # an error before the file is opened
     if unit not in UNITS:
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))

@@ -25,9 +25,18 @@ from .finger_path import (
     measure_surface_under,
     sum_cells,
 )
-from .force import compute_contact_loss_share, compute_rfd, find_first_touch, measure_touchdown
-from .perception import PERCEPTION, perceive
-from .signal import compute_deviation, compute_mean, compute_weights, measure_oscillation
+from .force import (
+    PERCEPTION,
+    compute_contact_loss_share,
+    compute_deviation,
+    compute_mean,
+    compute_rfd,
+    compute_weights,
+    find_first_touch,
+    measure_oscillation,
+    measure_touchdown,
+    perceive,
+)
 
 __all__ = [
     "METRICS",

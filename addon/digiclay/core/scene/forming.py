@@ -9,8 +9,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
-from ..control.handover import Handover
-from ..control.shape_display import ShapeDisplayControl
+from ..control.shape_display import Handover, ShapeDisplayControl
 from ..engine.system import System
 from ..model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from ..model.layout import Grid

@@ -71,9 +71,9 @@ STEPPERS: dict[str, tuple[str, str]] = {
     "bernoulli": ("steppers.bernoulli", "BernoulliExponential"),
     "richardson": ("steppers.richardson", "Richardson"),
     "adaptive": ("steppers.adaptive", "Adaptive"),
-    "euler": ("steppers.euler", "Euler"),
-    "heun": ("steppers.heun", "Heun"),
-    "runge_kutta_4": ("steppers.runge_kutta", "RungeKutta4"),
+    "euler": ("steppers.explicit", "Euler"),
+    "heun": ("steppers.explicit", "Heun"),
+    "runge_kutta_4": ("steppers.explicit", "RungeKutta4"),
 }
 #: Most physics steps in a control period, and most control periods on their way to a valve.
 MOST_STEPS = 1000

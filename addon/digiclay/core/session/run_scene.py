@@ -3,20 +3,195 @@
 from __future__ import annotations
 
 import json
+import platform
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import OutputError
 from ..engine.simulation import begin, periods
+from ..engine.system import System
+from ..metrics.summary import METRICS, compute_metrics
+from ..model.finger_range import describe_excess, find_indentations, is_beyond
+from ..model.fingertip import require_one
 from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
-from ..scene.toml_table import format_scene
+from ..scene.toml_table import ABSENT, format_scene
+from .accuracy import Errors
 from .memory_limit import check_memory
-from .run_result import Ended, Result, count_losses, evaluate
 
-__all__ = ["Result", "run", "save"]
+History = dict[str, NDArray[Any]]
+
+#: What a run is measured by: the metrics of its history and more, unit and meaning.
+RUN_METRICS: dict[str, tuple[str, str]] = {
+    **METRICS,
+    "losses": ("1", "how often the controller lost the finger, at every lift-off too"),
+    "run_time": ("s", "time the simulation took"),
+    "real_time_factor": ("1", "simulated time over run time"),
+}
+#: Units of the numbers in ``metrics.json``.
+UNITS = {name: unit for name, (unit, _) in RUN_METRICS.items()} | {"simulated": "s", "max_indentation": "m"}
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Results of a session.
+
+    Attributes
+    ----------
+    scene : Scene
+    history : dict of ndarray
+        The arrays of ``history.npz``; empty without a recorder.
+    periods : int
+        Control periods done.
+    run_time : float
+        Time the simulation took, s; neither building nor writing is in it.
+    metrics : dict
+        What ``metrics.json`` holds; SI units.
+    """
+
+    scene: Scene
+    history: History
+    periods: int
+    run_time: float
+    metrics: dict[str, Any]
+
+    @property
+    def figures(self) -> dict[str, float | None]:
+        """The metrics of `RUN_METRICS`."""
+        return {name: self.metrics[name] for name in RUN_METRICS}
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether the session was stopped before its end."""
+        return self.periods < self.scene.periods
+
+    def summary(self) -> str:
+        """Return the session in one line."""
+        rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
+        felt = f", RFD {rfd:.2g} N" if rfd is not None else ", no contact" if share == 0.0 else ""
+        if self.metrics.get("rfd_jnd_least") is not None:
+            felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
+        simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
+        end = " (incomplete: stopped)" if self.incomplete else ""
+        errors = ""
+        if "height_error" in self.metrics:
+            height, force = self.metrics["height_error"] * 1e6, self.metrics["force_error"] * 1e3
+            errors = f", height error about {height:.2g} µm, force error about {force:.2g} mN"
+        beyond = self.metrics.get("beyond_a_finger")
+        warning = f"; {beyond}" if beyond else ""
+        speed = f"{self.run_time:.2g} s ({factor:.3g} x real time)"
+        return f"{simulated:.1f} s simulated in {speed}{felt}{errors}{end}{warning}"
+
+    def with_errors(self, errors: Errors) -> Result:
+        """Return the result with its estimated errors among the metrics."""
+        found = {f"{name}_error": value for name, value in asdict(errors).items()}
+        units = {name: "m" if name.startswith("height") else "N" for name in found}
+        return replace(self, metrics={**self.metrics, **found, "units": {**self.metrics["units"], **units}})
+
+
+class Ended(NamedTuple):
+    """End of a session.
+
+    Attributes
+    ----------
+    periods : int
+        Control periods done.
+    run_time : float
+        Time the simulation took, s.
+    losses : int or None
+        From `count_losses`.
+    """
+
+    periods: int
+    run_time: float
+    losses: int | None
+
+
+def count_losses(memory: object) -> int | None:
+    """Return the number of losses in a controller's memory; None if it does not count."""
+    losses: int | None = getattr(memory, "losses", None)
+    return losses
+
+
+def evaluate(
+    scene: Scene,
+    system: System,
+    rows: History,
+    ended: Ended,
+    versions: Mapping[str, str] = MappingProxyType({}),
+) -> Result:
+    """Return the result of a session that has come to its end.
+
+    `rows`: from `recorder.HistoryWriter.finish`; empty without a recorder; `versions`: what else to note as
+    versions the run was made with.
+    """
+    if not rows:
+        return report(scene, ended, {}, versions)
+    moments = rows.pop("period") * scene.simulation.control_period
+    history = {
+        "time": moments,
+        **rows,
+        "fingertip": require_one(scene.trajectories()).poses(moments),
+        "total_force": rows["force"].sum(axis=1),
+        "position": system.grid.positions,
+    }
+    found: dict[str, Any] = compute_metrics(history, scene.set_point)
+    if system.cell.touch is not None:
+        depth = find_indentations(system.cell.touch.fingertip, history)
+        found["max_indentation"] = float(depth.max())
+        found["beyond_a_finger"] = describe_excess(found["max_total_force"], found["max_indentation"])
+        if found["beyond_a_finger"]:
+            history["beyond_a_finger"] = is_beyond(history["total_force"], depth)
+    return replace(report(scene, ended, found, versions), history=history)
+
+
+def report(
+    scene: Scene,
+    ended: Ended,
+    found: Mapping[str, Any],
+    versions: Mapping[str, str] = MappingProxyType({}),
+) -> Result:
+    """Return the result of a session that has come to its end, without a history.
+
+    `found`: metrics of its history; `versions`: what else to note as versions the run was made with.
+    """
+    simulated = ended.periods * scene.simulation.control_period
+    metrics: dict[str, Any] = {
+        "scene": scene.name,
+        "incomplete": ended.periods < scene.periods,
+        "simulated": simulated,
+        "run_time": ended.run_time,
+        "real_time_factor": simulated / ended.run_time,
+        "control_periods": ended.periods,
+        "cells": scene.cells,
+        "method": scene.method if scene.control else ABSENT,
+        "stepper": scene.simulation.stepper,
+        "versions": {
+            **versions,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+            "system": platform.system(),
+        },
+        **found,
+    }
+    metrics["units"] = {name: UNITS[name] for name in metrics if name in UNITS}
+    metrics["losses"] = ended.losses
+    return Result(scene, {}, ended.periods, ended.run_time, metrics)
+
+
+def select_rows(history: History, start: float, end: float) -> History:
+    """Return the rows of a history from one time to another. `start`, `end`, s."""
+    moments = history["time"]
+    rows = (moments >= start - 1e-9) & (moments <= end + 1e-9)
+    return {name: array if name == "position" else array[rows] for name, array in history.items()}
 
 
 def run(

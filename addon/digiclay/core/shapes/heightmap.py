@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
+import re
+import struct
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +17,152 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.layout import ON_THE_SIDE, Grid
-from .picture_heights import MOST
 from .relief import Placement, Tops
+
+#: Bytes of a file in which its size is looked for; a JPEG's may stand behind a small picture of it.
+HEAD = 1 << 20
+#: Segments of a JPEG that tell its size.
+FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+def read_size(path: Path) -> tuple[int, int] | None:
+    """Return width and height of a picture in pixels, None if they are not in its header.
+
+    PNG, JPEG, BMP, TIFF, EXR and HDR are known, by what they begin with.
+
+    Raises OSError when the file cannot be read.
+    """
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+        try:
+            if head[:4] in (b"II*\0", b"MM\0*"):
+                order = "<" if head[:1] == b"I" else ">"
+                file.seek(struct.unpack_from(f"{order}I", head, 4)[0])
+                return _tiff(file.read(HEAD), order)
+            return _size(head)
+        except (struct.error, IndexError, ValueError):
+            return None
+
+
+def _size(head: bytes) -> tuple[int, int] | None:
+    """Return the size that stands in a head."""
+    if head[:8] == b"\x89PNG\r\n\x1a\n":
+        width, height = struct.unpack_from(">II", head, 16)
+        return width, height
+    if head[:2] == b"BM":
+        width, height = struct.unpack_from("<ii", head, 18)
+        return abs(width), abs(height)
+    if head[:2] == b"\xff\xd8":
+        return _jpeg(head)
+    if head[:4] == b"\x76\x2f\x31\x01":
+        at = head.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+        left, low, right, high = struct.unpack_from("<4i", head, at)
+        return max(0, right - left + 1), max(0, high - low + 1)
+    if head[:2] == b"#?":
+        found = re.search(rb"\n[+-]([XY]) (\d{1,18}) [+-][XY] (\d{1,18})\n", head)
+        if found:
+            first, second = int(found[2]), int(found[3])
+            return (second, first) if found[1] == b"Y" else (first, second)
+    return None
+
+
+def _jpeg(head: bytes) -> tuple[int, int]:
+    """Return the size of a JPEG, from segment to segment."""
+    at = 2
+    while True:
+        while head[at] == 0xFF:
+            at += 1
+        kind, (length,) = head[at], struct.unpack_from(">H", head, at + 1)
+        if kind in FRAMES:
+            height, width = struct.unpack_from(">HH", head, at + 4)
+            return width, height
+        at += 1 + length
+
+
+def _tiff(entries: bytes, order: str) -> tuple[int, int]:
+    """Return the size of a TIFF from its list of entries: 256 is the width, 257 the height."""
+    (count,) = struct.unpack_from(f"{order}H", entries)
+    size = {}
+    for index in range(count):
+        tag, kind = struct.unpack_from(f"{order}HH", entries, 2 + 12 * index)
+        (size[tag],) = struct.unpack_from(order + ("H" if kind == 3 else "I"), entries, 10 + 12 * index)
+    if 256 not in size or 257 not in size:
+        raise ValueError("no size")
+    return size[256], size[257]
+
+
+Pixels = NDArray[np.generic]
+
+#: Pictures by extension.
+PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr")
+#: Pillow's names of those it reads here: by others a file with such an ending could have programs started.
+FORMATS = ("PNG", "TIFF", "JPEG", "BMP", "DIB")
+#: Those that Pillow cannot read.
+BLENDER_ONLY = (".exr", ".hdr")
+#: Pillow's names for pictures of one channel; all others are turned into brightness.
+GRAY = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F")
+#: Most pixels of a picture: 16 000 x 8 000. Some memory is needed for each, see docs/shapes.md.
+MOST = 128_000_000
+#: Readers of pictures in place of Pillow, the last one first; each has the signature of `read_pixels`.
+READERS: list[Callable[[Path], Pixels]] = []
+
+
+def read_pixels(path: Path) -> Pixels:
+    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first.
+
+    Raises ParameterError when it cannot be read, or is too large.
+    """
+    _refuse_by_head(path)
+    if READERS:
+        return READERS[-1](path)
+    if path.suffix.lower() in BLENDER_ONLY:
+        rule = "must be a PNG, TIFF or JPEG outside Blender"
+        raise ParameterError("shape", "file", rule, str(path), "Blender itself reads EXR and HDR.")
+    try:
+        image: Any = importlib.import_module("PIL.Image")
+    except ImportError:
+        raise ParameterError(
+            "shape", "file", "must be a mesh or an array where Pillow is not installed", str(path),
+            "Run 'pip install digiclay[images]'.",
+        ) from None  # fmt: skip
+    image.init()  # formats that are named are not looked for
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", image.DecompressionBombWarning)
+        try:
+            with image.open(path, formats=FORMATS) as opened:
+                refuse_too_many(path, *opened.size)
+                gray = opened if opened.mode in GRAY else opened.convert("L")
+                return np.flipud(np.asarray(gray))
+        except image.DecompressionBombError:
+            raise make_size_error(path, "too many pixels to open") from None
+        except OSError as error:
+            said = error.strerror or "not a picture, or cut off"
+        except (ValueError, SyntaxError, EOFError) as error:
+            said = " ".join(str(error).split())[:100]
+    raise ParameterError("shape", "file", "must be a picture that can be read", f"{path}: {said}")
+
+
+def _refuse_by_head(path: Path) -> None:
+    """Refuse a picture whose header states too large a size, for all readers."""
+    try:
+        size = read_size(path)
+    except OSError:
+        return  # said by who reads it
+    if size:
+        refuse_too_many(path, *size)
+
+
+def refuse_too_many(path: Path, width: int, height: int) -> None:
+    """Refuse a picture too large to be read. `width`, `height`: pixels."""
+    if width * height > MOST:
+        raise make_size_error(path, f"{width} x {height}")
+
+
+def make_size_error(path: Path, size: str) -> ParameterError:
+    """Return the error of a picture too large to be read. `size`: what it has."""
+    rule = f"must have at most {MOST // 1_000_000} million pixels"
+    return ParameterError("shape", "file", rule, f"{path}: {size}", "Make it smaller first.")
+
 
 #: Values a map keeps; more, and its pixels are averaged in squares when it is read.
 KEPT = 4_000_000

@@ -14,9 +14,8 @@ from ..mesh_io.mesh_reader import MESHES
 from ..model.actuator import Actuator
 from ..model.layout import Grid
 from .fitting import Fitted, fit_given, fit_relief
-from .heightmap import HeightMap, make_height_map
+from .heightmap import PICTURES, HeightMap, make_height_map, read_pixels
 from .mesh_relief import ShapeMesh, make_shape_mesh
-from .picture_heights import PICTURES, read_pixels
 from .relief import Relief
 from .request import AUTO, LENGTHS, Shape
 

@@ -95,3 +95,47 @@ class Explicit:
             thrown |= ~((lowest <= y[0]) & (y[0] <= highest))
         y[0][thrown] = np.inf
         return find_contact_force(cell, y, under[-1])
+
+
+@dataclass(frozen=True)
+class Euler(Explicit):
+    """Explicit, order 1."""
+
+    name = "euler"
+    order = 1
+    nodes = (0.0, 1.0)
+
+    def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
+        """Return how far the rows go in one step, s long."""
+        return step * rates(y, 0)
+
+
+@dataclass(frozen=True)
+class Heun(Explicit):
+    """Explicit, order 2."""
+
+    name = "heun"
+    order = 2
+    nodes = (0.0, 1.0)
+
+    def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
+        """Return how far the rows go in one step, s long."""
+        first = rates(y, 0)
+        return (0.5 * step) * (first + rates(y + step * first, 1))
+
+
+@dataclass(frozen=True)
+class RungeKutta4(Explicit):
+    """Explicit, order 4 where the right-hand side is smooth, 2 across a contact or a reversed valve."""
+
+    name = "runge_kutta_4"
+    order = 4
+    nodes = (0.0, 0.5, 1.0)
+
+    def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
+        """Return how far the rows go in one step, s long."""
+        first = rates(y, 0)
+        second = rates(y + (0.5 * step) * first, 1)
+        third = rates(y + (0.5 * step) * second, 1)
+        fourth = rates(y + step * third, 2)
+        return (step / 6.0) * (first + 2.0 * (second + third) + fourth)

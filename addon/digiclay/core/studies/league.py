@@ -117,7 +117,7 @@ def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
 
 
 def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | None, int]]:
-    """Return on how many trajectories each method has a greater mean RFD than the first one, and of how many."""
+    """Return on how many trajectories, of how many, a method has a greater mean RFD than the first one."""
     means = {method: _means_by_trajectory(table, method) for method in methods}
     first = means[methods[0]]
     counted: dict[str, tuple[int | None, int]] = {methods[0]: (None, len(first))}

@@ -13,14 +13,12 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.quantity import find_nearest_name
 from ..metrics.finger_path import sum_cells
-from ..metrics.force import find_contact_ends
-from ..metrics.perception import PERCEPTION, perceive
+from ..metrics.force import PERCEPTION, find_contact_ends, perceive
 from ..metrics.summary import METRICS, compute_metrics
 from ..scene.assembly import assemble
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
-from ..session.run_result import Result, select_rows
-from ..session.run_scene import run
+from ..session.run_scene import Result, run, select_rows
 from .nominal_relief import measure_relief
 from .speed_limits import Criterion, Drag, Follows, Lift, find_largest_speed, judge, place_way
 from .trial_paths import draw_drags, lift_off, list_paths, with_path

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..control.blister import Blister
 from ..metrics.finger_path import find_contact_rows
-from ..metrics.signal import find_stretches
+from ..metrics.force import find_stretches
 from ..metrics.summary import compute_cell_area
 from ..scene.schema import Scene
 

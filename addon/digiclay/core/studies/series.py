@@ -15,9 +15,16 @@ from typing import Any, TypeVar
 
 from ..base.errors import DigiclayError, OutputError, one_line
 from ..base.file_lock import hold_lock
-from ..base.run_folder import describe_claim, lock_name, resolve_inside
-from ..base.unfinished import is_unfinished, remove_abandoned
-from ..base.whole_files import format_json, read_json, write_whole
+from ..base.run_folder import (
+    describe_claim,
+    format_json,
+    is_unfinished,
+    lock_name,
+    read_json,
+    remove_abandoned,
+    resolve_inside,
+    write_whole,
+)
 
 #: The lock of whoever works in the folder.
 LOCK = ".lock"

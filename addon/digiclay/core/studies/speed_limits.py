@@ -15,8 +15,7 @@ from ..model.set_point import find_set_point
 from ..model.trajectory import Path, Waypoint
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
-from ..session.run_result import Result, select_rows
-from ..session.run_scene import run
+from ..session.run_scene import Result, run, select_rows
 
 #: How long the finger rests at the ends of a phase, s.
 REST = 0.3

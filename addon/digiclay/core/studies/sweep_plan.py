@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
-from ..base.whole_files import format_json, read_json, write_whole
+from ..base.run_folder import format_json, read_json, write_whole
 from ..control.methods import find_method
 from ..scene.toml_table import format_scene, write_part
 from .axes import Axis, Point

@@ -118,7 +118,7 @@ def list_paths() -> dict[str, tuple[str, list[Pose]]]:
 
 
 def draw_drags(count: int) -> list[tuple[str, list[Pose]]]:
-    """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, with a fingertip of any turn."""
+    """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, the fingertip turned."""
     random, drags = np.random.default_rng(DRAG_SEED), []
     for number in range(count):
         height, speed = random.uniform(-8.0, 15.0), random.uniform(5.0, 16.0)

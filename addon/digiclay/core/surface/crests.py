@@ -16,9 +16,297 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from .crest_network import SADDLE, Chain, find_chains, find_stretch, reaches_out
-from .pin_lattice import Lattice
-from .section_line import LEVEL, Field, smooth
+from .formed import Lattice, measure_distance
 from .skeleton import find_skeleton, measure_half_width
+
+#: As high as, to this share of the way up.
+LEVEL = 0.1
+#: Directions in which a half width is looked for.
+AROUND = 16
+#: Times a line is drawn through the middle of its sections.
+ROUNDS = 3
+#: Times the end of a line is looked for from where it was found last.
+ROUNDS_AT_END = 8
+#: A section this many times as wide as most is one through a junction, and says nothing of its middle.
+WIDE = 1.5
+EVEN = 1.25
+#: A line that has fallen below this share of its height at its end, and rises again, has ended in between.
+FALLEN = 0.75
+#: A line runs through the middle of its sections at this share of its height.
+MIDDLE = 0.7
+#: A line may have a corner where it turns by more than 28 degrees within `LEG` half widths to both sides.
+#: From `CORNER` half widths on, its legs show where they meet. It is a corner if the feature is so high there
+#: at least, and has lost less than half of what an arc between the legs would have.
+CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(28.0), 0.7
+#: Shares of a smoothing step and of the step back.
+TO_AND_FRO = (0.5, -0.53)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Heights of one feature between the pins, and the largest distance of its flanks."""
+
+    lattice: Lattice
+    off: Floats
+    height: Floats
+    most: float
+
+    def at(self, position: Floats) -> Floats:
+        """Return how far the feature is off at places, m; 0 beyond the bed."""
+        return np.nan_to_num(self.lattice.at(self.off, position))
+
+    def falls(self, position: Floats, direction: Floats, level: Floats) -> Floats:
+        """Return how far it is to where the feature falls to a level, m."""
+        return measure_distance(self.lattice, self.off, position, direction, level, self.most)
+
+    def half_widths(self, position: Floats) -> Floats:
+        """Return how far it is at least to where the feature falls to half its height at places, m."""
+        angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
+        ways = np.column_stack([np.cos(angles), np.sin(angles)])
+        k = len(position)
+        distance = self.falls(
+            np.repeat(position, AROUND, axis=0),
+            np.tile(ways, (k, 1)),
+            np.repeat(0.5 * self.at(position), AROUND),
+        )
+        least: Floats = np.minimum(distance.reshape(k, AROUND).min(axis=1), self.most)
+        return least
+
+    def line(self, chain: Chain) -> Floats | None:
+        """Return the line along the top that a chain of pins stands for, or none where it has no length."""
+        pitch = self.lattice.pitch
+        line = space_evenly(chain.points, pitch)
+        if line is None:
+            return None
+        line = smooth(line, 2, chain.closed)
+        for _ in range(ROUNDS):
+            spread = space_evenly(self._centered(line, chain), pitch)
+            if spread is None:
+                return None
+            line = smooth(spread, 1, chain.closed)
+        half = self.half_width(line, chain.closed)
+        for end in (0, 1):
+            if not (chain.closed or chain.joined[end]):
+                line = self._ended(line[::-1] if end == 0 else line, half)
+                line = line[::-1] if end == 0 else line
+                if len(line) < 2:
+                    return None
+        return self._sharpened(line, half, chain.closed)
+
+    def _sharpened(self, line: Floats, half: float, closed: bool) -> Floats:
+        """Return a line with its corners where its straight legs meet, if the feature is as high there."""
+        step = self.lattice.pitch / 2.0
+        fine = space_evenly(line, step)
+        width = max(2, round(CORNER * half / step))
+        if fine is None or len(fine) < 4 * width:
+            return line
+        wide = max(2, round(LEG * half / step))
+        turn = _turns(fine, wide, closed)
+        if closed:  # from a straight place on
+            first = int(np.argmin(turn[:-1]))
+            fine = np.concatenate([fine[first:-1], fine[: first + 1]])
+            turn = np.concatenate([turn[first:-1], turn[: first + 1]])
+        peaks = [
+            i for i in np.flatnonzero(turn > TURN) if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()
+        ]
+        ends = [0, *peaks, len(fine) - 1]
+        pieces, start = [], 0
+        for before, i, after in zip(ends, peaks, ends[2:], strict=False):
+            reach = width + wide
+            legs = [
+                fine[max(i - reach, (before + i + 1) // 2 if before else 0) : i - width + 1],
+                fine[i + width : min(i + reach, (i + after) // 2 if after < len(fine) - 1 else after) + 1],
+            ]
+            corner = self._meeting(legs[0], legs[1][::-1], half)
+            if corner is not None and i - width >= start:
+                pieces += [np.concatenate([fine[start : i - width + 1], corner])]
+                fine[i + width - 1], start = corner[0], i + width - 1
+        if not pieces:
+            return line
+        evenly = [space_evenly(piece, 2.0 * step) for piece in (*pieces, fine[start:])]
+        return np.concatenate(
+            [one[: None if k == len(pieces) else -1] for k, one in enumerate(evenly) if one is not None]
+        )
+
+    def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
+        """Return a line led on straight from its last leg to one of others, or from its end to the next."""
+        step = self.lattice.pitch / 4.0
+        there = [fine for fine in (space_evenly(other, step) for other in others) if fine is not None]
+        fine = space_evenly(line, step)
+        if not there or fine is None:
+            return line
+        near, far = (round(share * half / step) for share in (CORNER, CORNER + LEG))
+        leg = fine[-far - 1 : -near]
+        every = np.concatenate(there)
+        corner = every[[int(np.argmin(np.hypot(*(every - line[-1]).T)))]]
+        if len(leg) > 4:
+            middle, way = _straight(leg)
+            off = (every - middle) @ np.array([-way[1], way[0]])
+            ahead = (every - middle) @ way
+            met = np.flatnonzero((np.abs(off) <= step) & (ahead > 0.0))
+            if len(met):
+                at = met[[int(np.argmin(np.abs(ahead[met] - float((line[-1] - middle) @ way))))]]
+                path = middle + np.linspace(0.0, 1.0, 9)[:, None] * (every[at] - middle)
+                if self.at(path).min() >= HIGH * float(np.median(self.at(leg))):
+                    fine, corner = fine[:-near], every[at]
+        whole = space_evenly(np.concatenate([fine, corner]), self.lattice.pitch)
+        return line if whole is None else whole
+
+    def _meeting(self, one: Floats, two: Floats, half: float) -> Floats | None:
+        """Return where two legs (k, 2) meet that lead to a corner, (1, 2), or none."""
+        if min(len(one), len(two)) < 3:
+            return None
+        middles, ways = zip(*map(_straight, (one, two)), strict=True)
+        sides = np.column_stack([ways[0], -ways[1]])
+        if abs(np.linalg.det(sides)) < 1e-3:
+            return None
+        away = np.linalg.solve(sides, middles[1] - middles[0])
+        corner = (middles[0] + away[0] * ways[0])[None]
+        path = np.concatenate([m + np.linspace(0.0, 1.0, 9)[:, None] * (corner - m) for m in middles])
+        high = float(np.median(self.at(np.concatenate([one, two]))))
+        turn = max(np.arccos(np.clip(-ways[0] @ ways[1], -1.0, 1.0)), 1e-3)
+        out = (
+            np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn / 2.0) - 1.0 / np.tan(turn / 2.0))
+        )
+        least = max(HIGH, 1.0 - 0.25 * (out / half) ** 2)
+        return corner if away.min() > 0.0 and self.at(path).min() >= least * high else None
+
+    def _sections(self, line: Floats, closed: bool, share: float) -> tuple[Floats, Floats, Floats]:
+        """Return which way the sections of a line lie, and how far they reach to both sides at a height."""
+        ahead = np.gradient(line, axis=0) if len(line) > 2 else np.tile(line[-1] - line[0], (2, 1))
+        if closed:
+            ahead[0] = ahead[-1] = line[1] - line[-2]
+        ahead /= np.maximum(np.hypot(*ahead.T), 1e-12)[:, None]
+        aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+        level = share * self.at(line)
+        return aside, self.falls(line, aside, level), self.falls(line, -aside, level)
+
+    def _centered(self, line: Floats, chain: Chain) -> Floats:
+        """Return a line moved into the middle of its sections."""
+        aside, left, right = self._sections(line, chain.closed, MIDDLE)
+        wide = left + right
+        seen = np.isfinite(wide)
+        if not seen.any():
+            return line
+        seen &= wide <= EVEN * float(np.median(wide[seen]))
+        # Across a junction the line goes on as it does beside it.
+        known = np.flatnonzero(seen)
+        shift = np.interp(np.arange(len(line)), known, 0.5 * (left[known] - right[known]))
+        shift = np.clip(shift, -self.lattice.pitch, self.lattice.pitch)
+        for end in (0, 1):
+            if chain.joined[end] and not chain.closed:
+                shift[-end] = 0.0
+        return line + shift[:, None] * aside
+
+    def half_width(self, line: Floats, closed: bool) -> float:
+        """Return half the width at half the height, the median along a line."""
+        _, left, right = self._sections(line, closed, 0.5)
+        # Along the edge of the bed a feature has one flank only.
+        half = np.where(np.isfinite(left + right), 0.5 * (left + right), np.minimum(left, right))
+        seen = np.isfinite(half)
+        return float(np.median(half[seen])) if seen.any() else self.most
+
+    def _ended(self, line: Floats, half: float) -> Floats:
+        """Return a line that ends, with its last point, where its spine ends; it may be longer or shorter."""
+        pitch = self.lattice.pitch
+        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight on there.
+        around = line[-1] + (half + pitch) * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+        at_edge = bool(np.isnan(self.lattice.at(self.off, around)).any())
+        aside_at_end = half if at_edge else min(half, pitch)
+        kept = run <= run[-1] - (aside_at_end if run[-1] > 4.0 * half else 0.0)
+        line, run = line[kept], run[kept]
+        back = max(0.0, run[-1] - max(2.0 * half, 2.0 * pitch))
+        from_there = np.array([np.interp(back, run, axis) for axis in line.T])
+        direction = (line[-1] - from_there) / max(float(np.hypot(*(line[-1] - from_there))), 1e-12)
+        longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * direction
+        path = np.concatenate([line, line[-1] + longer])
+        fine = space_evenly(path, pitch / 4.0)
+        if fine is None:  # a line of a pitch that comes back to where it began
+            return line[:1]
+        known = self.lattice.at(self.off, fine)
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
+        beyond = np.flatnonzero(np.isnan(known))
+        last = int(beyond[0]) if len(beyond) else len(known)
+        end = float(run[-1])
+        for _ in range(ROUNDS_AT_END):
+            near = (along[:last] >= end - max(0.5 * half, pitch)) & (along[:last] <= end)
+            if not near.any():
+                break
+            level = float(known[:last][near].mean())
+            start = int(np.flatnonzero(near)[0])
+            fallen_to = np.minimum.accumulate(known[start:last])
+            again = (fallen_to < FALLEN * level) & (known[start:last] > fallen_to + LEVEL * level)
+            low = np.flatnonzero((known[start:last] < 0.5 * level) | again)
+            if not len(low):
+                end = float(along[last - 1])  # the feature goes on beyond the bed
+                break
+            k = start + int(low[0])
+            if again[k - start]:
+                k = start + int(np.argmin(known[start : k + 1]))
+            over, under = known[k - 1] - 0.5 * level, known[k] - 0.5 * level
+            share = over / (over - under) if k > start and under < 0.0 else 1.0
+            fallen = along[k - 1] + (along[k] - along[k - 1]) * share
+            at = int(np.flatnonzero(near)[-1])
+            aside = np.array([[-direction[1], direction[0]]])
+            sides = [
+                float(self.falls(fine[at : at + 1], s * aside, np.array([0.5 * level]))[0])
+                for s in (1.0, -1.0)
+            ]
+            wide = 0.5 * sum(sides) if np.isfinite(sides).all() else min(min(sides), half)
+            end = float(fallen) - min(wide, WIDE * half)
+        if end <= 0.0:
+            return line[:1]
+        kept = along < end - 0.25 * pitch
+        tip = np.array([np.interp(end, along, axis) for axis in fine.T])
+        whole = space_evenly(np.concatenate([fine[kept], tip[None]]), pitch)
+        return line[:1] if whole is None else whole
+
+
+def space_evenly(points: Floats, step: float) -> Floats | None:
+    """Return points along a line at even steps, `step` apart at most; none of a line without length."""
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    if run[-1] < 1e-9:
+        return None
+    at = np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step)) + 1))
+    return np.column_stack([np.interp(at, run, axis) for axis in points.T])
+
+
+def _straight(leg: Floats) -> tuple[Floats, Floats]:
+    """Return the middle of a leg (k, 2), and the unit vector along it."""
+    way = leg[len(leg) // 2 :].mean(axis=0) - leg[: (len(leg) + 1) // 2].mean(axis=0)
+    return leg.mean(axis=0), way / max(float(np.hypot(*way)), 1e-12)
+
+
+def _turns(line: Floats, width: int, closed: bool) -> Floats:
+    """Return the turn of a line (m, 2) at its points, from `width` points before to as many after, rad."""
+    count = len(line) - 1
+    at = np.arange(count + 1)
+    before, after = at - width, at + width
+    before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
+    one, two = line - line[before], line[after] - line
+    turn: Floats = np.abs(
+        np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], np.sum(one * two, axis=1))
+    )
+    return turn
+
+
+def smooth(line: Floats, times: int, closed: bool) -> Floats:
+    """Return a line without its staircase; ends stay.
+
+    Each point goes towards the middle of those beside it and a little further back again, so that an arc does
+    not shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
+    """
+    if len(line) < 4:
+        return line
+    for share in TO_AND_FRO * times:
+        pull = np.zeros_like(line)
+        pull[1:-1] = 0.5 * (line[:-2] + line[2:]) - line[1:-1]
+        if closed:
+            pull[[0, -1]] = 0.5 * (line[-2] + line[1]) - line[0]
+        line = line + share * pull
+    return line
+
 
 Pins = NDArray[np.int64]
 

@@ -14,14 +14,108 @@ and harmonic, as a soap film is at small slopes, between them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.spline import interpolate_monotone
+from .body import NO_PIN
 from .formed import Formed
-from .membrane import relax_membrane
+from .skin_mesh import make_skin
+
+#: The skin is as wanted when no point would move further than this under its own pull, m.
+STILL = 1e-9
+#: A point is at most a pitch or so from a fixed one: some 40 rounds settle a bed of any size.
+ROUNDS = 1000
+
+
+def relax_membrane(formed: Formed, position: Floats, start: Floats, parts: int, cap: float) -> Floats:
+    """Return the heights of the skin, m, shape (rows, columns) of its points.
+
+    Finite elements on the triangles of the skin; the points on a pin's end keep its height.
+
+    `formed`: the pins; `position` (rows, columns, 2), the skin's points, m; `start` (rows, columns), heights
+    to begin with, m, those of the pins at the pins; `parts`: points a pitch; `cap`: radius of a pin's flat
+    end, m.
+    """
+    flat = position.reshape(-1, 2)
+    height, free = _laid(formed, position, start, parts, cap)
+    faces = make_skin(flat, np.zeros(len(flat)), *start.shape)
+    stiffness = _Stiffness(flat, faces)
+    # Conjugate gradients on the free points, with the diagonal taken out.
+    weight = np.where(free, 1.0 / stiffness.diagonal, 0.0)
+    rest = -stiffness(height) * free
+    step = weight * rest
+    direction, power = step, float(rest @ step)
+    for _ in range(ROUNDS):
+        if np.abs(step).max() <= STILL:
+            break
+        pull = stiffness(direction) * free
+        length = power / float(direction @ pull)
+        height = height + length * direction
+        rest = rest - length * pull
+        step = weight * rest
+        power, former = float(rest @ step), power
+        direction = step + power / former * direction
+    return height.reshape(start.shape)
+
+
+def _laid(
+    formed: Formed, position: Floats, start: Floats, parts: int, cap: float
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return heights with every end of a pin level, and which points no pin carries."""
+    height, free = start.copy(), np.ones(start.shape, bool)
+    pins = position[::parts, ::parts]
+    reach = int(np.ceil(cap / min(formed.pitch, formed.row_spacing) * parts * 1.5)) + 1
+    lines, points = start.shape
+    for down in range(-reach, reach + 1):
+        for across in range(-reach, reach + 1):
+            row = np.arange(formed.rows) * parts + down
+            column = np.arange(formed.columns) * parts + across
+            inside = ((row >= 0) & (row < lines))[:, None] & ((column >= 0) & (column < points))
+            spot = np.ix_(np.clip(row, 0, lines - 1), np.clip(column, 0, points - 1))
+            near = inside & (np.sum((position[spot] - pins) ** 2, axis=-1) <= (cap * (1.0 + 1e-9)) ** 2)
+            at = spot[0].repeat(formed.columns, 1)[near], spot[1].repeat(formed.rows, 0)[near]
+            height[at] = start[::parts, ::parts][near]
+            free[at] = False
+    height[::parts, ::parts], free[::parts, ::parts] = start[::parts, ::parts], False
+    return height.ravel(), free.ravel()
+
+
+class _Stiffness:
+    """The cotangent Laplacian of a flat triangle mesh, applied to heights."""
+
+    def __init__(self, position: Floats, faces: NDArray[np.int32]) -> None:
+        starts, ends, weights = [], [], []
+        for corner in range(3):
+            tip, start, end = (faces[:, (corner + k) % 3] for k in range(3))
+            one, other = position[start] - position[tip], position[end] - position[tip]
+            area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+            weight = 0.5 * np.sum(one * other, axis=1) / area
+            kept = np.abs(weight) > 1e-12  # across a right angle nothing pulls
+            starts.append(start[kept])
+            ends.append(end[kept])
+            weights.append(weight[kept])
+        self._start, self._end = np.concatenate(starts), np.concatenate(ends)
+        self._weight, self._count = np.concatenate(weights), len(position)
+        self.diagonal = self._gathered(self._weight, self._weight)
+
+    def __call__(self, height: Floats) -> Floats:
+        """Return the pull on each point, m."""
+        pull = self._weight * (height[self._start] - height[self._end])
+        return self._gathered(pull, -pull)
+
+    def _gathered(self, at_start: Floats, at_end: Floats) -> Floats:
+        """Add up what the edges give to their ends."""
+        total: Floats = np.zeros(self._count)
+        total += np.bincount(self._start, at_start, self._count)
+        total += np.bincount(self._end, at_end, self._count)
+        return total
+
 
 #: Skins by name, with what is said of them in the help.
 SKINS: dict[str, str] = {
@@ -141,3 +235,82 @@ def _held(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) -> 
         bounded = np.clip(fine, cell.min(axis=0)[:, None], cell.max(axis=0)[:, None])
         fine = np.where(beyond, bounded, fine)
     return fine
+
+
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceGrid:
+    """Points of a skin, row by row.
+
+    Attributes
+    ----------
+    formed : Formed
+        The pins under it.
+    parts : int
+        Points a pitch.
+    position : ndarray (m, 2)
+        Points in plan, m.
+    height, former : ndarray (m,)
+        The skin, and the skin as it was before, m.
+    rows, columns : int
+        Of points.
+    """
+
+    formed: Formed
+    parts: int
+    position: Floats
+    height: Floats
+    former: Floats
+    rows: int
+    columns: int
+
+    @cached_property
+    def faces(self) -> Indices:
+        """Triangles of the skin, counter-clockwise seen from above."""
+        return make_skin(self.position, self.height, self.rows, self.columns)
+
+    @property
+    def raised(self) -> Floats:
+        """How far each point is above where it was before, m."""
+        return self.height - self.former
+
+    @property
+    def pins(self) -> Indices:
+        """Which point each pin top is, shape (n,)."""
+        index = np.arange(self.rows * self.columns, dtype=np.int32).reshape(self.rows, self.columns)
+        return index[:: self.parts, :: self.parts].ravel()
+
+    def nearest(self, of_pins: NDArray[Any]) -> NDArray[Any]:
+        """Return at each point what is known of the nearest pin."""
+        near: NDArray[Any] = of_pins[find_nearest_pin(self.formed, self.parts)]
+        return near
+
+    def values(self) -> dict[str, NDArray[np.float64]]:
+        """Return height, force and mode at each point: force straight between pins, mode of the nearest."""
+        force = interpolate_skin(self.formed, self.formed.force, "bilinear", self.parts, 0.0)
+        mode = self.nearest(self.formed.mode).astype(np.float64)
+        return {"height": self.height, "force": force, "mode": mode}
+
+    def values_with_base(self, level: float) -> dict[str, NDArray[np.float64]]:
+        """Return the same, and after it that of as many points of a base: no force, and no pin's mode."""
+        base = {"height": level, "force": 0.0, "mode": float(NO_PIN)}
+        count = self.height.size
+        return {
+            name: np.concatenate([value, np.full(count, base[name])]) for name, value in self.values().items()
+        }
+
+
+def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceGrid:
+    """Return the skin over formed pins.
+
+    `skin_name`: a key of `skins.SKINS`; `parts`: points a pitch; with 1 every skin is the triangles between
+    the pins; `cap`: radius of a pin's flat end, m; of use to the membrane only.
+    """
+    position = place_points(formed, parts)
+    rows, columns = position.shape[:2]
+    now, before = (
+        interpolate_skin(formed, pins, skin_name, parts, cap) for pins in (formed.height, formed.former)
+    )
+    return SurfaceGrid(formed, parts, position.reshape(-1, 2), now, before, rows, columns)

@@ -1,0 +1,289 @@
+"""Figures of blisters, limits and variants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from digiclay.core.base.modes import Mode
+from digiclay.core.session.run_scene import Result
+from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
+
+from .panel import NAMED
+from .results import AHEAD, AS_IT_IS, PAPER_SPEED, SUSTAINED, Results
+from .scenes import COMPARED, METHODS, NAMES, PRESSED, THIRD
+from .variants import NO_RISE
+
+#: Color, marker and its size of each profile.
+PROFILES = {"cone": (LINES[0], "o", 8.0), "gaussian": (LINES[1], "s", 5.0)}
+#: Instants of a drag that are drawn.
+INSTANTS = 5
+
+
+def blisters(results: Results) -> Any:
+    """Draw sections through raised and sunken blisters, both profiles, all methods."""
+    methods = [method for method in COMPARED if (method, "convex", "cone") in results.blisters]
+    height = 0.8 + 3.4 * len(methods)
+    with canvas(12.5, height, "Blisters in section, the finger in place") as (figure, place):
+        for row, method in enumerate(methods):
+            for column, shape in enumerate(("convex", "concave")):
+                axes = place(f"{method} {shape}", 0.85 + 6.15 * column, height - 3.5 - 3.4 * row, 5.25, 2.55)
+                for profile, look in PROFILES.items():
+                    done = results.blisters[method, shape, profile]
+                    _section(axes, done, look, profile)
+                _finger(axes, done, -1)
+                rest = done.scene.actuator.rest_height * MM
+                axes.axhline(rest, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
+                axes.set(xlim=(-25, 25), title=f"{NAMES[method]}, {shape}", ylabel="height (mm)")
+                axes.set_ylim((36, 64) if shape == "convex" else (28, 43))
+                if row == len(methods) - 1:
+                    axes.set_xlabel("distance from the middle (mm)")
+        first = figure.axes[0]
+        first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="bed at rest")
+        first.plot([], [], color=INK, linewidth=1.2, label="fingertip")
+        first.plot([], [], "o", color=INK, label="cell that feels it")
+        handles, labels = first.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper right", ncols=5, bbox_to_anchor=(0.99, 0.998),
+                      handlelength=1.6, columnspacing=1.2)  # fmt: skip
+    return figure
+
+
+def _section(axes: Any, done: Result, look: tuple[str, str, float], name: str) -> None:
+    """Draw the heights of the middle row; cells that feel the finger are filled."""
+    place, height, force = (done.history[key] for key in ("position", "height", "force"))
+    row = np.abs(place[:, 1]) < 1e-6
+    color, marker, size = look
+    across, top, felt = place[row, 0] * MM, height[-1, row] * MM, force[-1, row] > 0.0
+    axes.plot(across, top, color=color, marker=marker, markersize=size, markerfacecolor="white", label=name)
+    axes.plot(across[felt], top[felt], marker, color=color, markersize=size)
+
+
+def _finger(axes: Any, done: Result, row: int) -> None:
+    """Draw the fingertip's outline in the section."""
+    tip, x, z = done.scene.section("fingertip"), *(done.history["fingertip"][row, [0, 2]] * MM)
+    if tip is None:
+        return
+    turn = np.linspace(np.pi, 2.0 * np.pi, 91)
+    wide, high = tip.length * MM, tip.height * MM
+    axes.plot(x + wide * np.cos(turn), z + high * (1.0 + np.sin(turn)), color=INK, linewidth=1.2)
+
+
+def freezing(results: Results) -> Any:
+    """Draw sections along a drag at several times; frozen cells are marked."""
+    methods = [method for method in COMPARED if method in results.drags]
+    height = 0.8 + 3.7 * len(methods)
+    with canvas(12.5, height, "Freezing: what the finger has left keeps its height") as (figure, place):
+        from matplotlib import colormaps
+
+        for panel, method in enumerate(methods):
+            done, start, end = results.drags[method]
+            axes = place(method, 0.85, height - 3.85 - 3.7 * panel, 11.3, 2.8)
+            moments = done.history["time"]
+            ridge = np.abs(done.history["position"][:, 1]) < 1e-6
+            across = done.history["position"][ridge, 0] * MM
+            for number, moment in enumerate(np.linspace(start, end, INSTANTS)):
+                instant = int(np.argmin(np.abs(moments - moment)))
+                color = colormaps["cividis"](0.9 * number / (INSTANTS - 1))
+                top = done.history["height"][instant, ridge] * MM
+                frozen = done.history["mode"][instant, ridge] == Mode.FROZEN
+                axes.plot(across, top, color=color, label=f"{moment - start:.1f} s")
+                axes.plot(
+                    across[frozen], top[frozen], "s", color=color, markersize=8, markeredgecolor="white"
+                )
+                x, z = done.history["fingertip"][instant, [0, 2]] * MM
+                axes.plot(x, z + 6.0, "v", color=color, markersize=9)
+            axes.set(xlim=(-38, 38), ylim=(38, 65), ylabel="height (mm)", title=NAMES[method])
+            if panel == 0:
+                axes.plot([], [], "s", color=INK, label="frozen cell")
+                axes.plot([], [], "v", color=INK, label="finger")
+                legend_above(axes, 8)
+        axes.set_xlabel("along the drag (mm)")
+    return figure
+
+
+#: Told apart with any color vision; markers say the same once more.
+METHOD_COLORS = {"virtual_master": LINES[0], "cell_states": LINES[1], THIRD: LINES[2]}
+MARKERS = "os^D"
+
+
+def oscillation(results: Results) -> Any:
+    """Draw the force after a quick press at three gains, and what the sweep of the gains came to."""
+    position_gains = sorted({one.position_gain for one in results.swings})
+    middle = position_gains[len(position_gains) // 2]
+    with canvas(13.0, 7.6, f"Method I holding still after a quick press of {PRESSED * MM:g} mm") as (
+        figure,
+        place,
+    ):
+        detail = place("detail", 0.85, 4.4, 11.7, 2.25)
+        set_point = _details(detail, results, middle)
+        detail.axhline(set_point, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
+        detail.set(xlabel="time after the press (s)", ylabel="total force (N)", xlim=(-0.2, 2.4))
+        detail.set_ylim(0.0, 2.5 * set_point)
+        detail.set_title(f"$K_p$ = {middle:g} 1/m (beyond the frame: the press itself)")
+        legend_above(detail)
+        swing = place("amplitude", 0.85, 0.75, 5.4, 2.6)
+        settle = place("settling", 7.15, 0.75, 5.4, 2.6)
+        rows = {f"$K_p$ = {gain:g} 1/m": gain for gain in position_gains}
+        sweeps = {
+            label: [one for one in results.swings if one.position_gain == gain]
+            for label, gain in rows.items()
+        }
+        sweeps[f"{position_gains[0]:g} 1/m, quicker device"] = results.quicker
+        for number, (label, found) in enumerate(sweeps.items()):
+            row = sorted(found, key=lambda one: one.gain)
+            style: dict[str, Any] = {"color": LINES[number], "marker": MARKERS[number]}
+            swing.plot([one.gain for one in row], [one.amplitude for one in row], label=label, **style)
+            calm = [one for one in row if one.settling is not None]
+            settle.plot([one.gain for one in calm], [one.settling for one in calm], label=label, **style)
+        swing.axhline(SUSTAINED, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
+        swing.set(
+            ylabel="amplitude in the last second (N)", ylim=(0.0, None), title="Oscillation that goes on"
+        )
+        settle.set(
+            ylabel="time to settle within 10 % (s)", ylim=(0.0, None), title="Response (no point: it goes on)"
+        )
+        ticks = [2, 5, 10, 20, 50, 100]
+        for axes in (swing, settle):
+            axes.set_xscale("log")
+            axes.set_xticks(ticks, [str(tick) for tick in ticks])
+            axes.minorticks_off()
+            axes.set(xlabel="force gain $K_f$ (1/N)", xlim=(1.7, 190))
+        settle.legend(loc="upper right", borderaxespad=0.0)
+    return figure
+
+
+def _details(axes: Any, results: Results, position_gain: float) -> float:
+    """Draw the force at the lowest gain, at the last one that is calm, and at the first that is not."""
+    gains = sorted(gain for gain, known in results.details if known == position_gain)
+    calm, wild = results.onset(position_gain)
+    chosen = list(dict.fromkeys(gain for gain in (gains[0], calm, wild) if gain is not None))
+    for color, gain in zip(LINES, chosen, strict=False):
+        done, quick = results.details[gain, position_gain]
+        axes.plot(
+            done.history["time"] - quick, done.history["total_force"], color=color,
+            linewidth=1.4, label=f"$K_f$ = {gain:g} 1/N",
+        )  # fmt: skip
+    assert done.scene.set_point is not None  # Method I has one
+    return done.scene.set_point.force
+
+
+def tracking(results: Results) -> Any:
+    """Draw RFD and lag against the speed of a level drag, all methods."""
+    limits = results.criterion
+    with canvas(12.5, 5.2, "A ridge 15 mm high, drawn straight and level") as (figure, place):
+        panels = (
+            ("rfd", "RFD (N)", 1.0, limits.deviation, place("rfd", 0.85, 0.75, 5.1, 3.5)),
+            ("lag", "largest lag (mm)", MM, limits.lag, place("lag", 7.0, 0.75, 5.1, 3.5)),
+        )
+        for name, label, factor, limit, axes in panels:
+            for marker, method in zip(MARKERS, COMPARED, strict=False):
+                row, color = results.tracks.get(method, []), METHOD_COLORS[method]
+                speed = [one.speed * MM for one in row]
+                value = [getattr(one, name) * factor for one in row]
+                axes.plot(speed, value, color=color, alpha=0.9, label=NAMES[method] if row else None)
+                for one, x, y in zip(row, speed, value, strict=True):
+                    fill = color if one.losses == 0 and one.loss_share == 0.0 else "white"
+                    axes.plot(x, y, marker, color=color, markerfacecolor=fill, markersize=7)
+            axes.axhline(limit * factor, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
+            axes.axvline(PAPER_SPEED * MM, color=INK, linewidth=1.0, linestyle=(0, (1, 2)))
+            axes.set(xlabel="finger's speed (mm/s)", ylabel=label, xlim=(0, None), ylim=(0, None))
+            axes.set_title(label.split(" (")[0])
+        first = panels[0][-1]
+        first.plot([], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost")
+        first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="criterion")
+        first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (1, 2)), label="the paper's 15 mm/s")
+        handles, labels = first.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper left", ncols=6, bbox_to_anchor=(0.005, 0.93),
+                      fontsize=10, handlelength=1.2, columnspacing=0.8)  # fmt: skip
+    return figure
+
+
+DASHED = (0, (5, 3))
+
+
+def variants(results: Results) -> Any:
+    """Draw what the claims on the variants rest on."""
+    with canvas(13.0, 8.4, "One thing changed") as (figure, place):
+        _rise(place("rise", 1.9, 4.75, 4.4, 2.6), results)
+        _ahead(place("ahead", 8.2, 4.75, 4.4, 2.6), results)
+        _gains(place("gains", 0.95, 0.75, 5.35, 2.7), results)
+        _radius(place("radius", 7.25, 0.75, 5.35, 2.7), results)
+    return figure
+
+
+def _rise(axes: Any, results: Results) -> None:
+    names = [name for variant, _, name in results.dragged if variant == NO_RISE]
+    for number, (variant, called) in enumerate(((AS_IT_IS, "with the rise"), (NO_RISE, "without"))):
+        found = [results.dragged[variant, METHODS[1], name] for name in names]
+        _across(axes, names, [one.force for one in found], number, called)
+    axes.set(xlabel="mean total force (N)", title=f"Method II, drags at {PAPER_SPEED * MM:g} mm/s")
+    axes.set_xlim(0.0, 1.55 * max(line.get_xdata().max() for line in axes.get_lines()))
+    axes.legend(loc="center right", borderaxespad=0.0)
+
+
+def _ahead(axes: Any, results: Results) -> None:
+    found = {
+        (method, name): one.ahead * MM
+        for (variant, method, name), one in results.dragged.items()
+        if variant == AS_IT_IS and one.ahead is not None and "ridge" not in name
+    }
+    names = list(dict.fromkeys(name for _, name in found))
+    for number, (method, called) in enumerate(zip(METHODS, ("Method I", "Method II"), strict=True)):
+        _across(axes, names, [found.get((method, name), np.nan) for name in names], number, called)
+    near, far = (f"{one * MM:g}" for one in AHEAD)
+    axes.axvline(0.0, color=INK, linewidth=1.0, linestyle=DASHED)
+    axes.set(xlabel="height over the bed at rest (mm)", title=f"Cells {near} to {far} mm ahead")
+    lowest, highest = min(found.values()), max(found.values())
+    axes.set_xlim(1.15 * lowest, max(-0.1 * lowest, 1.5 * highest))
+    axes.legend(loc="upper left", borderaxespad=0.0)
+
+
+def _across(axes: Any, names: list[str], values: list[float], number: int, called: str) -> None:
+    """Draw a marker for each name, a color and shape for each call."""
+    y = -np.arange(len(names)) + 0.12 - 0.24 * number
+    style: dict[str, Any] = {"color": LINES[number], "linestyle": "", "markersize": 9}
+    axes.plot(values, y, "os"[number], label=called, **style)
+    axes.set_yticks(-np.arange(len(names)), names)
+    axes.set_gid(NAMED)
+    axes.set_ylim(-len(names) + 0.4, 0.6)
+
+
+def _gains(axes: Any, results: Results) -> None:
+    used = getattr(results.printed[METHODS[0]].scene.control, "position_gain", 0.0)
+    one = [swing for swing in results.swings if swing.position_gain == used]
+    shown = (("Method I", one, LINES[0], "o-"), ("Method II", results.cell_swings, LINES[1], "s-"))
+    for called, swings, color, look in shown:
+        row = sorted(swings, key=lambda swing: swing.gain)
+        values = [swing.gain for swing in row], [swing.amplitude for swing in row]
+        axes.plot(*values, look, color=color, label=called)
+    axes.axhline(SUSTAINED, color=INK, linewidth=1.0, linestyle=DASHED)
+    axes.set_xscale("log")
+    ticks = [2, 5, 10, 20, 50, 100, 200, 400]
+    axes.set_xticks(ticks, [str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.set(xlabel="$K_f$ of the master, $K_{FF}$ of a cell (1/N)", ylim=(0.0, None))
+    axes.set(ylabel="amplitude of the force (N)", title="Held still after a quick press")
+    axes.legend(loc="upper left", borderaxespad=0.0)
+
+
+def _radius(axes: Any, results: Results) -> None:
+    kinds = sorted({(one.thresholds, one.radius) for one in results.located})
+    least = min(radius for _, radius in kinds)
+    for known, radius in kinds:
+        row = [
+            one
+            for one in sorted(results.located, key=lambda one: one.noise)
+            if (one.thresholds, one.radius) == (known, radius) and one.scatter is not None
+        ]
+        # With thresholds both lie upon each other: the smaller markers on top.
+        near = f"$r_{{VM}}$ = {radius * MM:g} mm" if radius == least else "no radius"
+        axes.plot(
+            [one.noise * MM for one in row], [(one.scatter or 0.0) * MM for one in row],
+            color=LINES[int(radius != least)], marker="os"[int(radius != least)],
+            markersize=5 if radius == least else 9, zorder=3 if radius == least else 2,
+            linestyle="--" if known else "-", markerfacecolor="white" if known else None,
+            label=near + (", thresholds" if known else ""),
+        )  # fmt: skip
+    axes.set(xlabel="noise of a cell's force sensor (mN)", ylabel="scatter of the master (mm)")
+    axes.set(title="Method I, finger held still", xlim=(0.0, None), ylim=(0.0, None))
+    axes.legend(loc="upper left", borderaxespad=0.0)
