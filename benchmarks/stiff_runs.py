@@ -1,4 +1,4 @@
-"""Runs of the stiff cases: recorded commands, references, and evaluation."""
+"""Stiff cases, and their runs: recorded commands, references, and evaluation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Time of the parts of a tick in Blender, measured on the functions of the session itself."""
+"""Time of the parts of a tick and of the skin in Blender, measured on the functions of the session itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Claim of the paper, and common parts of the modules of claims."""
+"""Claims of the paper: their form, and those on relief and on following the fingertip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pin display on a serial line: heights at a rate, without ever waiting for the line."""
+"""Pin display on a serial line: its frames, and heights at a rate without ever waiting for the line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Link of the doors to the session: newest frame, orders, lease of the fingertip, counts."""
+"""Link of the doors to the session: bed, newest frame, orders, lease of the fingertip, counts."""
 
 from __future__ import annotations
 

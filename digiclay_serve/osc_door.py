@@ -1,4 +1,4 @@
-"""OSC door: requests and frames as datagrams, for a bounded number of subscribers."""
+"""OSC door: messages, requests and frames as datagrams, for a bounded number of subscribers."""
 
 from __future__ import annotations
 

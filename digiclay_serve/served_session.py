@@ -1,4 +1,4 @@
-"""Session of a server as a value: it follows the newest pose, control period by control period."""
+"""Session of a server as a value, which follows the newest pose, and the parts of its take on the disk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sobol indices of an output: shares of its variance by parameter, with confidence intervals, by SALib."""
+"""Sobol samples and indices by SALib: shares of an output's variance by parameter, with intervals."""
 
 from __future__ import annotations
 

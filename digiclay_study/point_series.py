@@ -1,4 +1,4 @@
-"""Series of points in a folder: start, evaluation on a pool, end, and the table of all points."""
+"""Series of points over ranges of a scene: start, evaluation on a pool, end, and the table of all points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trials of a tuning: two outputs each, and whether the run kept the fingertip."""
+"""Trials of a tuning: proposed by optuna, two outputs each, and their Pareto front."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Index page of a job series: one self-contained HTML file."""
+"""Index page of a job series, one self-contained HTML file, and its thumbnails."""
 
 from __future__ import annotations
 

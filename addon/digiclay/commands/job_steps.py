@@ -1,4 +1,4 @@
-"""Steps of a job: the session, its errors, meshes, pictures and films."""
+"""Steps of a job: the session, its errors, meshes, pictures and films; its log."""
 
 from __future__ import annotations
 

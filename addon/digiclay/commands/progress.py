@@ -1,4 +1,4 @@
-"""Progress line on a terminal, redrawn in place and removed at the end."""
+"""Output on a terminal: tables, and a progress line that is redrawn in place and removed at the end."""
 
 from __future__ import annotations
 

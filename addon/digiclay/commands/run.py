@@ -1,4 +1,4 @@
-"""``digiclay run``: simulate a scene and write its folder."""
+"""``digiclay run``: simulate a scene, within a budget of error if one is given, and write its folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stop of a session by Ctrl-C, SIGTERM or a closed terminal, with the computed rows kept."""
+"""Ends of a command: stopped with the computed rows kept, or refused in one line; exit codes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Primitive shapes of the device, as vertices and faces; numpy only, no Blender."""
+"""Parts of the device: their roles, and primitive shapes as vertices and faces; numpy only, no Blender."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks of a job series on a render farm, and which of them need others.
+"""Tasks of a job series on a render farm, and their templates for OpenJD, Flamenco and OpenCue.
 
 Of each job: the run, the frames of its films in ranges, and one task a film that encodes them; the page
 last. Each task is a command of digiclay that does nothing, with exit code 0, where it is done already.

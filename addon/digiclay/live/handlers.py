@@ -1,4 +1,4 @@
-"""Keys and handlers of live sessions: undo, redo, save, load, and removal of the extension.
+"""Handlers of live sessions: undo, redo, save, load, removal of the extension, recovery of a recording.
 
 The handlers are there only while a session runs.
 """

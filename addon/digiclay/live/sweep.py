@@ -1,4 +1,4 @@
-"""Motion of the fingertip over a press stroke that smooths, and the orders to the device below it.
+"""Strokes that smooth, and the smoothing that settles other strokes: path of the fingertip and orders.
 
 Pins are smoothed by their valves, not by a finger: it goes along the path above them, never ahead of the hand
 and no faster than a drag, and shows where the device is at work. At the end it waits until all pins have come

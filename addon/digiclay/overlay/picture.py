@@ -1,4 +1,4 @@
-"""Overlay as plain marks in pixels: boxes, lines, dots and text; no Blender."""
+"""Overlay as plain marks in pixels, boxes, lines, dots and text, and its colors; no Blender."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Legend of the colors in a picture, on a plane in front of the device."""
+"""Legend and force plot of a picture, on planes in front of the device."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loading of control methods of one's own: code to a checked class, and that to the table of methods."""
+"""Control methods of one's own: code found, loaded, checked, entered in the table, copied beside runs."""
 
 from __future__ import annotations
 

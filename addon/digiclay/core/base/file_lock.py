@@ -1,4 +1,4 @@
-"""File lock of one process, which ends with the process."""
+"""File lock of one process, which ends with the process; whether a process has ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run folder: locked at the start of a run, and complete under its name or absent."""
+"""Folders and files: safe names, locked at the start of a run, complete under their name or absent."""
 
 from __future__ import annotations
 

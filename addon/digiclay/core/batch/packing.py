@@ -1,4 +1,4 @@
-"""Assembly of a batch from scenes, and their compatibility."""
+"""Batch: parts merged from those of compatible scenes, its steppers and controllers, its control period."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sessions of many scenes in one call."""
+"""Sessions of many scenes in one call: played in step, recorded, evaluated."""
 
 from __future__ import annotations
 

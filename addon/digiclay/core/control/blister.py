@@ -1,4 +1,4 @@
-"""Blister: heights between the virtual master and the surrounding surface."""
+"""Blister: heights between its top and the surrounding surface, and the cells in, around and behind it."""
 
 from __future__ import annotations
 

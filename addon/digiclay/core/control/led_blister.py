@@ -1,4 +1,4 @@
-"""Blister of Method III: about the predicted place of the fingertip, and led ahead of it."""
+"""Blister of Method III: about the predicted place of the fingertip, led ahead of it; the method's memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Virtual master of Method I: gains, thresholds and the decisions of a control period."""
+"""Virtual master of Method I: gains, memory, model of its cell, and the decisions of a control period."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Control methods of one's own: the class they derive from, what they are shown, what they order.
+"""Control methods of one's own: their class, what they are shown and order, and the guard around them.
 
 An own method is one frozen dataclass: its fields are the parameters, its methods are pure functions. `begin`
 returns the memory before a session, `locate` says which cells are to be commanded, and `command` turns

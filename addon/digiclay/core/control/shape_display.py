@@ -1,4 +1,4 @@
-"""Shape display: given heights for all cells, with three methods of refresh."""
+"""Shape display: given heights for all cells, three methods of refresh, handover to a control method."""
 
 from __future__ import annotations
 

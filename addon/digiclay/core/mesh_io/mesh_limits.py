@@ -1,4 +1,4 @@
-"""Size limits of input meshes, and the messages of their refusal."""
+"""Size limits of input meshes, checks of file heads, and meshes placed several times."""
 
 from __future__ import annotations
 

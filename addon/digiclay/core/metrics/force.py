@@ -1,4 +1,4 @@
-"""Metrics of the total force: deviation, contact loss, first touch."""
+"""Metrics of signals and of the total force: deviation, overshoot, contact loss, differences one can feel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Render settings of a picture or film: appearance and rows shown; no Blender."""
+"""Render settings of a picture or film: appearance, rows shown, files of frames; no Blender."""
 
 from __future__ import annotations
 

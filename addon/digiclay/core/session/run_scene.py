@@ -1,4 +1,4 @@
-"""Session from scene to results: simulation, recording, run folder."""
+"""Session from scene to results: simulation, recording, evaluation, run folder."""
 
 from __future__ import annotations
 

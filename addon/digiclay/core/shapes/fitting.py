@@ -1,4 +1,4 @@
-"""Placement of a shape on a bed: fit of the plan, scale of the relief, clipping."""
+"""Placement of a shape on a bed: fit of the plan, scale of the relief, clipping; the fit in words."""
 
 from __future__ import annotations
 

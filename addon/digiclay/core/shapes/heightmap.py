@@ -1,4 +1,4 @@
-"""Height map: a shape as a grid of values, bilinear over its pixels."""
+"""Height map: a picture or grid of values as a shape, bilinear over its pixels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mesh as a shape: its top surface by rays along the axes of the pins."""
+"""Mesh as a shape: its top surface by rays along the axes of the pins, holes filled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Common part of the explicit steppers: march through the segments of a step."""
+"""Explicit steppers: Euler, Heun and Runge-Kutta 4, marching through the segments of a period."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formed surface: the pins now and before."""
+"""Formed surface: the pins now and before, and the lattice between them."""
 
 from __future__ import annotations
 
