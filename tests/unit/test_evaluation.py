@@ -209,7 +209,7 @@ def test_a_fault_in_a_stack_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) 
     # Warnings are errors in tests: a stack that fails by our own fault fails the test it runs in.
     break_stacks(monkeypatch, ZeroDivisionError("by\nzero"))
     bundle = some("control.force_gain=1,5")
-    with pytest.raises(BatchWarning, match="A stack of 2 runs failed: ZeroDivisionError: by zero"):
+    with pytest.raises(BatchWarning, match="A batch of 2 runs failed: ZeroDivisionError: by zero"):
         evaluate_bundle(bundle)
     with pytest.warns(BatchWarning):
         records = evaluate_bundle(bundle)

@@ -21,7 +21,7 @@ from ..core.surface.features import Finding
 from ..core.surface.formed import make_formed
 from ..core.surface.skins import SKINS
 from .arguments import add_run, millimeters, seconds, told_as_options
-from .stop import refuse_what_has_no_surface
+from .stop import require_surface
 
 
 def add_surface(parser: argparse.ArgumentParser) -> None:
@@ -175,7 +175,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     if arguments.separate and arguments.kind != "features":
         raise OutputError("--separate needs --kind features.")
     run = read_run(arguments.run, "height", "position", "force", "mode")
-    refuse_what_has_no_surface(run.scene, "export")
+    require_surface(run.scene, "export")
     model, finding = model_of(arguments, run.scene, arguments.kind), finding_of(arguments)
     formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
     made = make_bodies(formed, model, finding)

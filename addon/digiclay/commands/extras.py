@@ -97,7 +97,7 @@ def make_extras(
     return left_out, wrong
 
 
-def tell_left_out(left_out: Iterable[Extra], run: Path) -> None:
+def print_skipped(left_out: Iterable[Extra], run: Path) -> None:
     """Print the files that a stop prevented, and the command that makes them.
 
     `run`: the finished run's folder.

@@ -13,7 +13,7 @@ from ..core.surface.formed import make_formed
 from .arguments import add_run, seconds
 from .export import add_surface, finding_of, former_of, model_of, row_of
 from .progress import table as aligned
-from .stop import refuse_what_has_no_surface
+from .stop import require_surface
 
 EXAMPLES = """\
 examples:
@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """List the features."""
     run = read_run(arguments.run, "height", "position", "force", "mode")
-    refuse_what_has_no_surface(run.scene, "features")
+    require_surface(run.scene, "features")
     formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
     found = find_features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
     if arguments.quiet:

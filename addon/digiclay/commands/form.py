@@ -25,9 +25,9 @@ from ..core.shapes.fitting import Fitted, pack
 from ..core.shapes.source_file import find_shape, fit_shape, import_reader, list_shapes
 from .arguments import add_command, add_scene, scene_of
 from .export import formats
-from .extras import Extra, make_extras, plan_meshes, tell_left_out
+from .extras import Extra, make_extras, plan_meshes, print_skipped
 from .progress import Bar
-from .stop import STOPPED, Stop, allow_interrupt, defer_interrupt, refuse_what_has_no_surface
+from .stop import STOPPED, Stop, allow_interrupt, defer_interrupt, require_surface
 
 EXAMPLES = f"""\
 examples:
@@ -89,13 +89,13 @@ def carry_out(arguments: argparse.Namespace) -> int:
             versions = {"digiclay": __version__}
             progress = None if arguments.quiet else bar
             result = run(scene, progress=progress, stopped=stop, versions=versions)
-        result, lines = _judged(result, laid)
+        result, lines = _evaluate(result, laid)
         with claim.write() as folder:
             save(result, folder)
             left_out, wrong = make_extras(_exports(result, arguments.export), folder, stop)
     if not arguments.quiet:
         print("\n".join([*lines, result.summary(), f"written to {out}"]))
-    tell_left_out(left_out, out)
+    print_skipped(left_out, out)
     if wrong:
         raise wrong[0]
     return STOPPED if stop() else 0
@@ -103,7 +103,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 def _laid(scene: Scene) -> tuple[Scene, Fitted]:
     """Return the scene with the shape's heights in it, and the messages on them."""
-    refuse_what_has_no_surface(scene, "form")
+    require_surface(scene, "form")
     if scene.recorder is None:
         raise OutputError("form needs a recorder, and the scene has recorder = 'absent'.")
     if scene.shape is None:
@@ -122,7 +122,7 @@ def before_the_finger(result: Result) -> int:
     return int(touching[0]) - 1 if touching.size else len(result.history["time"]) - 1
 
 
-def _judged(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
+def _evaluate(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
     """Return the result with the data of its shape, and their lines of text."""
     history, layout = result.history, result.scene.layout
     assert history is not None

@@ -25,7 +25,7 @@ from .export import exported, formats
 from .gallery import of_heights, of_picture
 from .render import ARRAYS, draw_film, draw_still, draw_turntable, stage_moving
 from .run_state import PATIENCE, RunState, judge_run, list_lacking, note_film
-from .stop import refuse_what_has_no_surface, refuse_without_blender
+from .stop import refuse_without_blender, require_surface
 
 #: What the lines begin with that are meant for the series.
 PROGRESS, ERROR = "@ ", "! "
@@ -75,7 +75,7 @@ def check_outputs(scene: Scene, outputs: Outputs) -> None:
             formats(",".join(outputs.export))
         except argparse.ArgumentTypeError as error:
             raise OutputError(f"export: {error}.") from None
-        refuse_what_has_no_surface(scene, "export")
+        require_surface(scene, "export")
     if (outputs.needs_blender or outputs.export) and scene.recorder is None:
         raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
     if outputs.needs_blender:

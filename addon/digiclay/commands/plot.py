@@ -13,7 +13,7 @@ from ..core.base.run_folder import claim_files
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, read_run
 from .arguments import add_run
-from .stop import refuse_unwritable, refuse_what_has_no_surface, refuse_without
+from .stop import refuse_unwritable, refuse_without, require_surface
 
 EXAMPLES = """\
 examples:
@@ -45,7 +45,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     folder: Path = arguments.out or arguments.run
     refuse_without("matplotlib", "digiclay plot", "pip install digiclay[plots]")
     run = read_run(arguments.run, *(name for name in SHAPES if name != "time"))
-    refuse_what_has_no_surface(run.scene, "plot")
+    require_surface(run.scene, "plot")
     refuse_unwritable(folder)
     with claim_files([folder / name for name in PLOTS]):
         for path in plotted(run.scene, run.history, folder):

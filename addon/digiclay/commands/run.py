@@ -26,11 +26,11 @@ from .extras import (
     plan_meshes,
     plan_picture,
     plan_plots,
-    tell_left_out,
+    print_skipped,
     tell_stopped_before,
 )
 from .progress import Bar, Line, table
-from .stop import STOPPED, Stop, refuse_what_has_no_surface, refuse_without, refuse_without_blender
+from .stop import STOPPED, Stop, refuse_without, refuse_without_blender, require_surface
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
@@ -134,10 +134,10 @@ def carry_out(arguments: argparse.Namespace) -> int:
             found = within(scene, arguments.budget, quiet=arguments.quiet)
             scene = found.scene
         with Stop() as stop:
-            result = _simulated(scene, _blamed(arguments, path), stop, quiet=arguments.quiet)
+            result = _simulated(scene, _find_error_origin(arguments, path), stop, quiet=arguments.quiet)
             unjudged = False
             if not arguments.no_errors:
-                result, unjudged = _judged(result, stop, quiet=arguments.quiet)
+                result, unjudged = _evaluate(result, stop, quiet=arguments.quiet)
             if found:
                 result = replace(result, metrics={**result.metrics, "budget": noted(found)})
             with claim.write() as folder:
@@ -149,7 +149,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         print(f"written to {out}")
     if unjudged:
         tell_stopped_before("its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"])
-    tell_left_out(left_out, out)
+    print_skipped(left_out, out)
     if wrong:
         raise wrong[0]
     return STOPPED if stop() else 0
@@ -162,15 +162,15 @@ def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
         if scene.recorder is None:
             raise OutputError(f"--{name} needs a recorder, and the scene has recorder = 'absent'.")
     if arguments.export:
-        refuse_what_has_no_surface(scene, "--export")
+        require_surface(scene, "--export")
     if arguments.plots:
-        refuse_what_has_no_surface(scene, "--plots")
+        require_surface(scene, "--plots")
         refuse_without("matplotlib", "--plots", "pip install digiclay[plots]")
     if arguments.render:
         refuse_without_blender()
 
 
-def _blamed(arguments: argparse.Namespace, path: Path) -> str:
+def _find_error_origin(arguments: argparse.Namespace, path: Path) -> str:
     """Return what to name when a session is too large: the options that can make it so, or the file."""
     sizes = ("layout", "recorder", "simulation", "trajectory", "delay")
     return "--set" if any(one.key.split(".")[0] in sizes for one in arguments.settings) else path.name
@@ -191,7 +191,7 @@ def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
         raise SceneError(f"{origin}: {error}") from None
 
 
-def _judged(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
+def _evaluate(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
     """Return the result with its errors, where they can be estimated, and whether a stop left them out."""
     if result.incomplete or not has_every_command(result.scene):
         return result, False

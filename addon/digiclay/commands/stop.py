@@ -92,7 +92,7 @@ def defer_interrupt() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-def refuse_what_has_no_surface(scene: Scene, option: str) -> None:
+def require_surface(scene: Scene, option: str) -> None:
     """Refuse to make a surface of a bed that has none. `option`: what asks for the surface."""
     if min(scene.layout.rows, scene.layout.columns) < 2:
         raise OutputError(

@@ -275,8 +275,8 @@ AGAIN = 0.1
 #: Operators with one of these push an undo step when they are done; until then nothing is to be changed.
 STEPS = {"UNDO", "UNDO_GROUPED", "MACRO"}
 
-#: Most times it is looked whether what was put right has left something over: a fingertip that only a copy's
-#: bed still held, and its ellipsoid.
+#: Maximum number of repair passes: a repair may leave over a fingertip that only a copy's bed still held, and
+#: its ellipsoid.
 PASSES = 3
 
 #: Uids of the objects that are known, None before the first look; what came last, undo or redo; and whether

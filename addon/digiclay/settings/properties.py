@@ -202,7 +202,7 @@ def find_layout_mismatch(bed: Any, layout: Layout) -> str:
     pins, wanted = len(bed.data.vertices), layout.rows * layout.columns
     if pins != wanted:
         return f"The bed has {pins} pins, not {wanted}"
-    for index, place in _told_apart(layout):
+    for index, place in _layout_key(layout):
         x, y, _ = bed.data.vertices[index].co
         if abs(x / bridge.SCALE - place[0]) > AWAY or abs(y / bridge.SCALE - place[1]) > AWAY:
             return "The pins differ from the parameters of Layout"
@@ -210,7 +210,7 @@ def find_layout_mismatch(bed: Any, layout: Layout) -> str:
 
 
 @lru_cache(maxsize=32)
-def _told_apart(layout: Layout) -> tuple[tuple[int, list[float]], ...]:
+def _layout_key(layout: Layout) -> tuple[tuple[int, list[float]], ...]:
     """Return index and place of the pins that tell layouts of as many pins apart, m."""
     places = make_grid(layout).positions
     last = layout.rows * layout.columns - 1

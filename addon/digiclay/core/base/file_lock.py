@@ -180,7 +180,7 @@ def _take(path: Path) -> int | None:
 
 
 def _lock(file: int) -> bool:
-    """Take the system's lock on an open file; return whether it was to be had."""
+    """Take the system's lock on an open file; return whether it was acquired."""
     if os.name == "nt":
         windows: Any = importlib.import_module("msvcrt")
         try:

@@ -81,7 +81,7 @@ def list_numbers(values: Sequence[float]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class RunByRun:
-    """Asks each run's own controller in turn: right for every method, and as slow as they are.
+    """Calls each run's controller separately; correct for any method, not vectorized.
 
     What it asks about are the cells that take part in the run; the others get no orders.
 

@@ -14,7 +14,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import Parameters, quantity
 from ..model.control_interface import Measurement
-from ..model.layout import ON_THE_SIDE
+from ..model.layout import RELATIVE_TOLERANCE
 from .travel import ABEAM, measure_offsets
 
 
@@ -184,7 +184,7 @@ class BlisterRule:
         """
         blister = self.blister
         wider = (
-            radius * (1.0 + ON_THE_SIDE)
+            radius * (1.0 + RELATIVE_TOLERANCE)
             for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
         )
         return Constants((-ABEAM, *wider, self.behind, self.release, self.felt))

@@ -20,7 +20,7 @@ from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement
-from ..model.layout import ON_THE_SIDE
+from ..model.layout import RELATIVE_TOLERANCE
 from ..model.set_point import SetPoint
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
@@ -250,8 +250,8 @@ class CellStatesControl:
         blister, basis = self.blister, seen.quadratic_basis
         distance = np.sqrt(measure_square(basis[1, under], basis[2, under], basis))
         nearest = distance.min(axis=0)
-        in_blister = nearest < blister.radius * (1.0 - ON_THE_SIDE)
-        at_edge = ~in_blister & (nearest < blister.edge_radius * (1.0 - ON_THE_SIDE))
+        in_blister = nearest < blister.radius * (1.0 - RELATIVE_TOLERANCE)
+        at_edge = ~in_blister & (nearest < blister.edge_radius * (1.0 - RELATIVE_TOLERANCE))
         ahead = measure_lead(memory.heading, memory.x, memory.y, basis)
         facing = seen.height[at_edge & (ahead >= -ABEAM)]
         if facing.size:

@@ -19,7 +19,7 @@ from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement
-from ..model.layout import ON_THE_SIDE
+from ..model.layout import RELATIVE_TOLERANCE
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
 from .travel import measure_square
@@ -108,7 +108,7 @@ class PushPullControl:
     def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Commands]:
         """Drag commanded heights along, and move every pin up or down; see `Controller`."""
         known, target = self.parameters, seen.target
-        limit = memory.radius * memory.radius * (1.0 + ON_THE_SIDE) if memory.radius >= 0.0 else -1.0
+        limit = memory.radius * memory.radius * (1.0 + RELATIVE_TOLERANCE) if memory.radius >= 0.0 else -1.0
         listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit
         rising = memory.period % CYCLE == 0
         if rising:  # a whole cycle lies behind: what is left of it is no ripple
@@ -130,7 +130,7 @@ class PushPullControl:
         known, left = self.parameters, seen.own[0]
         error = seen.target - seen.height
         # A height dragged to the threshold lies on it, but for rounding.
-        moved = (np.abs(error) > known.threshold * (1.0 + ON_THE_SIDE)) & listening
+        moved = (np.abs(error) > known.threshold * (1.0 + RELATIVE_TOLERANCE)) & listening
         was = left > 0.0
         cycles = 1.0 + round(known.release_time / (CYCLE * self.period))
         left[:] = np.where(moved, cycles, np.where(listening, np.maximum(left - 1.0, 0.0), 0.0))

@@ -1,4 +1,4 @@
-"""Common part of controllers for the cells of one run, shape (m,), or of a stack of b runs, (m, b)."""
+"""Common part of controllers for the cells of one run, shape (m,), or of a batch of b runs, (m, b)."""
 
 from __future__ import annotations
 

@@ -221,7 +221,7 @@ class Handover:
     def locate(
         self, memory: Handed, touched: Measurement
     ) -> tuple[Handed, tuple[float, float, float] | None]:
-        """Let the one whose turn it is look at the touched cells; see `Controller`."""
+        """Delegate to the display or the method; see `Controller`."""
         if not self.is_displayed(memory):
             progress, disc = self.display.locate(memory.display, touched)
             return memory._replace(display=progress), disc
@@ -231,7 +231,7 @@ class Handover:
         return memory._replace(method=known), disc
 
     def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Commands]:
-        """Let the one whose turn it is command the cells; see `Controller`."""
+        """Delegate to the display or the method; see `Controller`."""
         if self.method is None or not self.is_displayed(memory):
             progress, orders = self.display.command(memory.display, seen)
             return memory._replace(display=progress), orders

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Constants, Floats, any_true, count_true
 from ..model.control_interface import Commands, Measurement
-from ..model.layout import ON_THE_SIDE
+from ..model.layout import RELATIVE_TOLERANCE
 from .blister import BlisterRule
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .ground import GROUNDS, EdgeGround, OwnGround
@@ -110,7 +110,7 @@ class VirtualMasterControl(MasterControl):
     def _measure_excess(self, memory: Any, basis: Floats) -> Floats:
         """Return by how much cells are beyond the circle in which the finger is looked for, m²."""
         x, y = self.get_place(memory)
-        return measure_excess(x, y, self.parameters.radius * (1.0 + ON_THE_SIDE), basis)
+        return measure_excess(x, y, self.parameters.radius * (1.0 + RELATIVE_TOLERANCE), basis)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Create the blister, freeze what is left behind, command every cell; see `Controller`."""

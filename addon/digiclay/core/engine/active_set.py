@@ -1,9 +1,9 @@
 """Active set of cells: its selection, and the transfer of its rows out of the bed and back.
 
-A cell takes part if the finger may touch it, the controller commands it, or it still moves:
-its valve is not shut, a command is on its way, or a force acts on it. All others stay
-exactly as they are, so leaving them out changes nothing, and a period's cost does not depend
-on the size of the bed. The set is kept for some periods, with a margin around it.
+A cell is active if the fingertip may touch it, the controller commands it, or it still moves:
+its valve is not shut, a command is on its way, or a force acts on it. Other cells cannot
+change, so skipping them is exact, and a period's cost does not depend on the size of the bed.
+The set is kept for some periods, with a margin around it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Cells
 from ..base.modes import Mode
-from ..model.layout import ON_THE_SIDE, Disc, Grid
+from ..model.layout import RELATIVE_TOLERANCE, Disc, Grid
 from ..model.physics import Cell
 from ..model.touch import FingerPeriod, Window, find_reached_disc
 from .state import ActiveSet, Rows, State
@@ -148,7 +148,7 @@ def _holds(outer: Disc | None, inner: Disc | None) -> bool:
     if outer is None:
         return False
     # One that touches the limit from inside is in: a last bit, other in a batch than alone, decides nothing.
-    return math.dist(inner[:2], outer[:2]) + inner[2] <= outer[2] * (1.0 + ON_THE_SIDE)
+    return math.dist(inner[:2], outer[:2]) + inner[2] <= outer[2] * (1.0 + RELATIVE_TOLERANCE)
 
 
 def _inside(grid: Grid, disc: Disc | None) -> Cells:

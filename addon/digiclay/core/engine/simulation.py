@@ -28,7 +28,7 @@ def begin(system: System) -> State:
 
 
 def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:
-    """Work out the fingers' ways through some control periods; None where nothing touches.
+    """Compute the fingertip paths of several control periods; None where nothing touches.
 
     `poses` (t, p, f, 7), of the fingers at `System.instants` of t periods: lowest point, m, and unit
     quaternion.
@@ -55,7 +55,7 @@ def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
     """
     after = simulate_period(system, state, finger)
     numbers = after.active.numbers
-    # One product tells: what is not finite makes no finite square.
+    # NaN and infinity make the dot product non-finite.
     if not math.isfinite(numbers.dot(numbers)):
         error = find_divergence(system, after.active.cells, after.active.block, state.period)
         if error:

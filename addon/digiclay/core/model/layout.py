@@ -49,7 +49,7 @@ FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
 STEPS = {0: (SQUARE, SQUARE), 1: (BACK, FORWARD), -1: (FORWARD, BACK)}
 
 #: Relative slack, so that cells exactly on a limit count the same on every side of the center.
-ON_THE_SIDE = 1e-9
+RELATIVE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -135,10 +135,10 @@ class Grid:
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
         return (
-            max(0, math.ceil((y - radius - bottom) / spacing - ON_THE_SIDE)),
-            min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + ON_THE_SIDE)),
-            max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - ON_THE_SIDE)),
-            min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + ON_THE_SIDE)),
+            max(0, math.ceil((y - radius - bottom) / spacing - RELATIVE_TOLERANCE)),
+            min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + RELATIVE_TOLERANCE)),
+            max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - RELATIVE_TOLERANCE)),
+            min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + RELATIVE_TOLERANCE)),
         )
 
     def within(self, bounds: Bounds) -> Cells:
@@ -154,7 +154,7 @@ class Grid:
         """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
         cells = self.within(self.bounds(x, y, radius))
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
-        return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
+        return cells[square <= radius * radius * (1.0 + RELATIVE_TOLERANCE)]
 
     def at(self, x: Floats, y: Floats) -> Cells:
         """Return the cells nearest to some places, m, shape (k,)."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
-from ..model.layout import ON_THE_SIDE, Grid
+from ..model.layout import RELATIVE_TOLERANCE, Grid
 from .relief import Placement, Tops
 
 #: Bytes of a file in which its size is looked for; a JPEG's may stand behind a small picture of it.
@@ -205,7 +205,7 @@ class HeightMap:
         across, along = (grid.x - at.x) / at.factor_x, (grid.y - at.y) / at.factor_y
         covered = _within(across, self.pixels[1]) & _within(along, self.pixels[0])
         under_a_pin = min(grid.layout.pitch / at.factor_x, grid.layout.row_spacing / at.factor_y)
-        block = max(1, int(min(under_a_pin / self.block, max(self.values.shape)) + ON_THE_SIDE))
+        block = max(1, int(min(under_a_pin / self.block, max(self.values.shape)) + RELATIVE_TOLERANCE))
         values = average_blocks(self.values, block)
         rows = _places(along, self.pixels[0], block * self.block, values.shape[0])
         columns = _places(across, self.pixels[1], block * self.block, values.shape[1])
@@ -263,7 +263,7 @@ def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
 
 def _within(places: Floats, pixels: int) -> NDArray[np.bool_]:
     """Return the positions that lie on the pixels, those on the edge included."""
-    slack = ON_THE_SIDE * pixels
+    slack = RELATIVE_TOLERANCE * pixels
     inside: NDArray[np.bool_] = (places >= -slack) & (places <= pixels + slack)
     return inside
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
-from ..model.layout import ON_THE_SIDE, Grid
+from ..model.layout import RELATIVE_TOLERANCE, Grid
 from ..surface.regions import label_components
 from .relief import Placement, Tops
 from .request import UPWARDS
@@ -183,7 +183,11 @@ class ShapeMesh:
             dx, dy = grid.x[cell] - corners[face, 0, 0], grid.y[cell] - corners[face, 0, 1]
             (ax, ay), (bx, by) = sides[face, 0].T, sides[face, 1].T
             one, two = (dx * by - dy * bx) / area[face], (ax * dy - ay * dx) / area[face]
-            over = (one >= -ON_THE_SIDE) & (two >= -ON_THE_SIDE) & (one + two <= 1.0 + ON_THE_SIDE)
+            over = (
+                (one >= -RELATIVE_TOLERANCE)
+                & (two >= -RELATIVE_TOLERANCE)
+                & (one + two <= 1.0 + RELATIVE_TOLERANCE)
+            )
             # Beside an edge the triangle is as high as on it, however steep it is.
             one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)
             whole = np.maximum(one + two, 1.0)

@@ -19,7 +19,7 @@ from ..base.arrays import Floats
 
 #: Above this exponent sums have to be done on logarithms: `solve_carefully` instead of `solve_pressed`.
 LARGE = 300.0
-#: Stands for zero where a ratio of two numbers that vanish together is wanted.
+#: Replaces zero in 0/0 limits.
 TINY = 1e-200
 #: Below this logarithm log(1 + q) is q, to the last bit.
 _ROUNDED_AWAY = -36.8

@@ -237,7 +237,7 @@ def evaluate_bundle(
         except Exception as error:  # each point meets it again by itself, and says what it is
             why = describe_error(error)
             if not isinstance(error, DigiclayError):
-                warnings.warn(f"A stack of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2)
+                warnings.warn(f"A batch of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2)
         if why:
             records = [None] * len(scenes)
     for number, scene in enumerate(scenes):

@@ -87,7 +87,7 @@ class Field:
         half = self.half_width(line, chain.closed)
         for end in (0, 1):
             if not (chain.closed or chain.joined[end]):
-                line = self._ended(line[::-1] if end == 0 else line, half)
+                line = self._find_line_ends(line[::-1] if end == 0 else line, half)
                 line = line[::-1] if end == 0 else line
                 if len(line) < 2:
                     return None
@@ -206,7 +206,7 @@ class Field:
         seen = np.isfinite(half)
         return float(np.median(half[seen])) if seen.any() else self.most
 
-    def _ended(self, line: Floats, half: float) -> Floats:
+    def _find_line_ends(self, line: Floats, half: float) -> Floats:
         """Return a line that ends, with its last point, where its spine ends; it may be longer or shorter."""
         pitch = self.lattice.pitch
         run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])

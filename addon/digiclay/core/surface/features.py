@@ -61,7 +61,7 @@ def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
     crests, cores = [], []
     mounds: list[tuple[Floats, float]] = []
     for crest in ridge.crests:
-        bare, ways = _bare(crest, least)
+        bare, ways = _strip_branches(crest, least)
         crests.append(bare)
         on_ridge = np.ones(len(crest.points), bool)
         for first, last in ways:
@@ -98,7 +98,7 @@ def measure_distances(places: Floats, every: tuple[FeaturePart, ...] | list[Feat
     return found
 
 
-def _bare(crest: Crest, least: float) -> tuple[Crest, list[tuple[int, int]]]:
+def _strip_branches(crest: Crest, least: float) -> tuple[Crest, list[tuple[int, int]]]:
     """Return a crest without the mounds on it, and the first and last points of each of them."""
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(crest.points[:, :2], axis=0).T))])
     line = _line(run, crest.off, crest.closed)
