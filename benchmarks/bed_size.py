@@ -37,7 +37,6 @@ class Size:
 
     Attributes
     ----------
-    pins : int
     built : float
         Time to put it together, s.
     period : float
@@ -46,7 +45,6 @@ class Size:
         CPU time of a control period, the mean, s: the finger's poses are worked out for 128 at once.
     gathered : float
         Cells that take part, on average.
-    bytes_a_pin : float
     """
 
     pins: int

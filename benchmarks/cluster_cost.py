@@ -33,8 +33,6 @@ class Cost:
 
     Attributes
     ----------
-    work : str
-    workers : int
     pieces : int
         Tasks, or points.
     wall : float

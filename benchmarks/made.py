@@ -147,10 +147,8 @@ class Made:
         For people.
     bed, own_bed : str
         One of `BEDS`: where it was made, and where its strokes were drawn.
-    scene : Scene
     formed, intended : ndarray (n,)
         Heights of the pins above rest, m.
-    strokes : int
     simulated, spent : float
         Duration of the session, and processor time for it, s.
     """

@@ -33,9 +33,6 @@ class Export:
 
     Attributes
     ----------
-    pins : int
-    kind, file : str
-    triangles : int
     made : float
         Time to make the mesh, s.
     written : float

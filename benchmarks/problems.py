@@ -57,8 +57,6 @@ class Problem:
 
     Attributes
     ----------
-    name : str
-    scene : Scene
     commands : ndarray (t, n)
         Held for a control period each.
     sets : list of (ndarray of int (m,), int)

@@ -49,8 +49,6 @@ class Steps(Line):
 
     Parameters
     ----------
-    stream : TextIO
-    label : str
     total : int
         Pieces of work.
     """

@@ -40,8 +40,6 @@ class Size:
 
     Attributes
     ----------
-    study : str
-    runs : int
     alone, stacked : float
         Simulated only.
     judged_alone, judged_stacked : float

@@ -35,7 +35,6 @@ class SkinCost:
 
     Attributes
     ----------
-    pins : int
     evaluate : tuple of float
         For each of `SHOWN`.
     """
@@ -87,7 +86,6 @@ class Cost:
 
     Attributes
     ----------
-    pins : int
     parts : dict
         Median time of each of `PARTS`, s.
     whole : float

@@ -50,8 +50,6 @@ class Beside:
 
     Attributes
     ----------
-    known : Problem
-    mine : list of Work
     told : list of Work
         Peers that know which cells take part.
     whole : list of Work

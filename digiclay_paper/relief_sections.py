@@ -61,7 +61,6 @@ class Section(NamedTuple):
 
     Attributes
     ----------
-    name : str
     part : str
         Boss or crease it belongs to: ridge, mound or valley.
     along : ndarray (k,)

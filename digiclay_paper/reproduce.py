@@ -58,10 +58,8 @@ class Stages(Line):
 
     Parameters
     ----------
-    stream : TextIO
     stop : Stop
         Asked before each stage.
-    quiet : bool
     """
 
     def __init__(self, stream: TextIO, stop: Stop, *, quiet: bool) -> None:

@@ -116,7 +116,6 @@ class Dragged(NamedTuple):
 
     Attributes
     ----------
-    follows : Follows
     force, deviation : float
         Mean and standard deviation over time of the total force, N.
     followers : float
@@ -164,7 +163,6 @@ class Session(NamedTuple):
 
     Attributes
     ----------
-    scene : Scene
     history : dict of ndarray
         Every fourth row of time, height, total force, total force asked for (``set_point``), number of
         cells that follow and fingertip; and the positions.
@@ -197,19 +195,6 @@ class Results:
     Attributes
     ----------
     blisters : by method, shape ("convex", "concave"), profile
-    drags : a drag of a ridge, and when it starts and ends, s
-    printed, session : the paper's session at its own times; at times both methods can follow
-    slow : how many times as long the latter takes
-    simple : the simple trajectories at 15 mm/s, by method and name
-    tracks : ridge drags at several speeds
-    fastest, lifting : largest speed of a drag, by method and name, and of a lift, by method, m/s
-    swings, details : the sweep of the gains; its sessions, by gains
-    quicker : the same sweep with a quicker device, and how fast its pins are without load, m/s
-    wild : the session's first seconds with Method I at the first gain that oscillates, if one does
-    cell_swings : Method II pressed quickly and held, by K_FF
-    dragged : drags by variant of the scene, method and name of the trajectory
-    located : a finger held still under noise, with the search radius and without
-    third : blisters, drags, tracks, simple trajectories, sessions and largest speeds of Method III
     """
 
     criterion: Criterion = field(default_factory=Criterion)

@@ -182,7 +182,6 @@ class Display:
 
     Parameters
     ----------
-    link : DoorLink
     line : int
         Its descriptor, raw and not blocking.
     rate : float

@@ -26,7 +26,6 @@ class Bed:
     ----------
     name : str
         Of the scene.
-    rows, columns : int
     pitch, stroke : float
         m.
     period : float
@@ -97,10 +96,8 @@ class DoorLink:
 
     Parameters
     ----------
-    bed : Bed
     orders, frames : LatestSlot
         To the session, and from it.
-    token : str
     """
 
     def __init__(self, bed: Bed, orders: LatestSlot, frames: LatestSlot, token: str) -> None:

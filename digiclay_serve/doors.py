@@ -30,10 +30,8 @@ class DoorSettings:
 
     Attributes
     ----------
-    host : str
     port, osc_port : int
         0: chosen by the system.
-    token : str
     display : dict or None
         Serial line of a pin display: path, rate in Hz, baud.
     """
@@ -50,8 +48,6 @@ class Doors(AbstractContextManager["Doors"]):
 
     Parameters
     ----------
-    settings : DoorSettings
-    bed : Bed
     frame_size : int
         Bytes of a packed frame.
 

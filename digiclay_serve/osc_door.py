@@ -131,12 +131,7 @@ class _Subscriber:
 
 
 class _OscDoor(asyncio.DatagramProtocol):
-    """Handlers of the datagrams.
-
-    Parameters
-    ----------
-    link : DoorLink
-    """
+    """Handlers of the datagrams."""
 
     def __init__(self, link: DoorLink) -> None:
         self._link = link

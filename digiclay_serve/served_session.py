@@ -50,21 +50,16 @@ class Session:
 
     Attributes
     ----------
-    scene : Scene
-    system : System
     state : State
         Used up by the next step.
     pose : ndarray (7,)
         The fingertip's.
     number : int
         Of the last pose taken up.
-    kept : Kept
-    recording : Recording or None
     diverged : int
         How often it went back to `kept`.
     refused : ndarray (7,) or None
         Pose on the way to which it diverged: it is not gone to again.
-    limits : Limits
     behind : bool
         Whether the pose asked for is farther away than the largest speed allows.
     """

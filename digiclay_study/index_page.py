@@ -32,13 +32,10 @@ class Findings:
         Scene and version.
     command : str
         By which the study is repeated.
-    ranges : tuple of Range
-    samples, points, seed : int
     second : bool
         Whether there are second-order indices.
     unchanged : mapping
         Outputs of the unchanged scene, None where it has none.
-    responses : mapping of str to Response
     indices : mapping of str to Indices or None
         None for an output that does not vary.
     """

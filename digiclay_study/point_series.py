@@ -193,7 +193,6 @@ class Subject:
         What the options change of it at every point.
     scene : Scene
         With them.
-    ranges : tuple of Range
     names : tuple of str
         Outputs: keys of `evaluation.FIGURES`.
     """
@@ -319,9 +318,6 @@ class Evaluation:
 
     Parameters
     ----------
-    subject : Subject
-    folder : Folder
-    pool : Pool
     records : dict
         Of the points that are done, by their index; they become more.
     """

@@ -42,7 +42,6 @@ class Cluster(Executor):
 
     Parameters
     ----------
-    client : distributed.Client
     address : str
         Of the scheduler, for messages.
     """

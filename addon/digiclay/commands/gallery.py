@@ -100,7 +100,6 @@ class Card:
 
     Attributes
     ----------
-    name : str
     thumbnail : bytes
         A small JPEG or PNG; empty where there is none.
     facts : sequence of (str, str)

@@ -75,8 +75,6 @@ class Bar(Line):
 
     Parameters
     ----------
-    stream : TextIO
-    label : str
     period : float
         Simulated time a control period stands for, s.
     """
@@ -98,7 +96,6 @@ class Counted(Line):
 
     Parameters
     ----------
-    stream : TextIO
     label, unit : str
         What is going on, and what is counted.
     before : int, optional

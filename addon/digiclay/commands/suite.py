@@ -59,7 +59,6 @@ class Plan:
 
     Attributes
     ----------
-    methods, groups : tuple of str
     seeds : tuple of int
         Of the noise.
     points : tuple of Point

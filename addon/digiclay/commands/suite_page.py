@@ -47,14 +47,10 @@ class Provenance:
 
     Attributes
     ----------
-    scene, version : str
     identity : str
         Hash of all scenes, with all parameters.
-    methods : tuple of str
-    seeds : tuple of int
     noise : float
         N.
-    machine, date, command : str
     """
 
     scene: str

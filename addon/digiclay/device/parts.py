@@ -71,7 +71,6 @@ class Sources(NamedTuple):
         First a pin a mode, then a pin a level of force, in the order of their codes; then the others.
     arrow : bpy.types.Object
         An arrow of length 1 that points down and ends at the origin.
-    housing : bpy.types.Object
     skin : SkinMeshes
         Objects of the live skin.
     clear : bpy.types.Material

@@ -50,7 +50,6 @@ class Task:
         Of digiclay.
     folder : str
         What the command works on, from the series' folder; empty: that folder itself.
-    options : tuple of str
     needs : tuple of str
         Names of the tasks before it.
     blender : bool

@@ -93,7 +93,6 @@ class Following:
     ----------
     address : str
         As it was entered.
-    token : str
     door : socket
         Connected to the server and not blocking: what others send never arrives.
     asked : float

@@ -40,8 +40,6 @@ class Running:
         `session_uid` of the bed.
     name : str
         Of the bed, for messages.
-    scene : Scene
-    system : System
     state : State
         Used up by the next tick: read what you need, keep nothing of it.
     snapshot : bytes
@@ -58,10 +56,8 @@ class Running:
         Ticks until the state undo or redo has put into the bed is taken up; 0: there is none.
     steps : int
         Single control periods asked for while paused.
-    clock : Clock
     trace : Trace
         Total force, set point and heights of picked pins in the last seconds.
-    monitor : ErrorMonitor or None
     errors : Errors or None
         Latest estimate.
     gestures : tuple of Gesture
@@ -70,7 +66,6 @@ class Running:
         The gesture that begins if the finger touches.
     rest_time : float
         How long the finger has not moved, s of simulated time.
-    recording : Recording or None
     strokes : tuple of Stroke
         What the Press tool has drawn and the finger has not finished, oldest first: the finger goes along
         these, wherever the fingertip is.

@@ -115,7 +115,6 @@ class Stroke:
         When the last sample came, s.
     burst : int
         Index of the first sample that came together with the last one.
-    brush : Brush
     tracking : Tracking or None
         How the blister follows, of a brush that needs one; found when the finger begins.
     climb : float

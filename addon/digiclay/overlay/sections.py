@@ -36,8 +36,6 @@ class Readings:
     ----------
     name, method : str
         Of the bed and of its control method; an empty method means no control.
-    paused : bool
-    waiting : bool
     factor : float or None
         Simulated over real time of the last second; None before there is one.
     errors : tuple of float or None

@@ -97,7 +97,6 @@ class Shots:
 
     Attributes
     ----------
-    scene : bpy.types.Scene
     count : int
         Number of frames.
     show : callable

@@ -231,7 +231,6 @@ class OwnRow(Method):
         In scene files.
     kind : type
         Class of its parameters, which builds the controller.
-    source : MethodSource
     """
 
     name: str

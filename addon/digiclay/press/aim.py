@@ -27,7 +27,6 @@ class Target:
     ----------
     bed : bpy.types.Object
         Not to be kept: undo invalidates it.
-    grid : Grid
     height : ndarray (n,)
         Heights of the pin tops, m.
     point : ndarray (3,)

@@ -35,7 +35,6 @@ class Entry(NamedTuple):
         Its name in the property; never used twice in one bed.
     name : str
         The user's.
-    seconds : float
     """
 
     number: str

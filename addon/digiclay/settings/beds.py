@@ -13,7 +13,6 @@ class Bed:
 
     Attributes
     ----------
-    rows, columns : int
     pitch : float
         m.
     share : float

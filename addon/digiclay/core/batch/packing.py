@@ -84,10 +84,6 @@ class RunByRun:
     """Calls each run's controller separately; correct for any method, not vectorized.
 
     What it asks about are the cells that take part in the run; the others get no orders.
-
-    Attributes
-    ----------
-    controllers : tuple of Controller
     """
 
     controllers: tuple[Controller, ...]
@@ -148,7 +144,6 @@ class BatchStepper:
 
     Attributes
     ----------
-    stepper : Stepper
     alike : bool
         The cells of all runs are alike, so they are moved as those of one large bed.
     valve : int
@@ -169,7 +164,6 @@ class BatchMovement:
 
     Parameters
     ----------
-    batch : BatchStepper
     plan, rows, near
         See `interfaces.Stepper.prepare`.
     """

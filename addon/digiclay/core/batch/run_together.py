@@ -38,11 +38,8 @@ class Play:
     ----------
     systems : mapping of int to System
         By the numbers of their runs.
-    ways : mapping of int to Trajectory
     runs : tuple of int
         Whose the last axis is.
-    batch : Batch
-    state : State
     coming : Fingers or None
         How the fingers come, as far as that is worked out.
     """
@@ -81,7 +78,6 @@ class Instant:
 
     Attributes
     ----------
-    play : Play
     over, failed : ndarray of bool (b,)
         Which have come to their end, and which of them in an error.
     share : float

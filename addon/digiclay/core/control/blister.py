@@ -103,7 +103,6 @@ class BlisterRule:
 
     Attributes
     ----------
-    blister : Blister
     behind : float or ndarray (b,)
         Cosine below which a cell lies behind the fingertip.
     release : float or ndarray (b,)

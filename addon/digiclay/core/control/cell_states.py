@@ -160,7 +160,6 @@ class CellStatesControl:
 
     Attributes
     ----------
-    parameters : CellStates
     blister : Blister
         Its radii count from the nearest cell under the finger.
     actuator : Actuator

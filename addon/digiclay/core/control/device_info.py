@@ -26,7 +26,6 @@ class DeviceInfo:
 
     Attributes
     ----------
-    grid : Grid
     cell : Cell
         The cells' physics.
     period : float

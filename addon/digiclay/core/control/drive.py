@@ -105,14 +105,7 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class CellwiseControl(BatchControl):
-    """Controller without memory: the orders for a cell depend on that cell alone.
-
-    Attributes
-    ----------
-    parameters : DriveParameters
-    actuator : Actuator
-    drive : Drive
-    """
+    """Controller without memory: the orders for a cell depend on that cell alone."""
 
     parameters: DriveParameters
     actuator: Actuator

@@ -89,12 +89,7 @@ class _Profile(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LevelFingertip:
-    """Known fingertip, level.
-
-    Attributes
-    ----------
-    fingertip : Fingertip
-    """
+    """Known fingertip, level."""
 
     fingertip: Fingertip
 
@@ -237,8 +232,6 @@ class FingerFilter:
 
     Attributes
     ----------
-    fingertip : Fingertip
-    spread : Spread
     period : float
         Control period, s.
     """

@@ -30,7 +30,6 @@ class FlowServo:
 
     Attributes
     ----------
-    cell : Cell
     ratios, openings : ndarray (257,)
         Openings from -1 to 1, and the speed of a pin without load at them, as a share of the largest.
     fall, rise : float

@@ -181,13 +181,6 @@ class HybridControl:
 
     Attributes
     ----------
-    parameters : Hybrid
-    blister : Blister
-    device : DeviceInfo
-    pulp : PulpEstimate
-    finger : FingerFilter
-    profile : LeadProfile
-    servo : FlowServo
     felt : float
         Force above which a cell is touched, N.
     noise : float

@@ -154,9 +154,6 @@ class LedBlister:
 
     Attributes
     ----------
-    blister : Blister
-    rule : BlisterRule
-    profile : LeadProfile
     ahead : float
         Time over which the fingertip is predicted, s.
     """

@@ -65,7 +65,6 @@ class Master(NamedTuple):
 
     Attributes
     ----------
-    phase : Phase
     x, y, height : float
         Where the master is, m.
     opening : float
@@ -237,8 +236,6 @@ class MasterControl(BatchControl):
 
     Attributes
     ----------
-    parameters : VirtualMaster
-    blister : Blister
     actuator : Actuator
         The cells' cylinders.
     model : MasterCell

@@ -136,14 +136,7 @@ class OwnMethod(DriveParameters):
 
 @dataclass(frozen=True, eq=False)
 class OwnControl:
-    """Controller of an own method that orders heights or openings.
-
-    Attributes
-    ----------
-    parameters : OwnMethod
-    device : DeviceInfo
-    drive : Drive
-    """
+    """Controller of an own method that orders heights or openings."""
 
     parameters: OwnMethod
     device: DeviceInfo
@@ -257,7 +250,6 @@ class Pace:
     ----------
     spent : float
         Of `count` calls, s.
-    count : int
     """
 
     spent: float = 0.0
@@ -279,7 +271,6 @@ class Guarded:
 
     Attributes
     ----------
-    inner : Controller
     name : str
         Of the method in scene files.
     origin : str
@@ -290,7 +281,6 @@ class Guarded:
         Control period, s.
     rows : int
         State rows a cell needs.
-    pace : Pace
     """
 
     inner: Controller

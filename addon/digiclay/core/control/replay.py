@@ -18,7 +18,6 @@ class Replay:
 
     Attributes
     ----------
-    grid : Grid
     commands : ndarray (t, n)
         Valve commands, a row a control period; none afterwards.
     """

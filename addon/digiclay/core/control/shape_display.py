@@ -86,7 +86,6 @@ class ShapeDisplayControl:
     ----------
     heights : ndarray (n,)
         Of the shape, m.
-    moves : tuple of Move
     patience : int
         Control periods.
     whole : (float, float, float)
@@ -189,8 +188,6 @@ class Handover:
 
     Attributes
     ----------
-    display : ShapeDisplayControl
-    method : Controller or None
     raised : ndarray (n,) or None
         Heights of the shape above the bed at rest, m, for a method whose cells go back to rest: it
         sees the bed without them, so that the shape is what its cells go back to.

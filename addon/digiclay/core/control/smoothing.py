@@ -51,7 +51,6 @@ class SmoothingControl:
 
     Attributes
     ----------
-    method : Controller
     drive : Drive
         Of the pins that are smoothed.
     exchange : Exchange

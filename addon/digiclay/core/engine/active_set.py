@@ -32,9 +32,6 @@ class Selection:
 
     Attributes
     ----------
-    grid : Grid
-    rows : Rows
-    cell : Cell
     period : float or ndarray (b,)
         Control period, s.
     fastest : float or ndarray (b,)

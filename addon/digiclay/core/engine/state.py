@@ -205,7 +205,6 @@ class State(NamedTuple):
         out of reach goes on relaxing, and is aged exactly when it is needed again.
     peak : float or ndarray (b,)
         No pin top outside `active` is higher than this, m.
-    active : ActiveSet
     memory : object
         The controller's memory.
     """

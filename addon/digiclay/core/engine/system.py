@@ -23,11 +23,6 @@ class System:
 
     Attributes
     ----------
-    grid : Grid
-    cell : Cell
-    sensors : Sensors
-    controller : Controller
-    stepper : Stepper
     plan : object
         What the stepper works out once for all periods.
     period : float, or ndarray (b,) of b runs
@@ -38,7 +33,6 @@ class System:
         Of the active cells.
     instants : ndarray (p,)
         Times into the period at which the finger's pose is needed, first 0, last `period`, s.
-    rows : Rows
     by_set : bool
         Whether what becomes of a cell depends on which others are active: in a batch each run then keeps
         the active set it has alone.

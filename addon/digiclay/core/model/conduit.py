@@ -35,7 +35,6 @@ class OrificeAndConduit:
 
     Attributes
     ----------
-    valve : Orifice
     resistance : float
         Of the conduit, Pa s/m³.
     """

@@ -106,7 +106,6 @@ class Grid:
 
     Attributes
     ----------
-    layout : Layout
     x, y : ndarray (n,)
         Positions of the cells' axes, m; cell ``row * columns + column``.
     """

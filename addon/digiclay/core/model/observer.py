@@ -36,7 +36,6 @@ class ValveObserver(Sensors):
     ----------
     inner : Sensors
         Without state; its heights are used, its forces are not.
-    cell : Cell
     period : float
         Control period, s.
     length : int

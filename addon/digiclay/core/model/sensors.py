@@ -154,10 +154,8 @@ class Noisy(Sensors):
 
     Attributes
     ----------
-    inner : Sensors
     force, height : float
         Standard deviations, N and m.
-    seed : int
     """
 
     inner: Sensors
@@ -192,7 +190,6 @@ class Quantized(Sensors):
 
     Attributes
     ----------
-    inner : Sensors
     force, height : float
         Steps, N and m.
     """
@@ -233,7 +230,6 @@ class Delayed(Sensors):
 
     Attributes
     ----------
-    inner : Sensors
     periods : int
         How late, at least 1.
     rest : float

@@ -31,10 +31,8 @@ class Motion:
 
     Attributes
     ----------
-    cell : Cell
     line : Queue
         Commands on their way.
-    stepper : Stepper
     plan : object
         The stepper's.
     instants : ndarray

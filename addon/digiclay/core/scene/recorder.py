@@ -64,7 +64,6 @@ class Recording:
 
     Parameters
     ----------
-    recorder : Recorder
     rows : Rows
         Which row of the state holds what.
     keep : callable

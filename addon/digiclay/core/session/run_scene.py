@@ -46,7 +46,6 @@ class Result:
 
     Attributes
     ----------
-    scene : Scene
     history : dict of ndarray
         The arrays of ``history.npz``; empty without a recorder.
     periods : int

@@ -67,7 +67,6 @@ class Fitted:
 
     Attributes
     ----------
-    name : str
     heights : ndarray (n,)
         m, from 0 to the stroke.
     covered : int

@@ -176,12 +176,10 @@ class HeightMap:
 
     Attributes
     ----------
-    name : str
     values : ndarray (r, c)
         The first row lies at the lowest y. Each is the mean of up to `block` x `block` pixels.
     pixels : (int, int)
         Rows and columns of pixels.
-    block : int
     value_length : float or None
         Meters in the unit of the values; None where they are no lengths.
     """

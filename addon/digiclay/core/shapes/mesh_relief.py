@@ -82,7 +82,6 @@ class ShapeMesh:
 
     Attributes
     ----------
-    name : str
     vertices : ndarray (v, 3)
         In the file's unit.
     faces : ndarray of int (f, 3)

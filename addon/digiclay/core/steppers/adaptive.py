@@ -44,7 +44,6 @@ class AdaptivePlan:
     allowed, allowed_tension : float
         Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's
         filters, N: what so much height makes at first touch, where the pulp is softest.
-    speeds : Speeds
     period : float
         s.
     """

@@ -50,7 +50,6 @@ class BernoulliPlan:
 
     Attributes
     ----------
-    cell : Cell
     segments : tuple of Segment
         The s physics steps of a period.
     response : ndarray (g + 1, r)

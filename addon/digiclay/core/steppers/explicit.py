@@ -26,11 +26,8 @@ class ExplicitPlan:
 
     Attributes
     ----------
-    cell : Cell
-    queue : Queue
     segments : tuple of Segment
         The physics steps of a period.
-    speeds : Speeds
     """
 
     cell: Cell

@@ -77,7 +77,6 @@ class _Valve:
 
     Attributes
     ----------
-    cell : Cell
     openings, weights : ndarray
         See `StepStart`.
     pressure : ndarray

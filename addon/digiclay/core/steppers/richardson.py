@@ -26,7 +26,6 @@ class RichardsonPlan:
     ----------
     coarse, fine : BernoulliPlan
         For the steps, and for their halves.
-    speeds : Speeds
     period : float
         s.
     """

@@ -71,12 +71,10 @@ class Column:
 
     Attributes
     ----------
-    key : str
     unit : str
         Of the parameter; empty where it has none.
     values : tuple
         In SI; texts where they are no numbers.
-    logarithmic : bool
     """
 
     key: str

@@ -34,7 +34,6 @@ class Interval:
 
     Attributes
     ----------
-    mean : float
     half : float or None
         Half the width; None of a single value.
     count : int
@@ -52,7 +51,6 @@ class Row:
 
     Attributes
     ----------
-    method : str
     measures : mapping of str to Interval or None
         `MEANS`, ``max_total_force``, ``losses``, ``period_cost``, ``cost_ratio`` and a limit a motion.
     worse : int or None

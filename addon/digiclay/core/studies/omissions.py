@@ -63,7 +63,6 @@ class Tried(NamedTuple):
 
     Attributes
     ----------
-    said : str
     departure : float
         Largest difference of a height from the full scene, m; infinite when the trial was
         broken off because it left the budget.
@@ -85,14 +84,12 @@ class Fitted:
 
     Attributes
     ----------
-    scene : Scene
     budget, departure, own_error : float
         What was allowed; the largest difference of a height from the full scene, the
         controller acting on what it sees; and the estimated error of the integration. The
         last two together are at most the first, m.
     work : float
         Share of the full scene's work that is left: cells times steps times the parts of a cell.
-    tried : tuple of Tried
     """
 
     scene: Scene

@@ -159,7 +159,6 @@ class Chain:
     ----------
     points : ndarray (m, 2)
         m; the first again at the end of a closed one.
-    closed : bool
     joined : (bool, bool)
         Whether the first and the last point are at a junction with another line.
     nodes : frozenset of int

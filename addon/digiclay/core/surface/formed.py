@@ -136,7 +136,6 @@ class Lattice:
 
     Attributes
     ----------
-    formed : Formed
     neighbor : ndarray of int (n, 8 or 6)
         Counter-clockwise; -1 beyond the edge of the bed.
     """
