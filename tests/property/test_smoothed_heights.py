@@ -7,6 +7,7 @@ from digiclay.core.control.exchange import make_exchange
 from digiclay.core.control.smoothing import order_periods
 from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Grid, Layout, make_grid
+from digiclay.core.model.null_parts import Uncontrolled
 from digiclay.core.model.physics import Cell
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -46,8 +47,7 @@ def test_smoothed_heights_keep_sum_range_and_what_is_outside_and_are_never_rough
         grid.compute_basis(cells), height, none, height.copy(), np.zeros(grid.count, np.int8),
         np.empty((0, grid.count)), cells,
     )  # fmt: skip
-    (control,) = order_periods(None, grid, CELL, 5e-3, np.array([order]))
-    assert control is not None
+    (control,) = order_periods(Uncontrolled(), grid, CELL, 5e-3, np.array([order]))
     _, commands = control.command(None, seen)
     target, (x, y, radius, _) = commands.target, order
     outside = np.hypot(grid.x - x, grid.y - y) > radius * (1.0 + 1e-9)

@@ -110,6 +110,7 @@ def is_well(door: socket.socket, number: int) -> None:
     state: list[Any] = [0, 0]
     while state[1] != number or state[4:7] != pytest.approx(PLACE, abs=1e-8):  # python-osc sends 32 bits
         state = received(door, "/digiclay/state", subscribe, pose)
+    assert state[1] == number
 
 
 def test_the_examples_of_the_page_run(

@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..core.base.errors import OutputError
-from ..core.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from ..core.scene.schema import Scene
 
 #: Some jobs of a batch failed; what the user asked for cannot be done; stopped by Ctrl-C or SIGTERM.
 FAILED, WRONG, STOPPED = 1, 2, 130

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from . import gltf_reader, obj_reader, threemf_reader
-from .axes import find_axes, make_axes
+from .mesh_axes import find_axes, make_axes
 from .mesh_limits import check_off, check_ply, check_stl, refuse_size, stl_is_text
 
 Indices = NDArray[np.int64]

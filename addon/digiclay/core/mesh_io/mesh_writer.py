@@ -16,7 +16,7 @@ from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
 from ..base.run_folder import open_whole
 from ..surface.body import NO_PIN, Body, Indices, split_pieces
-from .axes import UP, find_forward, make_axes
+from .mesh_axes import UP, find_forward, make_axes
 
 #: One triangle of a binary file.
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])

@@ -30,6 +30,8 @@ SHAPES: dict[str, tuple[str | int, ...]] = {
     "fingertip": ("t", 7), "total_force": ("t",), "position": ("n", 2),
     "beyond_a_finger": ("t",),
 }  # fmt: skip
+#: Arrays that not every run has.
+LATER = ("beyond_a_finger",)
 #: Types of an array that does not hold numbers: their kinds, and what they are called.
 KINDS = {"mode": ("i", "whole numbers"), "beyond_a_finger": ("b", "truth values")}
 
@@ -52,7 +54,10 @@ def read_run(folder: Path, *names: str) -> Run:
     scene = load_recorded(folder / "scene.toml")
     try:
         with zipfile.ZipFile(path) as archive:
-            held = read_heads(archive, ("time", *names))
+            kept = {Path(name).stem for name in archive.namelist()}
+            held = read_heads(
+                archive, [name for name in ("time", *names) if name in kept or name not in LATER]
+            )
             _refuse(path, scene, held)
             history = {name: read_array(archive, name) for name in held}
     except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
+from ..model.layout import find_neighbors
 from .skin_mesh import check_heights, find_grid_shape
 
 
@@ -119,11 +120,6 @@ def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | flo
 
 Pins = NDArray[np.int64]
 
-#: Steps to the neighbors, (rows, columns), counter-clockwise; a shifted bed has one list for rows
-#: that stand back and one for rows that are shifted forward along x.
-SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
-BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
-FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
 #: Steps a pitch with which a distance is looked for.
 STEPS = 2
 #: Pairs of a place and a step that are looked at at once.
@@ -146,13 +142,8 @@ class Lattice:
     @classmethod
     def of(cls, formed: Formed) -> Lattice:
         """Return the neighbors of all pins of a bed: 8 in an aligned one, else 6."""
-        row, column = np.divmod(np.arange(formed.rows * formed.columns), formed.columns)
-        lists = (SQUARE, SQUARE) if not formed.shift else (BACK, FORWARD)
-        lists = lists[::-1] if formed.shift < 0.0 else lists
-        steps = np.array(lists)[row % 2]
-        rows, columns = row[:, None] + steps[..., 0], column[:, None] + steps[..., 1]
-        on_bed = (rows >= 0) & (rows < formed.rows) & (columns >= 0) & (columns < formed.columns)
-        return cls(formed, np.where(on_bed, rows * formed.columns + columns, -1))
+        shift = formed.shift / formed.pitch
+        return cls(formed, find_neighbors(formed.rows, formed.columns, shift, corners=True))
 
     @property
     def pitch(self) -> float:
