@@ -290,7 +290,7 @@ class HybridControl:
         if memory.period % EVERY and self._holds(memory, float(np.add.reduce(force))):
             return memory if not memory.alone else memory._replace(alone=0)
         own[at.residual] = 0.0
-        if felt.size and self._has_jumped(memory.estimate, touched.quadratic_basis.take(felt, 1)):
+        if felt.size and self._has_jumped(memory.estimate, touched.quadratic_basis[1:3, felt]):
             return self._find(memory._replace(losses=memory.losses + 1), touched, felt)
         return self._fit(memory, touched, here, touched.quadratic_basis.take(here, 1))
 
@@ -304,9 +304,9 @@ class HybridControl:
         error = abs(force - self.parameters.force_setpoint)
         return error <= HELD * self.parameters.force_setpoint and math.hypot(vx, vy, vz) <= SLOW
 
-    def _has_jumped(self, guess: Estimate, basis: Floats) -> bool:
-        """Tell whether no touched cell is where the finger can be."""
-        place, (_, x, y) = tuple(guess.mean[:2].tolist()), basis[:3].tolist()
+    def _has_jumped(self, guess: Estimate, position: Floats) -> bool:
+        """Tell whether no touched cell, at (2, m), m, is where the fingertip can be."""
+        place, (x, y) = tuple(guess.mean[:2].tolist()), position.tolist()
         return not any(math.dist(place, cell) <= self.farthest for cell in zip(x, y, strict=True))
 
     def _find(self, memory: Follower, touched: Measurement, here: NDArray[np.intp]) -> Follower:
