@@ -1,7 +1,7 @@
 """Unit of a bed and its fingertip after copy, delete and hide.
 
 Blender copies, deletes and hides the objects that are selected, not those that belong to them. Here is told
-what is missing or left over then, and it is put right; when that happens is up to `unit_watch`.
+what is missing or left over then, and it is put right; when that happens is up to the timer below.
 """
 
 from __future__ import annotations
