@@ -80,20 +80,6 @@ def test_every_report_goes_through_the_one_function() -> None:
     assert plain == []
 
 
-def test_every_message_has_a_translation() -> None:
-    texts = {
-        node.value
-        for _, tree in source()
-        for other in [inner(tree, ast.Raise, ast.JoinedStr) | docstrings(tree)]
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in other
-        if " " in node.value and WORD.search(node.value)
-    }
-    said = {text for text in texts if not text.startswith(NAMES) and text not in HIDDEN}
-    assert len(said) > 150
-    assert sorted(text for text in said if translations.translate(text, "de") is None) == []
-
-
 def test_a_translation_has_the_places_of_its_text() -> None:
     def places(text: str) -> list[tuple[str | None, str | None]]:
         return [(spec, how) for _, name, spec, how in Formatter().parse(text) if name is not None]

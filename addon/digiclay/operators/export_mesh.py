@@ -26,7 +26,7 @@ ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
 
 #: Axes under the names of Blender's own exporter.
 AXIS_NAMES = {name.upper().replace("-", "NEGATIVE_"): name for name in AXES}
-AXIS_ITEMS = [(key, name.upper(), f"{name.upper()} axis") for key, name in AXIS_NAMES.items()]
+AXIS_ITEMS = [(key, name.upper(), "") for key, name in AXIS_NAMES.items()]
 
 
 class ExportMesh(SurfaceOptions, bpy.types.Operator):
