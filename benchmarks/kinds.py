@@ -11,6 +11,7 @@ from . import (
     ablation,
     bed_size,
     cluster_cost,
+    commit_pair,
     made,
     mesh_export,
     method_figures,
@@ -39,6 +40,7 @@ examples:
   python -m benchmarks serve          deadlines of a session for other programs at 1 kHz
   python -m benchmarks methods        force deviation of Methods I and III over paths and drags
   python -m benchmarks ablation       Method III with one of its parts left out at a time
+  python -m benchmarks commits v0.1.0 time of a control period beside another commit
   python -m benchmarks made           things formed by recorded strokes, beside what was intended
 """
 
@@ -55,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
     kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
     for kind in (
         session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together, made,
-        cluster_cost, serve_times, method_figures, ablation,
+        cluster_cost, serve_times, method_figures, ablation, commit_pair,
     ):  # fmt: skip
         kind.add(kinds)
     return top
