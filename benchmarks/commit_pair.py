@@ -85,7 +85,7 @@ def carry_out(arguments: argparse.Namespace) -> None:
         spread = (statistics.median(ratios), min(ratios), max(ratios))
         rows.append([case, *(f"{one:.1f}" for one in figures), *(f"{one:.2f}" for one in spread)])
     title = f"processor time of a control period, medians of {turns} turns; {made_with()}"
-    text = f"{title}\n{table(head, rows)}"
+    text = "\n".join([title, "", *table(head, rows)])
     print(text)
     kept(arguments.out, "commits", text, head, rows)
 

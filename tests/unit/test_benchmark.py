@@ -13,10 +13,11 @@ from types import FrameType
 import numpy as np
 import pytest
 from digiclay.commands.progress import table
-from digiclay.core.base.errors import OutputError
+from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 
+from benchmarks import commit_pair
 from benchmarks import peers as peers
 from benchmarks.__main__ import main
 from benchmarks.numpy_calls import Counted, Ledger, floor, methods_noted, period_calls
@@ -209,3 +210,17 @@ def test_terms_gives_a_line_for_every_term(capsys: pytest.CaptureFixture[str]) -
 def test_every_benchmark_shows_an_example(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     code, out = main([kind, "--help"]), capsys.readouterr().out
     assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (0, True)
+
+
+def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
+    tree = commit_pair.extract("HEAD", tmp_path)
+    times = commit_pair.run(tree, "HEAD", 2)
+    assert len(times) == len(commit_pair.CASES)
+    assert all(0.0 < time < 1.0 for time in times)
+    (tree / "digiclay" / "core" / "engine" / "simulation.py").write_text("1 / 0\n", encoding="utf-8")
+    with pytest.raises(
+        DigiclayError, match=r"^commits: HEAD cannot be timed: ZeroDivisionError: division by"
+    ):
+        commit_pair.run(tree, "HEAD", 2)
+    with pytest.raises(DigiclayError, match=r"^commits: nonsense must be a commit, branch or tag"):
+        commit_pair.extract("nonsense", tmp_path)
