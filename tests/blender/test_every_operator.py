@@ -27,6 +27,8 @@ def enter(mode: str) -> None:
     BPY.object.mode_set(mode=mode)
 
 
+#: Blender 4.2 makes no points of a mesh.
+NO_MESH = "POINTCLOUD" if bpy.app.version >= (4, 5) else "CURVE"
 #: What can be active, and what can become of a bed that was active.
 ODD: dict[str, Callable[[Any], object]] = {
     "a bed": lambda bed: None,
@@ -51,7 +53,7 @@ ODD: dict[str, Callable[[Any], object]] = {
     "no vertices": lambda bed: bed.data.clear_geometry(),
     "mesh swapped": lambda bed: setattr(bed, "data", bpy.data.meshes["Cube"]),
     "attribute removed": lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]),
-    "converted to points": lambda bed: BPY.object.convert(target="POINTCLOUD"),
+    "converted to what is no mesh": lambda bed: BPY.object.convert(target=NO_MESH),
     "converted as it is drawn": lambda bed: BPY.object.convert(target="MESH"),
     "joined with a cube": lambda bed: (select(bpy.data.objects["Cube"], bed), BPY.object.join()),
     "joined into a cube": lambda bed: (select(bed, bpy.data.objects["Cube"]), BPY.object.join()),
