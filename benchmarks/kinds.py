@@ -40,7 +40,7 @@ examples:
   python -m benchmarks serve          deadlines of a session for other programs at 1 kHz
   python -m benchmarks methods        force deviation of Methods I and III over paths and drags
   python -m benchmarks ablation       Method III with one of its parts left out at a time
-  python -m benchmarks commits v0.1.0 time of a control period beside another commit
+  python -m benchmarks commits main   a control period at another commit and at this one
   python -m benchmarks made           things formed by recorded strokes, beside what was intended
 """
 
