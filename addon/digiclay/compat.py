@@ -22,12 +22,14 @@ except ImportError as error:
     raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
 
 __all__ = [
-    "PACKAGE", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "own_curves",
+    "PACKAGE", "RELATIVE_PATH", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "own_curves",
     "quiet", "scratch", "set_node_setting", "shader_nodes", "strips", "to_video",
 ]  # fmt: skip
 
 #: The name Blender knows the extension by.
 PACKAGE = __package__
+#: Of a property that takes paths beside the open file: without it Blender 4.5 to 5.2 crash in preferences.
+RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set()
 #: What inputs of the bed's geometry nodes are called in older files.
 FORMER_INPUTS = {"Color by Force": "Colour by Force", "Top Color at (N)": "Top Colour at (N)"}
 #: What a scene of ours can be made of, in the order it is taken apart.

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from .compat import bpy
+from .compat import RELATIVE_PATH, bpy
 from .device import palettes
 from .overlay.placement import CORNERS
 from .settings import own_folder
@@ -131,6 +131,7 @@ class Preferences(bpy.types.AddonPreferences):
         description="Folder with Python files of control methods; a change turns Run Own Methods off",
         default=Choices.methods_folder,
         subtype="DIR_PATH",
+        options=RELATIVE_PATH,
         update=take_folder,
     )
 

@@ -83,9 +83,8 @@ def test_a_folder_beside_the_open_file_is_stored_as_a_full_path_or_refused(
     chosen: Any, tmp_path: Path
 ) -> None:
     def enter() -> None:
-        """Type the folder as in the preferences: Blender 4.5 crashes where a script assigns such a path."""
-        chosen["methods_folder"] = "//own"
-        preferences.take_folder(chosen, bpy.context)
+        """Enter the folder as in the preferences."""
+        chosen.methods_folder = "//own"
 
     enter()  # beside a file that was never saved
     (line,) = own_folder.read_present().refused
