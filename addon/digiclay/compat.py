@@ -22,8 +22,8 @@ except ImportError as error:
     raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
 
 __all__ = [
-    "PACKAGE", "RELATIVE_PATH", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "own_curves",
-    "quiet", "scratch", "set_node_setting", "shader_nodes", "strips", "to_video",
+    "PACKAGE", "RELATIVE_PATH", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting",
+    "own_curves", "quiet", "scratch", "set_node_setting", "shader_nodes", "strips", "to_video",
 ]  # fmt: skip
 
 #: The name Blender knows the extension by.
