@@ -81,7 +81,7 @@ def repeat_period(system: System, state: State, finger: Any, leader: State) -> S
     """Simulate the control period that a run, or a batch, has just done, under its commands.
 
     `system`: of the same bed and rows; its controller and sensors are left aside; `state`: before the period;
-    used up; `finger` FingerPeriod or fingers.FingersPeriod or None, the fingertip's path through the period;
+    used up; `finger`: FingerPeriod, FingersPeriod or None, the fingertip's path through the period;
     the fingertips' of a batch; `leader`: after the period. The cells that were active there are so here: the
     two differ by errors of the integration, and a set of cells has room for far more.
     """

@@ -73,8 +73,8 @@ def make_segments(
     """Cut a control period into physics steps.
 
     `cut`: time into the period at which it is cut besides, s; 0: nowhere; `period`: control period, s;
-    `count`: number of steps of equal length. Returns `segments`; `selection`: of the active cells; `instants`
-    (p,), when the stepper needs the finger's pose, s.
+    `count`: number of steps of equal length. Returns `segments`, and `instants` (p,), when the stepper
+    needs the fingertip's pose, s.
     """
     times = {round(i * period / count, 15) for i in range(count + 1)}
     if cut:
