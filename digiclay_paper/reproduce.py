@@ -11,7 +11,7 @@ from typing import Any, TextIO
 from digiclay.commands.arguments import add_command
 from digiclay.commands.progress import Line
 from digiclay.commands.stop import Stop, refuse_without
-from digiclay.core.base.run_folder import check_folder, write_folder
+from digiclay.core.files.run_folder import check_folder, write_folder
 
 EXAMPLES = """\
 examples:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from digiclay import __version__
-from digiclay.core.base.run_folder import write_whole
+from digiclay.core.files.run_folder import write_whole
 from digiclay.plots.figure import save
 
 from . import figures_session, paper_figures

@@ -15,7 +15,7 @@ from digiclay.commands.arguments import add_command, add_scene, scene_of
 from digiclay.commands.stop import Stop, refuse_unwritable, refuse_without
 from digiclay.core.base.addresses import describe_exposure
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.run_folder import format_json, write_whole
+from digiclay.core.files.run_folder import format_json, write_whole
 from digiclay.core.scene.scene_source import Setting
 
 from .door_link import describe_bed

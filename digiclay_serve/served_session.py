@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputError
-from digiclay.core.base.run_folder import Content, claim_folder, write_whole
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
+from digiclay.core.files.run_folder import Content, claim_folder, write_whole
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene

@@ -18,7 +18,7 @@ from digiclay.commands.progress import Counted
 from digiclay.commands.stop import Stop
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.base.quantity import UNITS, Parameters, list_quantities
-from digiclay.core.base.run_folder import write_whole
+from digiclay.core.files.run_folder import write_whole
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.studies.axes import MOST, Point, find_value, place_points

@@ -14,7 +14,7 @@ from digiclay.commands.extras import format_command
 from digiclay.commands.progress import Counted, format_duration
 from digiclay.commands.stop import STOPPED, Stop, refuse_without
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.run_folder import write_whole
+from digiclay.core.files.run_folder import write_whole
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import Bundles, Record, make_bundles
 from digiclay.core.studies.sweep_plan import Folder

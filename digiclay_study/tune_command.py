@@ -14,7 +14,7 @@ from digiclay.commands.arguments import add_command
 from digiclay.commands.progress import format_duration
 from digiclay.commands.stop import STOPPED, Stop, refuse_without
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.base.run_folder import write_whole
+from digiclay.core.files.run_folder import write_whole
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import FIGURES, Record, find_figure, make_bundles

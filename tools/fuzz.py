@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.quantity import list_quantities
-from digiclay.core.base.toml_text import parse_tables
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
 from digiclay.core.engine.system import System
+from digiclay.core.files.tables import parse_tables
 from digiclay.core.metrics.summary import compute_metrics
 from digiclay.core.model.trajectory import Path, Waypoint, interpolate_poses
 from digiclay.core.scene.assembly import assemble

@@ -19,8 +19,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "tools")]
 
 from digiclay.commands.parser import parser  # noqa: E402
-from digiclay.core.base.png import encode_png  # noqa: E402
 from digiclay.core.control.methods import METHODS  # noqa: E402
+from digiclay.core.files.formats import encode_png  # noqa: E402
 from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
 from nomenclature import LEGEND, section  # noqa: E402
 

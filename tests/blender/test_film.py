@@ -13,7 +13,7 @@ import pytest
 from digiclay.compat import scratch, strips
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.base.modes import COLORS, Mode
-from digiclay.core.base.png import is_whole_picture
+from digiclay.core.files.formats import is_whole_picture
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session.render_settings import Film, Turntable

@@ -13,7 +13,7 @@ from digiclay.commands.job_steps import find_frames, make_frames
 from digiclay.commands.render import ARRAYS, stage_moving
 from digiclay.commands.run_state import is_done
 from digiclay.compat import scratch, strips
-from digiclay.core.base.run_folder import lock_name
+from digiclay.core.files.run_folder import lock_name
 from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.render_settings import list_missing, name_frame
 from digiclay.core.studies.job_table import read_outputs

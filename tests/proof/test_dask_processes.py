@@ -14,7 +14,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.cluster import open_cluster
 from digiclay.commands.executors import finish
-from digiclay.core.base.run_folder import read_json
+from digiclay.core.files.run_folder import read_json
 from distributed import Client
 
 from tests.own_methods import forgotten, write_method

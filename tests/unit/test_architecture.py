@@ -21,18 +21,19 @@ CORE = PACKAGE / "core"
 #: The packages of the core, and which of the packages above its row each imports from.
 ROOMS = {
     "base": "",
+    "files": "base",
     "model": "base",
     "steppers": "base model",
     "engine": "base model",
     "surface": "base model",
-    "mesh_io": "base surface",
-    "shapes": "base model surface mesh_io",
-    "control": "base model shapes",
+    "mesh_io": "base files surface",
+    "shapes": "base files model surface mesh_io",
+    "control": "base files model shapes",
     "metrics": "base model surface",
-    "scene": "base model engine shapes control",
-    "session": "base model engine control metrics scene",
+    "scene": "base files model engine shapes control",
+    "session": "base files model engine control metrics scene",
     "batch": "base model steppers engine control metrics scene session",
-    "studies": "base model engine mesh_io shapes control metrics scene session batch",
+    "studies": "base files model engine mesh_io shapes control metrics scene session batch",
 }
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}

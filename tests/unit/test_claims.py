@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.file_lock import find_host
-from digiclay.core.base.run_folder import (
+from digiclay.core.files.file_lock import find_host
+from digiclay.core.files.run_folder import (
     claim_files,
     claim_folder,
     find_lock,
@@ -198,7 +198,7 @@ def test_whoever_waits_gets_the_claim_when_the_other_one_ends() -> None:
     script = (
         "import sys, time\n"
         "from pathlib import Path\n"
-        "from digiclay.core.base.run_folder import claim_folder\n"
+        "from digiclay.core.files.run_folder import claim_folder\n"
         "with claim_folder(Path('o'), overwrite=False):\n"
         "    print('here', flush=True)\n"
         "    sys.stdin.readline()\n"

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.base import run_folder
 from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.files import run_folder
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.model.layout import Layout, make_grid

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
-from digiclay.core.base.toml_text import LARGEST
 from digiclay.core.control.named_shapes import read_values
 from digiclay.core.engine.simulation import begin
+from digiclay.core.files.tables import LARGEST
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load, read_table

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.file_lock import find_host, find_start, hold_lock, hold_record, may_have_made
-from digiclay.core.base.run_folder import is_unfinished, name_unfinished, remove_abandoned
+from digiclay.core.files.file_lock import find_host, find_start, hold_lock, hold_record, may_have_made
+from digiclay.core.files.run_folder import is_unfinished, name_unfinished, remove_abandoned
 
 from tests.other_process import dead
 from tests.timeouts import TIMEOUT, wait_until
@@ -109,7 +109,7 @@ def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
     script = (
         "import os\n"
         "from pathlib import Path\n"
-        "from digiclay.core.base.file_lock import hold_lock\n"
+        "from digiclay.core.files.file_lock import hold_lock\n"
         "for _ in range(60):\n"
         "    with hold_lock(Path('d/lock'), 'no', 100.0):\n"
         "        os.close(os.open('inside', os.O_CREAT | os.O_EXCL))\n"
@@ -134,7 +134,7 @@ def test_a_lock_is_free_as_soon_as_its_process_is_killed() -> None:
     script = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from digiclay.core.base.file_lock import hold_lock\n"
+        "from digiclay.core.files.file_lock import hold_lock\n"
         "with hold_lock(Path('lock'), 'no'):\n"
         "    print('here', flush=True)\n"
         "    sys.stdin.readline()\n"

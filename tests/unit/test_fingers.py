@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError, SceneError, StateError
-from digiclay.core.base.toml_text import parse_tables
 from digiclay.core.engine.simulation import begin
+from digiclay.core.files.tables import parse_tables
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, load
 from digiclay.core.scene.schema import Scene

@@ -10,7 +10,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from digiclay.commands.gallery import Card, height_map, page
-from digiclay.core.base.png import encode_png
+from digiclay.core.files.formats import encode_png
 
 
 class Reader(HTMLParser):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from digiclay.cli import main
-from digiclay.core.base.run_folder import lock_name
+from digiclay.core.files.run_folder import lock_name
 
 JOBS = """
 scenes = ["tap"]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.base.run_folder import MARK, check_folder, write_folder
+from digiclay.core.files.run_folder import MARK, check_folder, write_folder
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result, run, save

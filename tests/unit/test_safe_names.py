@@ -10,7 +10,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.batch_folder import open_batch
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.run_folder import LONGEST, find_name, fold_name, make_safe_name, make_unique_names
+from digiclay.core.files.run_folder import LONGEST, find_name, fold_name, make_safe_name, make_unique_names
 from digiclay.core.session.finished_run import is_whole
 from digiclay.core.studies.job_table import read_jobs
 from hypothesis import example, given

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.file_lock import find_host
-from digiclay.core.base.run_folder import read_json
+from digiclay.core.files.file_lock import find_host
+from digiclay.core.files.run_folder import read_json
 from digiclay.core.studies.series import Kind, open_series
 
 from tests.other_process import dead

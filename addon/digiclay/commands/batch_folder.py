@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
-from ..core.base.run_folder import lock_name, read_json, remove_abandoned, resolve_inside, write_whole
+from ..core.files.run_folder import lock_name, read_json, remove_abandoned, resolve_inside, write_whole
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series

@@ -12,8 +12,8 @@ from typing import Any
 
 from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
-from ..core.base.run_folder import check_folder, find_name, write_folder
 from ..core.control.methods import list_methods
+from ..core.files.run_folder import check_folder, find_name, write_folder
 from ..core.metrics.finger_path import sum_cells
 from ..core.model.set_point import find_set_point
 from ..core.scene.recorder import Recorder

@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import claim_files
+from ..core.files.run_folder import claim_files
 from ..core.mesh_io.export_model import KINDS, Model, make_bodies
 from ..core.mesh_io.mesh_axes import AXES, UP, make_axes
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix, write

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import __version__
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import check_folder, claim_folder, find_name
+from ..core.files.run_folder import check_folder, claim_folder, find_name
 from ..core.model.layout import make_grid
 from ..core.scene.assembly import assemble
 from ..core.scene.forming import GESTURES, make_forming_scene

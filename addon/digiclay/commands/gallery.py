@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
-from ..core.base.png import encode_png
-from ..core.base.run_folder import write_whole
+from ..core.files.formats import encode_png
+from ..core.files.run_folder import write_whole
 from ..device.heat import COLORS
 
 #: Files that can be one; and its width, pixels.

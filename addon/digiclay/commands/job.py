@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import BusyError, DigiclayError, OutputError, one_line
-from ..core.base.run_folder import claim_folder, format_json, write_whole
+from ..core.files.run_folder import claim_folder, format_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
 from ..plugins.method_loader import CODE, resolve_word

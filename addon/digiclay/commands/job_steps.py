@@ -13,7 +13,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import OutputError, one_line
-from ..core.base.run_folder import claim_files, lock_name, remove_abandoned
+from ..core.files.run_folder import claim_files, lock_name, remove_abandoned
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.finished_run import Run, read_run

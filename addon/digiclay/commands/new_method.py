@@ -10,8 +10,8 @@ from string import Template
 from typing import Any
 
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import write_whole
 from ..core.control.methods import METHODS
+from ..core.files.run_folder import write_whole
 from ..plugins.method_loader import name_method
 from .arguments import add_command
 from .stop import refuse_unwritable

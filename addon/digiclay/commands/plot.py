@@ -9,7 +9,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..core.base.run_folder import claim_files
+from ..core.files.run_folder import claim_files
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, read_run
 from .arguments import add_run

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from ..core.base.errors import DigiclayError
-from ..core.base.run_folder import claim_files
+from ..core.files.run_folder import claim_files
 from ..core.metrics.summary import compute_metrics
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import find_last_touch, find_row, read_run

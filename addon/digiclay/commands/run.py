@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import OutputError, ParameterError, SceneError
-from ..core.base.run_folder import claim_folder, find_name
+from ..core.files.run_folder import claim_folder, find_name
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import Result, run, save

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import DigiclayError
-from ..core.base.run_folder import format_json, lock_name, read_json, write_whole
+from ..core.files.run_folder import format_json, lock_name, read_json, write_whole
 from ..core.scene.scene_source import load, load_recorded
 from ..core.session.finished_run import has_files, is_whole
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs

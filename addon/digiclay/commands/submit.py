@@ -12,7 +12,7 @@ from pathlib import Path, PureWindowsPath
 from typing import NamedTuple
 
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import make_safe_name, resolve_inside, write_whole
+from ..core.files.run_folder import make_safe_name, resolve_inside, write_whole
 from ..farms import series_plan
 from ..farms.series_plan import Task, plan_series, split_frames
 from .batch_folder import Folder

@@ -13,8 +13,8 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError
-from ..core.base.run_folder import find_name, write_whole
 from ..core.control.methods import METHODS, find_method
+from ..core.files.run_folder import find_name, write_whole
 from ..core.scene.scene_source import Setting, find, load
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import Record

@@ -11,7 +11,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError
-from ..core.base.run_folder import write_whole
+from ..core.files.run_folder import write_whole
 from ..core.scene.scene_source import Setting, find
 from ..core.studies.axes import Axis, Column, make_columns, make_points, read_axis
 from ..core.studies.evaluation import (

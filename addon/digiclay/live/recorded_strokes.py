@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import ParameterError, SceneError, StateError
-from ..core.base.part_table import read_part, refuse_unknown, show_value
 from ..core.base.quantity import Parameters, quantity
+from ..core.files.tables import read_part, refuse_unknown, show_value
 from ..core.model.fingertip import Fingertip
 from ..core.scene.scene_source import read_table
 from ..core.scene.schema import Scene

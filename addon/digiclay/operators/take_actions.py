@@ -5,7 +5,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
-from ..core.base.run_folder import write_whole
+from ..core.files.run_folder import write_whole
 from ..core.scene.toml_table import format_scene
 from ..core.session.take import to_scene
 from ..device.view import bed_of

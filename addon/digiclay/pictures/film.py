@@ -24,7 +24,7 @@ from ..compat import bpy, quiet, scratch, strips, to_video
 from ..core.base.arrays import Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
-from ..core.base.run_folder import name_unfinished
+from ..core.files.run_folder import name_unfinished
 from ..core.session.render_settings import Film, Moving, Turntable, name_frame
 from ..device import view
 from ..device.instant import Instant

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..compat import bpy, has_denoiser, quiet, scratch
 from ..core.base.errors import OutputError
-from ..core.base.png import is_whole_picture
+from ..core.files.formats import is_whole_picture
 from ..core.session.render_settings import Picture, Still
 from ..device import view
 from ..device.instant import Instant

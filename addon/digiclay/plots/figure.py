@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import write_whole
+from ..core.files.run_folder import write_whole
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes

@@ -23,10 +23,10 @@ from typing import Any, NamedTuple, NoReturn
 
 from ..core.base.errors import MethodError, ParameterError
 from ..core.base.quantity import Quantity
-from ..core.base.run_folder import write_whole
 from ..core.control.blister import Blister
 from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
 from ..core.control.own_method import MOST_ROWS, Guarded, OwnMethod, describe_failure, guard
+from ..core.files.run_folder import write_whole
 from ..core.model.set_point import SetPoint
 from ..core.scene.schema import Scene
 

@@ -1,1 +1,1 @@
-"""Base of all other packages of the core: errors, quantities, cell modes, files."""
+"""Base of all other packages of the core: errors, quantities, cell modes, arrays."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..base.errors import ParameterError
-from ..base.part_table import show_value
 from ..base.quantity import Parameters, find_nearest_name
+from ..files.tables import show_value
 from ..model.set_point import SetPoint
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
-from ..base.npz import map_array
+from ..files.formats import map_array
 from ..model.layout import Grid
 
 #: How the name of a file of values ends.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
-from ..base.run_folder import open_whole
+from ..files.run_folder import open_whole
 from ..surface.body import NO_PIN, Body, Indices, split_pieces
 from .mesh_axes import UP, find_forward, make_axes
 

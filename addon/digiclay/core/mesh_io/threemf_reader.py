@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
-from ..base.npz import BROKEN_ZIP
+from ..files.formats import BROKEN_ZIP
 from .mesh_limits import (
     IDENTITY,
     join_meshes,

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..base.errors import ParameterError, SceneError
-from ..base.part_table import ReadParts
-from ..base.sample_file import find_file, list_files
-from ..base.toml_text import LARGEST, parse_tables
 from ..control.methods import list_methods
+from ..files.run_folder import find_file, list_files
+from ..files.tables import LARGEST, ReadParts, parse_tables
 from .schema import Scene
 from .toml_table import ABSENT, merge_one_finger, resolve
 

@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from ..base.errors import ParameterError
-from ..base.part_table import ReadParts, read_part, refuse_unknown, shorten, show_value
 from ..base.quantity import Parameters, list_quantities
-from ..base.toml_text import format_value
 from ..control.methods import find_method
+from ..files.tables import ReadParts, format_value, read_part, refuse_unknown, shorten, show_value
 from ..model.layout import ARRANGEMENTS
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..base.errors import OutputError
 from ..base.modes import Mode
-from ..base.npz import BROKEN_ZIP, Head, read_array, read_heads
-from ..base.run_folder import MARK, read_json
+from ..files.formats import BROKEN_ZIP, Head, read_array, read_heads
+from ..files.run_folder import MARK, read_json
 from ..scene.recorder import Recorder
 from ..scene.scene_source import load_recorded
 from ..scene.schema import Scene

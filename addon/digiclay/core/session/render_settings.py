@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
-from ..base.png import is_whole_picture
 from ..base.quantity import Parameters, quantity
+from ..files.formats import is_whole_picture
 
 #: What draws, and what colors the pins.
 ENGINES = ("cycles", "workbench")

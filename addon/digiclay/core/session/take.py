@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
-from ..base.npz import BROKEN_ZIP, read_array, read_heads
-from ..base.toml_text import parse_tables
 from ..control.smoothing import FARTHEST, ORDER, find_fault
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
+from ..files.formats import BROKEN_ZIP, read_array, read_heads
+from ..files.tables import parse_tables
 from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
 from ..scene.schema import Scene

@@ -7,8 +7,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..base.errors import ParameterError, SceneError
-from ..base.npz import map_array
-from ..base.sample_file import find_file, list_files
+from ..files.formats import map_array
+from ..files.run_folder import find_file, list_files
 from ..mesh_io import mesh_reader
 from ..mesh_io.mesh_reader import MESHES
 from ..model.actuator import Actuator

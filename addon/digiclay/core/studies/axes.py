@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import ParameterError, SceneError
-from ..base.part_table import ReadParts
 from ..base.quantity import list_quantities
+from ..files.tables import ReadParts
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
 

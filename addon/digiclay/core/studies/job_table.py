@@ -15,12 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import ParameterError, SceneError, one_line
-from ..base.part_table import read_part, refuse_unknown, show_value
 from ..base.quantity import Parameters, list_quantities
-from ..base.run_folder import find_name, make_unique_names
-from ..base.sample_file import find_file, list_files
-from ..base.toml_text import format_value
 from ..control.methods import find_method
+from ..files.run_folder import find_file, find_name, list_files, make_unique_names
+from ..files.tables import format_value, read_part, refuse_unknown, show_value
 from ..mesh_io.export_model import Model
 from ..model.layout import make_grid
 from ..scene.scene_source import SAMPLES, Setting, find, load, read_table

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..base.errors import DigiclayError, OutputError, one_line
-from ..base.file_lock import hold_lock
-from ..base.run_folder import (
+from ..files.file_lock import hold_lock
+from ..files.run_folder import (
     describe_claim,
     format_json,
     is_unfinished,

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
-from ..base.run_folder import format_json, read_json, write_whole
 from ..control.methods import find_method
+from ..files.run_folder import format_json, read_json, write_whole
 from ..scene.toml_table import format_scene, write_part
 from .axes import Axis, Point
 from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate

@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import BusyError
+from ..base.errors import BusyError
 
 #: Clocks of a machine and of the drive it writes to differ by less than this, s.
 CLOCKS_DIFFER = 60.0

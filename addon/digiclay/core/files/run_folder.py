@@ -8,13 +8,14 @@ import os
 import re
 import shutil
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from .errors import OutputError
+from ..base.errors import OutputError, SceneError
+from ..base.quantity import find_nearest_name
 from .file_lock import find_host, hold_lock, may_have_made
 
 #: Bytes of a name in UTF-8; file systems take 255, of which what is unfinished needs some.
@@ -332,3 +333,28 @@ def write_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterat
     """
     with claim_folder(out, overwrite=overwrite, patience=patience) as claim, claim.write() as folder:
         yield folder
+
+
+def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
+    """Return the samples of a folder by their names: its files that end with one of `kinds`.
+
+    `kinds`: endings of names, with the dot.
+    """
+    return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in kinds}
+
+
+def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
+    """Return the file a word stands for.
+
+    `word`: a sample's name, or a path; `kind`: what messages call a sample. Raises SceneError when there is
+    no such file, or sample.
+    """
+    if word in samples:
+        return samples[word]
+    if os.path.isfile(word):  # unlike Path.is_file it takes any text, however odd or long
+        return Path(word)
+    if Path(word).suffix or Path(word).name != word:
+        raise SceneError(f"{word}: there is no such file.")
+    close = find_nearest_name(word, list(samples))
+    asked = f" Did you mean {close}?" if close else ""
+    raise SceneError(f"{word or repr(word)} is neither a file nor a {kind} ({', '.join(samples)}).{asked}")
