@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
-from digiclay import translations
+from digiclay import translations, ui_text
+from digiclay.ui_text import localize
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -34,3 +36,22 @@ def test_a_label_is_found_among_operators_and_elsewhere() -> None:
 def test_a_brush_has_the_name_of_what_it_does_where_other_things_are_smooth() -> None:
     entries = translations.make_entries({"Smooth"}, "de")
     assert (entries["*", "Smooth"], entries["Brush", "Smooth"]) == ("Glatt", "Glätten")
+
+
+def test_values_come_into_their_places_in_the_language_of_the_interface() -> None:
+    # Blender's module has no languages: its window shows them (tests/window).
+    ui_text.set_translator(lambda text: translations.translate(text, "de") or text)
+    try:
+        assert localize("Simulated: {:.1f} s", 1.25) == "Simuliert: 1.2 s"
+        assert localize("Nobody has written this {}", 1) == "Nobody has written this 1"
+    finally:
+        ui_text.set_translator(bpy.app.translations.pgettext_iface)
+    assert localize("Simulated: {:.1f} s", 1.25) == "Simulated: 1.2 s"
+
+
+def test_without_a_translator_texts_are_english() -> None:
+    ui_text.set_translator()
+    try:
+        assert localize("waiting") == "waiting"
+    finally:
+        ui_text.set_translator(bpy.app.translations.pgettext_iface)

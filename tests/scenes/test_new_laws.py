@@ -189,7 +189,7 @@ def test_laws_that_no_scene_selects_change_no_file_and_no_other_test(copy: Path)
     shutil.copy(ROOT / "pyproject.toml", copy)
     run_python(copy, str(copy / "tools" / "nomenclature.py"))
     assert run_python(copy, "-c", PLAIN) == "False 2\n"
-    tests = ("regression/test_old_formats.py", "regression/test_nomenclature.py", "unit/test_schema.py")
+    tests = ("regression/test_old_formats.py", "unit/test_schema.py")
     files = [str(copy / "tests" / name) for name in (*tests, "unit/test_toml_table.py")]
     run_python(copy, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", f"--rootdir={copy}", *files)
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
+from tests.form.test_pages import PAGES
 from tests.site.page_commands import Command, find_commands, find_files
-from tests.unit.test_docs import PAGES
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.test_docs import PAGES
+from tests.form.test_pages import PAGES
 
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "docs" / "pictures.md"
@@ -54,7 +54,7 @@ def test_what_makes_a_picture_exists(made: dict[str, str]) -> None:
             assert f"\n{command.removeprefix('make ')}:" in makefile
         elif not command:  # a page has the command
             assert re.search(r"\]\(\w+\.md#|same section", cell), name
-        else:  # tests/unit/test_docs.py checks the arguments
+        else:  # tests.form.test_pages.py checks the arguments
             assert command.startswith(("python -m benchmarks ", "digiclay "))
 
 

@@ -15,7 +15,7 @@ from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.schema import SECTIONS, import_parameters
 
 from benchmarks.kinds import parser as benchmarks_parser
-from tests.unit.test_docs import COMMAND, is_refused
+from tests.form.test_pages import COMMAND, is_refused
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {

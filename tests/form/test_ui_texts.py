@@ -8,13 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from string import Formatter
 
-import bpy
 import digiclay
-import pytest
-from digiclay import translations, ui_text
-from digiclay.ui_text import localize
-
-pytestmark = pytest.mark.usefixtures("extension")
+from digiclay import translations
 
 ROOT = Path(digiclay.__file__).parent
 FOLDERS = ("operators", "panels", "press", "overlay", "live")
@@ -86,22 +81,3 @@ def test_a_translation_has_the_places_of_its_text() -> None:
 
     messages = translations._catalog("de")["messages"]
     assert [text for text, german in messages.items() if places(text) != places(german)] == []
-
-
-def test_values_come_into_their_places_in_the_language_of_the_interface() -> None:
-    # Blender's module has no languages: its window shows them (tests/window).
-    ui_text.set_translator(lambda text: translations.translate(text, "de") or text)
-    try:
-        assert localize("Simulated: {:.1f} s", 1.25) == "Simuliert: 1.2 s"
-        assert localize("Nobody has written this {}", 1) == "Nobody has written this 1"
-    finally:
-        ui_text.set_translator(bpy.app.translations.pgettext_iface)
-    assert localize("Simulated: {:.1f} s", 1.25) == "Simulated: 1.2 s"
-
-
-def test_without_a_translator_texts_are_english() -> None:
-    ui_text.set_translator()
-    try:
-        assert localize("waiting") == "waiting"
-    finally:
-        ui_text.set_translator(bpy.app.translations.pgettext_iface)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.test_architecture import PACKAGE, ROOT, find_circle, find_own_name, imports
+from tests.form.test_architecture import PACKAGE, ROOT, find_circle, find_own_name, imports
 
 #: Packages beside the extension: they import it, and it never imports them.
 BESIDE = {name: ROOT / name for name in ("benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study")}

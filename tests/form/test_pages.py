@@ -1,0 +1,243 @@
+"""The pages: headings, measurements, links, names, commands and navigation."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+import shlex
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from digiclay.commands.parser import parser
+from digiclay.core.base.quantity import list_quantities
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.schema import SECTIONS, import_parameters
+
+from benchmarks.kinds import parser as benchmarks_parser
+from tools.nomenclature import REFERENCES
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted(
+    [
+        *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "benchmarks/README.md")),
+        *ROOT.glob("docs/*.md"),
+        *ROOT.glob("addon/digiclay/sample_shapes/*/README.md"),
+    ]
+)
+PACKAGES = ("addon", "benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study", "tools")
+SOURCES = {
+    f"/{path.relative_to(ROOT)}" for name in (*PACKAGES, "tests") for path in (ROOT / name).rglob("*.py")
+}
+#: Words that make a heading a sentence or a question.
+SENTENCE = re.compile(
+    r"\?|^(what|how|why|where|when|who|which|whether)\b"
+    r"|\b(is|are|was|were|has|have|does|do|can|must|costs|brings|comes|goes|stays|knows|says|tells|ends|stands"
+    r"|changes|found|moved|moves|recovers|springs)\b",
+    re.IGNORECASE,
+)
+#: A speed or a run time: a row of a table, not a sentence.
+TIMING = re.compile(r"\d x real time|\d (?:s|ms|min|minutes) of (?:CPU|processor) time", re.IGNORECASE)
+#: A program and its arguments; a number behind a name is a version.
+COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmarks) (?!\d)(.*)")
+#: Files of the user: a method of one's own, and its copy beside a run.
+USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
+#: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
+PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
+#: Pages of the navigation that `tools/site_pages.py` makes at the build.
+MADE = {"benchmarks.md", "changes.md", "contributing.md"}
+
+
+def _lines(text: str) -> Iterator[tuple[str, bool]]:
+    """Yield the lines of a page, and whether each is code."""
+    fenced = False
+    for line in text.splitlines():
+        fence = line.lstrip().startswith("```")
+        fenced ^= fence
+        yield line, fenced or fence or line.startswith("    ")
+
+
+def _headings(text: str) -> list[str]:
+    return [line.lstrip("# ") for line, code in _lines(text) if not code and line.startswith("#")]
+
+
+def _anchors(text: str) -> set[str]:
+    """Return the anchors of a page's headings, as the usual renderers make them."""
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in _headings(text)}
+
+
+def find_commands(text: str) -> list[tuple[str, str]]:
+    """Return program and arguments of every command of a page, in blocks of code and within sentences."""
+    lines = list(_lines(text))
+    blocks = [line.strip() for line, code in lines if code]
+    prose = " ".join(line for line, code in lines if not code)
+    matches = [COMMAND.match(line) for line in (*blocks, *re.findall(r"`([^`]+)`", prose))]
+    # Two blanks or a # begin the remark beside a command.
+    return [(match[1], re.split(r"\s{2,}|\s#", match[2])[0]) for match in matches if match]
+
+
+def is_refused(program: str, arguments: str) -> bool:
+    """Return whether a program refuses a command line."""
+    words = shlex.split(arguments)
+    try:
+        PARSERS[program]().parse_args(words if len(words) > 1 else [*words, "--help"])
+    except SystemExit as end:
+        return end.code != 0
+    return False
+
+
+@functools.cache
+def _definitions() -> dict[str, set[str]]:
+    """Return the names that each module defines, by the module's own name; those of equal names together."""
+    defined: dict[str, set[str]] = {}
+    for path in (path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")):
+        names = defined.setdefault(path.stem, set())
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                names.add(node.name)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                names.add(node.id)
+    return defined
+
+
+def find_sentences(page: Path, text: str) -> list[str]:
+    """Return the headings that are no noun phrases."""
+    return [heading for heading in _headings(text) if SENTENCE.search(heading)]
+
+
+def find_timings(page: Path, text: str) -> list[str]:
+    """Return the lines outside tables that give a run time."""
+    prose = [line for line, code in _lines(text) if not code and not line.startswith("|")]
+    return [
+        line for line in prose if TIMING.search(re.sub(r"`[^`]*`|\*[^*]+\*", " ", line.replace("**", "")))
+    ]
+
+
+def find_undated(page: Path, text: str) -> list[str]:
+    """Return the rows without a date and a commit in tables with a column *commit*."""
+    rows, measured = [], False
+    for line, code in _lines(text):
+        if code or not line.startswith("|"):
+            measured = False
+        elif re.search(r"\|\s*commit\s*\|", line, re.IGNORECASE):
+            measured = True
+        elif measured and not re.fullmatch(r"[|\s:-]+", line):
+            rows.append(line)
+    return [row for row in rows if not re.search(r"\b20\d\d-\d\d-\d\d\b.*\b[0-9a-f]{7}\b", row)]
+
+
+def find_dead_links(page: Path, text: str) -> list[str]:
+    """Return the links to a file or heading that does not exist; `make docs` checks those to reference/."""
+    dead = []
+    for target in re.findall(r"\]\((?!\w+://|reference/)([^)\s]+)\)", text):
+        name, _, anchor = target.partition("#")
+        file = page.parent / name if name else page
+        if not file.exists() or (anchor and anchor not in _anchors(file.read_text(encoding="utf-8"))):
+            dead.append(target)
+    return dead
+
+
+def find_absent_modules(page: Path, text: str) -> list[str]:
+    """Return the Python files that a page names and that do not exist."""
+    given = {*USERS, *re.findall(r'title="([^"]+)"', text)}
+    named = re.findall(r"(?<![\w./])((?:\w+/)*\w+\.py)\b", text)
+    return [
+        name
+        for name in named
+        if name not in given and Path(name).name not in given
+        if not any(path.endswith(f"/{name}") for path in SOURCES)
+    ]
+
+
+def find_absent_names(page: Path, text: str) -> list[str]:
+    """Return ``module.name`` where a page names what the module does not define."""
+    parameters = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    endings = {"py", "md", "csv", "png", "jpg", "toml", "json", "npz", "stl", "obj", "html"}
+    return [
+        f"{module}.{name}"
+        for module, name in re.findall(r"`(?!bpy)(?:[\w.]+\.)?([a-z_]+)\.([A-Za-z]\w*)", text)
+        if module in _definitions() and name not in endings and f"`{module}.{name}`" not in parameters
+        if name not in _definitions()[module] and name not in _definitions()
+    ]
+
+
+def find_refused_commands(page: Path, text: str) -> list[str]:
+    """Return the commands that their programs refuse."""
+    return [" ".join(command) for command in find_commands(text) if is_refused(*command)]
+
+
+CHECKS = (
+    find_sentences, find_timings, find_undated, find_dead_links, find_absent_modules, find_absent_names,
+    find_refused_commands,
+)  # fmt: skip
+#: A page with one fault of each kind, in the order of the checks.
+WRONG = """\
+# Why is it wet?
+It took 3 s of processor time.
+[there](nowhere.md), `core/absent.py`, `simulation.absent_name`, `digiclay run --absent tap`
+
+| commit | s |
+|---|---|
+| today | 3 |
+"""
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_no_page_has_a_fault_that_the_check_finds(check: Callable[[Path, str], list[str]]) -> None:
+    faults = {page.name: check(page, page.read_text(encoding="utf-8")) for page in PAGES}
+    assert {name: found for name, found in faults.items() if found} == {}
+    assert len(check(ROOT / "README.md", WRONG)) == 1
+
+
+def test_all_fourteen_equations_have_a_row_and_places_that_exist() -> None:
+    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    assert {int(n) for n in re.findall(r"^\| (\d+)", text, re.MULTILINE)} == set(range(1, 15))
+    named = re.findall(r"`core/([\w/]+)\.py: ([\w.]+)`", text)
+    assert len(named) > 12
+    absent = []
+    for module, name in named:
+        code = (ROOT / "addon" / "digiclay" / "core" / f"{module}.py").read_text(encoding="utf-8")
+        patterns = (rf"\b(def|class) {part}\b|^ *{part}\b *[:=]" for part in name.split("."))
+        if not all(re.search(pattern, code, re.MULTILINE) for pattern in patterns):
+            absent.append(f"{module}: {name}")
+    assert absent == []
+
+
+def test_every_parameter_says_where_it_comes_from() -> None:
+    sources = {
+        source
+        for section in SECTIONS
+        for method in METHODS
+        for quantity in list_quantities(import_parameters(section, method)).values()
+        for source in quantity.source.split(", ")
+    }
+    # The paper, derived, chosen; or a reference that the page of symbols lists, and none without a value.
+    assert sources - {"P", "D", "C"} == set(REFERENCES)
+
+
+def test_the_page_of_the_package_lists_every_extra_that_is_for_its_users() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    page = (ROOT / project["readme"]).read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^\| `digiclay\[(\w+)\]` \|", page, re.MULTILINE)) == sorted(
+        project["optional-dependencies"].keys() - {"dev"}
+    )
+
+
+def _targets(entry: Any) -> Iterator[str]:
+    """Yield the pages of an entry of the navigation, in order."""
+    if isinstance(entry, str):
+        yield entry
+    for inner in entry.values() if isinstance(entry, dict) else entry if isinstance(entry, list) else ():
+        yield from _targets(inner)
+
+
+def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
+    listed = list(_targets(yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]))
+    written = [name for name in listed if name not in MADE and not name.startswith("reference/")]
+    pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    assert sorted(written) == sorted(pages), "each page needs one line under nav in mkdocs.yml"
+    assert {*listed} >= MADE

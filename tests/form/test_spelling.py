@@ -1,0 +1,73 @@
+"""Words: American spelling in code, texts and pages; names of modules that lead to one file."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import pytest
+
+from tests.form.test_architecture import ROOT, tracked
+
+BRITISH = re.compile(
+    r"colour|behaviour|neighbour|favour|honour|vapour|centre|centring|fibre|litre|metre|grey|licence|defence"
+    r"|travell(ed|ing)|labell(ed|ing)|modell(ed|ing)|signall(ed|ing)|catalogue|programme\b|artefact|judgement"
+    r"|ageing|aluminium|plough|mould"
+    r"|(quant|normal|initial|organ|optim|minim|maxim|recogn|summar|visual|special|random|real|general"
+    r"|character|synchron|emphas|util|stabil|serial)is(e|es|ed|ing|ation)\b|analys(e|ed|ing)\b",
+    re.IGNORECASE,
+)
+#: German, what former releases wrote (the samples too), and this file, which has the words themselves.
+UNREAD = ("de.toml", "CHANGELOG.md", "test_spelling.py")
+#: Names in files, which stay what they are.
+READ = re.compile(r'\bcentring_time\b|"(--)?colour"|"Colour by Force"|"Top Colour at \(N\)"')
+#: Modules that may have the name of another or of their package, and why.
+ALLOWED = {
+    "__init__": "the front door of a package",
+    "__main__": "what `python -m` runs",
+    "scene_source": "what reads a scene, from whatever source",
+}
+#: Packages whose modules are named after what others contain, and why.
+NAMED_AFTER_OTHERS = {"commands": "each module is the command of its name", "plots": "what a plot shows"}
+
+
+def british_words(text: str) -> list[str]:
+    """Return the British words of a text."""
+    return [match.group() for match in BRITISH.finditer(READ.sub("", text))]
+
+
+def test_no_word_is_spelled_the_british_way() -> None:
+    files = [
+        path
+        for path in tracked("*.py", "*.md", "*.toml", "*.txt")
+        # Samples and changes of former releases stay as written; this file has the words themselves.
+        if ROOT / "tests" / "samples" not in path.parents
+        and path.name not in ("test_spelling.py", "de.toml", "CHANGELOG.md")
+    ]
+    found = {str(path.relative_to(ROOT)): british_words(path.read_text(encoding="utf-8")) for path in files}
+    assert {name: words for name, words in found.items() if words} == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("Mode Colours", ["Colour"]),
+        ("the centred neighbours", ["centre", "neighbour"]),
+        ("quantised, otherwise a rise in noise", ["quantised"]),
+        ('{"colour": "color"}', []),
+    ],
+)
+def test_the_check_finds_british_words_and_them_alone(text: str, found: list[str]) -> None:
+    assert british_words(text) == found
+
+
+def test_no_module_has_the_name_of_its_package_or_of_another_module() -> None:
+    beside = ("benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study", "tools")
+    modules = [
+        path
+        for path in tracked("addon/*.py", *(f"{name}/*.py" for name in beside))
+        if path.stem not in ALLOWED and path.parent.name not in NAMED_AFTER_OTHERS
+    ]
+    counts = Counter(path.stem for path in modules)
+    wrong = [path for path in modules if counts[path.stem] > 1 or path.parent.name in path.stem.split("_")]
+    assert sorted(str(path.relative_to(ROOT)) for path in wrong) == []

@@ -1,0 +1,44 @@
+"""Bounds of the libraries: pyproject.toml, and the pins that `tests/release` installs and runs with."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+#: Of each library the lowest version and the major version that is too high.
+BOUNDS = {
+    name: (low, int(above))
+    for line in DEPENDENCIES
+    for name, low, above in re.findall(r"^([\w-]+)>=([\d.]+),<(\d+)$", line)
+}
+
+
+def numbers(version: str) -> list[int]:
+    """Return the three numbers of a version."""
+    return [int(part) for part in f"{version}.0.0".split(".")[:3]]
+
+
+def read_pins(name: str) -> dict[str, list[int]]:
+    """Return the pinned versions of the bounded libraries in a file of requirements/."""
+    text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    pins = dict(re.findall(r"^([\w-]+)==([\d.]+)$", text, re.MULTILINE))
+    return {library: numbers(pin) for library, pin in pins.items() if library in BOUNDS}
+
+
+def test_every_library_is_bounded_and_the_lowest_pins_are_the_bounds() -> None:
+    assert len(BOUNDS) == len(DEPENDENCIES)
+    assert read_pins("lowest") == {name: numbers(low) for name, (low, _) in BOUNDS.items()}
+
+
+@pytest.mark.parametrize("file", ["highest", "demo", "extension", "matrix-5.2"])
+def test_every_pin_lies_between_the_lowest_and_the_highest(file: str) -> None:
+    pins, highest = read_pins(file), read_pins("highest")
+    assert pins
+    for name, pin in pins.items():
+        low, above = BOUNDS[name]
+        assert numbers(low) <= pin <= highest[name] < [above], name
