@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.metrics.force import compute_rfd
-from digiclay.core.model.control_interface import Controller
-from digiclay.core.model.set_point import find_set_point
+from digiclay.core.model.control_interface import Controller, find_set_point
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 

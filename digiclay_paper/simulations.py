@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.metrics.force import measure_amplitude, measure_frequency, measure_settling_time
-from digiclay.core.model.set_point import find_set_point
+from digiclay.core.model.control_interface import find_set_point
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from digiclay.core.metrics.finger_path import measure_surface_under, sum_cells
 from digiclay.core.metrics.force import compute_deviation, compute_rfd, compute_weights
-from digiclay.core.model.set_point import find_set_point
+from digiclay.core.model.control_interface import find_set_point
 from digiclay.core.session.run_scene import Result
 
 #: Along the ridge and along the valley, s.

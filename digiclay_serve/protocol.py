@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.model.finger_range import MOST_FORCE
 from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.touch import MOST_FORCE
 from numpy.typing import NDArray
 
 #: Environment variable with the token.
@@ -96,7 +96,7 @@ class Status:
 class Flag(IntFlag):
     """What a client has to know of a frame before it believes it."""
 
-    #: The contact law does not hold: `core.model.finger_range`.
+    #: The contact law does not hold: `core.model.touch`.
     BEYOND_A_FINGER = 1
     #: Total force and forces were larger, and are reduced to the ceiling by one factor.
     FORCE_LIMITED = 2

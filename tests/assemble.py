@@ -13,19 +13,17 @@ from digiclay.core.control.travel import Heading
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
 from digiclay.core.engine.simulation import System, begin, periods
 from digiclay.core.engine.state import State
-from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.actuator import Actuator, Supply
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.delay import Delay
 from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
-from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.lag import ValveLag
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.supply import Supply
 from digiclay.core.model.trajectory import Path, Trajectory, make_level
-from digiclay.core.model.valve import Valve
+from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Finger, Scene, Simulation

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.model.set_point import SetPoint
+from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.scene.scene_source import load
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
-from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.physics import compute_rates
-from digiclay.core.model.valve import Valve
+from digiclay.core.model.valve import Fluid, Valve
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

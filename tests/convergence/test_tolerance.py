@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.valve import Valve
+from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors

@@ -12,10 +12,10 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.contact import Contact
-from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.trajectory import Path, Trajectory, Waypoint
+from digiclay.core.model.valve import Fluid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from hypothesis import example, given, settings

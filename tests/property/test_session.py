@@ -8,10 +8,9 @@ from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.engine.simulation import begin, step
 from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import Trajectory, make_level
-from digiclay.core.model.valve import Valve
+from digiclay.core.model.valve import Fluid, Valve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

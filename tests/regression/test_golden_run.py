@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.valve import Fluid
 from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import one_cell, path, record, sample, scripted

@@ -10,12 +10,13 @@ from digiclay.core.model.contact import Contact
 from digiclay.core.steppers.closed_form import (
     LARGE,
     TINY,
+    StepStart,
+    find_loaded_path,
     replace_zeros,
     solve_carefully,
     solve_crossing,
     solve_pressed,
 )
-from digiclay.core.steppers.near_overflow import StepStart, find_loaded_path
 
 from tests.assemble import one_cell
 

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 from digiclay.core.model.conduit import Conduit, OrificeAndConduit, connect_in_series
-from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.valve import Valve, make_orifice
+from digiclay.core.model.valve import Fluid, Valve, make_orifice
 from scipy.integrate import quad
 
 THIN = Fluid(density=760.0, viscosity=0.65e-6)

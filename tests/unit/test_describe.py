@@ -7,8 +7,7 @@ import re
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.supply import Supply
+from digiclay.core.model.actuator import Actuator, Supply
 
 from tests.assemble import AWAY, one_cell, record, scripted
 

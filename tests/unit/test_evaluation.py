@@ -13,8 +13,8 @@ from digiclay.cli import main
 from digiclay.core.batch.finger_paths import make_fingers
 from digiclay.core.batch.packing import advance, begin, classify, make_batch, merge_parts
 from digiclay.core.batch.padding import compute_reach
+from digiclay.core.model.actuator import Supply
 from digiclay.core.model.contact import Contact
-from digiclay.core.model.supply import Supply
 from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from digiclay.commands.batch_folder import FACTS
 from digiclay.core.engine.simulation import begin
-from digiclay.core.model import finger_range
+from digiclay.core.model import touch
 from digiclay.core.model.contact import Contact
-from digiclay.core.model.finger_range import MOST_FORCE, MOST_INDENTATION, describe_excess, find_indentations
 from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.model.touch import MOST_FORCE, MOST_INDENTATION, describe_excess, find_indentations
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -65,7 +65,7 @@ def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line(through
 def test_rows_and_live_states_beyond_the_law_are_marked(
     depth: float, tilt: float, x: float, stiffness: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(finger_range, "ROWS", 1)
+    monkeypatch.setattr(touch, "ROWS", 1)
     result = pressed(depth, tilt, x, contact=Contact(stiffness=stiffness))
     history, system = result.history, assemble(result.scene)
     unders = under(Fingertip().outline(history["fingertip"]), *history["position"].T)

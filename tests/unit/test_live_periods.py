@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.model.set_point import SetPoint
 from digiclay.core.model.trajectory import interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve

@@ -9,9 +9,8 @@ import pytest
 from digiclay.core.control.master import Master, Phase, make_master_cell
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.conduit import Conduit
-from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.physics import Cell
-from digiclay.core.model.valve import Valve
+from digiclay.core.model.valve import Fluid, Valve
 
 from tests.assemble import make_system
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.actuator import Actuator, Supply
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.physics import Speeds, find_speeds
-from digiclay.core.model.supply import Supply
+from digiclay.core.model.valve import Fluid
 
 from tests.assemble import AWAY, make_system, one_cell, path, record, scripted
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.base.modes import Mode
+from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.model.set_point import SetPoint
 from digiclay.plots import run as plots
 from digiclay.plots.relief import hidden
 

@@ -19,8 +19,8 @@ from digiclay.core.metrics.summary import (
     find_first_touch,
     measure_lag,
 )
+from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.model.set_point import SetPoint
 
 TIME = np.linspace(0.0, 10.0, 2001)
 #: Rounding of sums over 2001 rows.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.actuator import Supply
 from digiclay.core.model.physics import compute_rates
-from digiclay.core.model.supply import Supply
 
 from tests.assemble import one_cell
 

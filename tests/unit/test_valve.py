@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.valve import Orifice, Valve, make_orifice
+from digiclay.core.model.valve import Fluid, Orifice, Valve, make_orifice
 
 OPENINGS = np.array([0.05, 0.2, 0.5, 0.8, 1.0])
 #: A wide valve and a thin fluid: the flow of a free cell is turbulent.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
-from ..core.model.finger_range import MOST_FORCE, MOST_INDENTATION
+from ..core.model.touch import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
 from ..ui_text import localize
 from .picture import Box, Color, Dot, Line, Look, Picture, Words, round_axis, scale_curve
@@ -57,7 +57,7 @@ class Readings:
     top : float or None
         Force from which on a pin has the last color, N; None while the colors tell the modes.
     beyond : bool
-        Whether the contact law does not hold now, by `core.model.finger_range`.
+        Whether the contact law does not hold now, by `core.model.touch`.
     """
 
     name: str
@@ -142,7 +142,7 @@ def error_message(errors: tuple[float, float] | None) -> str:
 
 
 def force_message(force: float, *, beyond: bool = False) -> str:
-    """Return the text of the total force, N, and that it, or else a depth, is beyond `finger_range`."""
+    """Return the text of the total force, N, and that it, or else a depth, is beyond the contact law's range."""
     if force >= 100.0:
         return localize("{:.3g} N: no finger", force)
     if force > MOST_FORCE:

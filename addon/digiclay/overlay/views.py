@@ -14,7 +14,7 @@ import numpy as np
 from .. import preferences
 from ..compat import bpy
 from ..core.base.modes import Mode
-from ..core.model.set_point import find_set_point
+from ..core.model.control_interface import find_set_point
 from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
 from ..live import running

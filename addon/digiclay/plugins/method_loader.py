@@ -27,7 +27,7 @@ from ..core.control.blister import Blister
 from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
 from ..core.control.own_method import MOST_ROWS, Guarded, OwnMethod, describe_failure, guard
 from ..core.files.run_folder import write_whole
-from ..core.model.set_point import SetPoint
+from ..core.model.control_interface import SetPoint
 from ..core.scene.schema import Scene
 
 #: The group of entry points by which installed packages offer methods.

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.core.model.set_point import SetPoint
+from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting

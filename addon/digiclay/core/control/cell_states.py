@@ -19,9 +19,8 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.control_interface import Commands, Measurement
+from ..model.control_interface import Commands, Measurement, SetPoint
 from ..model.layout import RELATIVE_TOLERANCE
-from ..model.set_point import SetPoint
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .servo import Tracking, lock_overloaded

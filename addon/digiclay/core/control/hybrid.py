@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 from ..base.arrays import Constants, Floats
 from ..base.quantity import quantity
 from ..model.contact import Contact
-from ..model.control_interface import Commands, Measurement
+from ..model.control_interface import Commands, Measurement, SetPoint
 from ..model.fingertip import Fingertip
 from ..model.layout import enclose_discs
 from ..model.null_parts import Unrelaxed
-from ..model.set_point import SetPoint
 from ..model.touch import Touch
 from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor

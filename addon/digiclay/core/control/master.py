@@ -13,10 +13,10 @@ import numpy as np
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
+from ..model.control_interface import SetPoint
 from ..model.delay import Queue
 from ..model.interfaces import Flow
 from ..model.physics import GAUSS, Cell
-from ..model.set_point import SetPoint
 from .blister import Blister
 from .runs import BatchControl
 from .servo import Tracking

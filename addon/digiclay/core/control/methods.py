@@ -13,7 +13,7 @@ from typing import Any
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, find_nearest_name
 from ..files.tables import show_value
-from ..model.set_point import SetPoint
+from ..model.control_interface import SetPoint
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
-from ..model.set_point import SetPoint, find_set_point
+from ..model.control_interface import SetPoint, find_set_point
 from ..surface.skin_mesh import find_grid_shape
 from .finger_path import (
     CellSums,

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
-from .fluid import Fluid
-from .valve import Orifice
+from .valve import Fluid, Orifice
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
-"""Interface of the control methods: what is measured of cells, what is commanded to them."""
+"""Interface of the control methods: what is measured of cells, commanded to them and asked of the method."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Floats
 
@@ -84,3 +85,41 @@ class Controller(Protocol):
         `memory`: from `locate`; `seen`: of the cells to command.
         """
         ...
+
+
+@dataclass(frozen=True)
+class SetPoint:
+    """Set point of the total force.
+
+    Attributes
+    ----------
+    force : float
+        F_ref, N.
+    per_cell : bool
+        Whether every cell that follows the finger is asked for it, and not all cells together.
+    """
+
+    force: float
+    per_cell: bool = False
+
+    def total(self, following: ArrayLike) -> Floats:
+        """Return the set point for a number of following cells, N.
+
+        ``F_ref`` for all cells together, ``n F_ref`` for n cells that follow; NaN where none does,
+        since then no force is asked for.
+
+        `following`: numbers of cells in the mode `FORCE_FOLLOW`.
+        """
+        count = np.asarray(following, dtype=np.float64)
+        if not self.per_cell:
+            return np.full(count.shape, self.force)
+        total: Floats = np.where(count > 0.0, self.force * count, np.nan)
+        return total
+
+
+def find_set_point(set_point: SetPoint | None, following: ArrayLike) -> Floats:
+    """Return the `SetPoint.total`, N; NaN throughout for a method without a set point.
+
+    `following`: numbers of cells in the mode `FORCE_FOLLOW`.
+    """
+    return np.full(np.shape(following), np.nan) if set_point is None else set_point.total(following)

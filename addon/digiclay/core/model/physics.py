@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Floats
-from .actuator import Actuator
+from .actuator import Actuator, Supply
 from .interfaces import Flow, Lag
-from .supply import Supply
 from .touch import Touch, compute_force
 
 #: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.

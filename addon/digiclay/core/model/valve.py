@@ -1,4 +1,4 @@
-"""Valve of a cell: a two-branch orifice law between a reservoir and the cell (equations 3 to 7)."""
+"""Valve of a cell and its fluid: an orifice law of two branches (equations 3 to 7)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,21 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity, refuse_overrides
-from .fluid import Fluid
+
+
+@dataclass(frozen=True)
+class Fluid(Parameters):
+    """An incompressible Newtonian fluid; the default is a silicone oil (Syltherm XLT at 20 °C)."""
+
+    density: float = quantity(855.0, "density", unit="kg/m3", symbol="ρ", source="Melinder 2010", above=0.0)
+    viscosity: float = quantity(
+        1.6e-6, "kinematic viscosity", unit="m2/s", symbol="ν", source="Melinder 2010", above=0.0
+    )
+
+    @property
+    def dynamic_viscosity(self) -> float:
+        """Dynamic viscosity μ = ρ ν, Pa s."""
+        return self.density * self.viscosity
 
 
 @dataclass(frozen=True)

@@ -11,25 +11,23 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..control.methods import ControlParameters, find_method
+from ..model.control_interface import SetPoint
 from ..model.fingertip import require_one
 from ..model.laws import LAWS, law_parameters
-from ..model.set_point import SetPoint
 from ..model.trajectory import Path, Trajectory
 
 if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part`
     from ..control.blister import Blister
-    from ..model.actuator import Actuator
+    from ..model.actuator import Actuator, Supply
     from ..model.conduit import Conduit
     from ..model.contact import Contact
     from ..model.delay import Delay
     from ..model.fingertip import Fingertip
-    from ..model.fluid import Fluid
     from ..model.lag import ValveLag
     from ..model.layout import Layout
     from ..model.relaxation import Relaxation
     from ..model.sensors import Sensing
-    from ..model.supply import Supply
-    from ..model.valve import Valve
+    from ..model.valve import Fluid, Valve
     from ..shapes.request import Shape
     from .recorder import Recorder
 
@@ -38,8 +36,8 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part
 PARTS: dict[str, tuple[str, str]] = {
     "layout": ("model.layout", "Layout"),
     "actuator": ("model.actuator", "Actuator"),
-    "supply": ("model.supply", "Supply"),
-    "fluid": ("model.fluid", "Fluid"),
+    "supply": ("model.actuator", "Supply"),
+    "fluid": ("model.valve", "Fluid"),
     "conduit": ("model.conduit", "Conduit"),
     "valve_lag": ("model.lag", "ValveLag"),
     "delay": ("model.delay", "Delay"),

@@ -12,8 +12,8 @@ from ..base.arrays import Floats
 from ..base.modes import Mode
 from ..engine.state import State
 from ..engine.system import System
-from ..model.finger_range import MOST_FORCE, MOST_INDENTATION, find_indentations, is_beyond
-from ..model.set_point import SetPoint, find_set_point
+from ..model.control_interface import SetPoint, find_set_point
+from ..model.touch import MOST_FORCE, MOST_INDENTATION, find_indentations, is_beyond
 
 #: Most pins whose heights are traced.
 PICKED = 6
@@ -88,7 +88,7 @@ def measure_total_force(system: System, state: State) -> float:
 
 
 def exceeds_law(system: System, state: State, pose: Floats) -> bool:
-    """Return whether the contact law does not hold, with the fingertip at a pose (7,): see `finger_range`."""
+    """Return whether the contact law does not hold, with the fingertip at a pose (7,): see `touch.is_beyond`."""
     if system.cell.touch is None:
         return False
     near, fingertip = state.active.touched, system.cell.touch.fingertip

@@ -18,8 +18,8 @@ from ..base.errors import OutputError
 from ..engine.simulation import begin, periods
 from ..engine.system import System
 from ..metrics.summary import METRICS, compute_metrics
-from ..model.finger_range import describe_excess, find_indentations, is_beyond
 from ..model.fingertip import require_one
+from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene

@@ -18,14 +18,13 @@ from itertools import pairwise
 import numpy as np
 
 from ..base.arrays import Constants, Flags, Floats, any_true, apply_map, per_row, prepare_map
+from ..model.actuator import Supply
 from ..model.contact import LARGEST_EXPONENT, Contact
 from ..model.delay import Queue
 from ..model.interfaces import Pulp, Segment
 from ..model.null_parts import Unrelaxed
 from ..model.physics import Cell
-from ..model.supply import Supply
-from .closed_form import LARGE, TINY, solve_crossing, solve_pressed
-from .near_overflow import LoadedPath, StepStart, find_loaded_path
+from .closed_form import LARGE, TINY, LoadedPath, StepStart, find_loaded_path, solve_crossing, solve_pressed
 
 
 def _legendre(count: int) -> tuple[tuple[float, float], ...]:

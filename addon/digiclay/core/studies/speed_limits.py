@@ -11,7 +11,7 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..metrics.finger_path import measure_lag, sum_cells
 from ..metrics.force import compute_rfd, find_contact_ends
-from ..model.set_point import find_set_point
+from ..model.control_interface import find_set_point
 from ..model.trajectory import Path, Waypoint
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
