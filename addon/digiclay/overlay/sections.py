@@ -142,7 +142,7 @@ def error_message(errors: tuple[float, float] | None) -> str:
 
 
 def force_message(force: float, *, beyond: bool = False) -> str:
-    """Return the text of the total force, N, and that it, or else a depth, is beyond the contact law's range."""
+    """Return the text of the total force, N, and whether the contact law does not hold."""
     if force >= 100.0:
         return localize("{:.3g} N: no finger", force)
     if force > MOST_FORCE:
