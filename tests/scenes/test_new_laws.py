@@ -26,8 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..base.quantity import Parameters, quantity
-from .fluid import Fluid
-from .valve import Orifice, Valve, make_orifice
+from .valve import Fluid, Orifice, Valve, make_orifice
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def measure_total_force(system: System, state: State) -> float:
 
 
 def exceeds_law(system: System, state: State, pose: Floats) -> bool:
-    """Return whether the contact law does not hold, of the fingertip at a pose (7,): see `touch.is_beyond`."""
+    """Return whether the contact law does not hold, of the fingertip at a pose (7,): `touch.is_beyond`."""
     if system.cell.touch is None:
         return False
     near, fingertip = state.active.touched, system.cell.touch.fingertip
