@@ -27,8 +27,7 @@ from digiclay.live.recorded_strokes import PointerStroke, play_strokes, read_str
 from digiclay.live.sculpting import begin_session
 from digiclay.pictures import stage
 from digiclay.pictures.still import add_picture_scene, apply_style, render_picture
-from digiclay.settings.beds import BEDS
-from digiclay.settings.devices import make_scene
+from digiclay.settings.devices import BEDS, make_scene
 from numpy.typing import NDArray
 
 from .report import add_kind, kept, made_with, progress

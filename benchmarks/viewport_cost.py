@@ -15,11 +15,12 @@ import numpy as np
 from digiclay import bridge
 from digiclay.compat import bpy, scratch
 from digiclay.core.model.layout import Layout
-from digiclay.device import display, form, view
+from digiclay.device import form, view
 from digiclay.device.instant import Instant, find_ellipsoid
 from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.live.waiting import blocking_reason
 from digiclay.operators.add_bed import add, select_only
+from digiclay.panels import display
 from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
 

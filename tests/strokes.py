@@ -11,8 +11,7 @@ from digiclay.live import sculpting
 from digiclay.live.running import Running
 from digiclay.live.stroke import Brush, draw
 from digiclay.live.stroke_queue import change_stroke, queue_stroke
-from digiclay.settings.beds import BEDS
-from digiclay.settings.devices import make_scene
+from digiclay.settings.devices import BEDS, make_scene
 from numpy.typing import NDArray
 
 from tests.hand import TICK, heights

@@ -13,7 +13,7 @@ from .compat import bpy
 from .core.base.arrays import Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import Fingertip
-from .device.primitives import ELLIPSOID, ROLE, Shape
+from .roles import ELLIPSOID, ROLE
 from .ui_text import localize
 
 #: Blender units per meter of the device: a millimeter is drawn as a hundredth of a unit,
@@ -32,7 +32,7 @@ AXES = "digiclay_axes"
 ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np.float32)}
 
 
-def mesh(name: str, shape: Shape, smooth_below: float = 0.6) -> Any:
+def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: float = 0.6) -> Any:
     """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad.
 
     `shape`: lengths in Blender units; `smooth_below`, rad.

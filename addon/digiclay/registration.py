@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 
 from . import command_line, manual_map, operators, panels, preferences, translations
-from .device import detail, display, unit
+from .device import detail, unit
 from .exchange import image_reader
 from .live import handlers
 from .press import brush_presets, tool
@@ -15,7 +15,6 @@ from .settings import properties
 MODULES: tuple[ModuleType, ...] = (
     properties,
     image_reader,
-    display,
     preferences,
     brush_presets,
     operators,

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 from digiclay.device import unit, view
-from digiclay.device.primitives import BALL, FINGER, HOUSING, OWNED, ROLE
+from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE
 
 
 def done(step: str) -> None:

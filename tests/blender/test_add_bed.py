@@ -17,7 +17,7 @@ from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
 from digiclay.settings import own_presets, properties
-from digiclay.settings.beds import BEDS
+from digiclay.settings.devices import BEDS
 
 from tests.timeouts import TIMEOUT
 

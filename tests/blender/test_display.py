@@ -13,11 +13,13 @@ from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import Mode
 from digiclay.core.session.accuracy import Errors
-from digiclay.device import display, palettes, view
+from digiclay.device import palettes, view
 from digiclay.live import bed_state, running, sculpting
+from digiclay.operators.display import pick_pins
 from digiclay.overlay import views
 from digiclay.overlay.picture import choose_colors
 from digiclay.overlay.placement import lay_out
+from digiclay.panels import display
 from digiclay.panels.live_session import error_line
 from digiclay.settings import properties
 
@@ -42,7 +44,7 @@ def session(bed: Any) -> Iterator[running.Running]:
     pressed[2] = 0.037
     begun = sculpting.advance(begun, above, 0.0, 100)
     for tick in range(1, 11):
-        begun = sculpting.advance(begun, pressed, tick / 30, 100, pins=display.picked_pins(bed))
+        begun = sculpting.advance(begun, pressed, tick / 30, 100, pins=view.picked_pins(bed))
     # The trace keeps every other period: it ends with this state.
     while begun.state.period % begun.trace.every:
         begun = sculpting.advance(sculpting.request_step(begun), pressed, 1.0, 100)
@@ -147,11 +149,11 @@ def test_panel_and_overlay_say_the_same_of_the_error(
 
 
 def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(bed: Any) -> None:
-    display.pick_pins(bed, (7, 399, 0))
-    assert display.picked_pins(bed) == (7, 399, 0)
-    assert display.picked_pins(bed.copy()) == (7, 399, 0)
+    pick_pins(bed, (7, 399, 0))
+    assert view.picked_pins(bed) == (7, 399, 0)
+    assert view.picked_pins(bed.copy()) == (7, 399, 0)
     assert bpy.ops.digiclay.clear_pins() == {"FINISHED"}
-    assert display.picked_pins(bed) == ()
+    assert view.picked_pins(bed) == ()
     assert not bpy.ops.digiclay.clear_pins.poll()
 
 
@@ -161,8 +163,8 @@ def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(bed: An
 )
 def test_pins_that_cannot_be_picked_are_refused(bed: Any, pins: tuple[int, ...], said: str) -> None:
     with pytest.raises(DigiclayError, match=said):
-        display.pick_pins(bed, pins)
-    assert display.picked_pins(bed) == ()
+        pick_pins(bed, pins)
+    assert view.picked_pins(bed) == ()
 
 
 def test_the_panel_display_stands_in_the_sidebar(bed: Any) -> None:

@@ -12,7 +12,7 @@ import bpy
 import digiclay
 import pytest
 from digiclay import manual_map
-from digiclay.device.display import Display
+from digiclay.panels.display import Display
 from digiclay.settings.groups import CLASSES
 
 #: A program that a test has Blender take for the browser: it writes down the address it is given.

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from digiclay.bridge import SCALE
 from digiclay.device import view
-from digiclay.device.primitives import ROLE
 from digiclay.live import running
 from digiclay.press import aim
+from digiclay.roles import ROLE
 from mathutils import Vector
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.

@@ -17,8 +17,8 @@ from digiclay.core.scene.scene_source import find, list_samples, load
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.settings import properties
+from digiclay.settings.declared import read
 from digiclay.settings.shown_units import unit_of
-from digiclay.settings.table import read
 
 pytestmark = pytest.mark.usefixtures("extension")
 

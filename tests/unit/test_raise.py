@@ -21,8 +21,7 @@ from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
 from digiclay.live.stroke import DEEPEST, Brush, start
 from digiclay.live.tracking import find_tracking
-from digiclay.settings.beds import BEDS
-from digiclay.settings.devices import make_scene
+from digiclay.settings.devices import BEDS, make_scene
 from numpy.typing import NDArray
 
 from tests.hand import TICK, heights

@@ -15,8 +15,7 @@ from digiclay.live.recorded_strokes import PointerStroke, play_strokes, read_str
 from digiclay.live.running import Running
 from digiclay.live.sculpting import begin_session
 from digiclay.live.stroke import Brush
-from digiclay.settings.beds import BEDS, FIRST
-from digiclay.settings.devices import make_scene
+from digiclay.settings.devices import BEDS, FIRST, make_scene
 
 from benchmarks.made import RELIEFS, STROKES, find_relief, make
 from tests.hand import heights

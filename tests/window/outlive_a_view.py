@@ -35,7 +35,7 @@ def script(blender: Any) -> Iterator[float | None]:
 
 def pick(blender: Any) -> Iterator[float | None]:
     """Begin to pick in one workspace, and go on in another; there, click beside all views as well."""
-    picked = blender.part("device.display").picked_pins
+    picked = blender.part("device.view").picked_pins
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
     yield from click(blender, blender.on_the_bed(-6, -9))

@@ -68,7 +68,7 @@ def note(blender: Any, name: str) -> None:
         "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
         "overlay": blender.part("overlay.views").shown(),
         "forces written": bool(blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()),
-        "picked": list(blender.part("device.display").picked_pins(blender.beds()[0])),
+        "picked": list(blender.part("device.view").picked_pins(blender.beds()[0])),
     }
 
 

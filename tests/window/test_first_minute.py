@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.settings.beds import BEDS, FIRST
+from digiclay.settings.devices import BEDS, FIRST
 
 from tests.window.blender_window import played
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.settings.beds import BEDS
+from digiclay.settings.devices import BEDS
 
 from benchmarks.made import find_relief
 from tests.window.blender_window import played

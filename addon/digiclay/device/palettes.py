@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..bridge import linear, srgb
 from ..compat import bpy, shader_nodes
 from ..core.base.modes import COLORS, Mode
-from .primitives import ROLE
+from ..roles import ROLE
 
 Color = tuple[float, float, float]
 

@@ -10,9 +10,9 @@ from .. import bridge
 from ..bridge import SCALE
 from ..compat import bpy, shader_nodes
 from ..core.base.modes import COLORS, Mode
+from ..roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 from . import heat, primitives
 from .instant import Instant
-from .primitives import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 from .skin_lattice import choose_parts, make_lattice
 from .skin_nodes import SkinMeshes, make_meshes
 
@@ -160,19 +160,6 @@ def lock_in_place(ball: Any) -> None:
     """Have an ellipsoid selected by a click, and moved by its fingertip alone."""
     ball.hide_select = False
     ball.lock_location = ball.lock_rotation = ball.lock_scale = (True, True, True)
-
-
-def ellipsoid(tip: Any) -> Any | None:
-    """Return the ellipsoid of a fingertip, or None when the user has deleted it."""
-    ball = tip.get(BALL)
-    if ball is None:  # older files do not have it as a property
-        ball = next((child for child in tip.children if child.get(ROLE) == ELLIPSOID), None)
-    return ball if ball is not None and ball.parent == tip and is_linked(ball) else None
-
-
-def is_linked(thing: Any) -> bool:
-    """Return whether an object stands in any collection: what is deleted but held by a property does not."""
-    return bool(thing.users_collection)
 
 
 def finger_material(clear: bool) -> Any:

@@ -1,4 +1,4 @@
-"""Parts of the device: their roles, and primitive shapes as vertices and faces; numpy only, no Blender."""
+"""Primitive shapes of the device's parts as vertices and faces; numpy only, no Blender."""
 
 from __future__ import annotations
 
@@ -8,18 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.base.arrays import Floats
-
-#: Property that holds an object's role.
-ROLE = "digiclay_role"
-#: A housing is an object of its own in older files only. A pin is whatever the bed's nodes draw, and a bake
-#: holds baked pins: both stand in no scene.
-BED, FINGERTIP, ELLIPSOID, HOUSING, PIN, BAKE = "bed", "fingertip", "ellipsoid", "housing", "pin", "bake"
-#: Properties by which a bed holds its fingertip, and that its ellipsoid: what is held is appended along.
-FINGER, BALL = "digiclay_fingertip", "digiclay_ellipsoid"
-#: Marks what was seen to belong to a bed: only that can be left behind by one. What older files have lying
-#: about without a bed stays.
-OWNED = "digiclay_owned"
-
 
 #: Vertices (k, 3) and faces (tuples of vertex indices, counter-clockwise from outside).
 Shape = tuple[Floats, list[tuple[int, ...]]]

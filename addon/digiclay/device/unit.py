@@ -14,10 +14,23 @@ from ..compat import bpy, own_curves
 from ..core.base.errors import DigiclayError
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
+from ..roles import (
+    BAKE,
+    BALL,
+    BED,
+    ELLIPSOID,
+    FINGER,
+    FINGERTIP,
+    HOUSING,
+    OWNED,
+    PIN,
+    ROLE,
+    ellipsoid,
+    is_linked,
+)
 from ..settings import properties
 from . import parts, view
 from .instant import Instant, find_ellipsoid
-from .primitives import BAKE, BALL, BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, OWNED, PIN, ROLE
 
 #: Marks what was hidden along with what it belongs to: only that is shown along with it again.
 HIDDEN = "digiclay_hidden"
@@ -53,7 +66,7 @@ def mark_parts() -> frozenset[int]:
         if bed.get(FINGER) != tip:  # an older file
             bed[FINGER] = tip
             view.hold_parts(bed)
-        ball = parts.ellipsoid(tip)
+        ball = ellipsoid(tip)
         if ball is not None and tip.get(BALL) != ball:
             tip[BALL] = ball
         if ball is not None and not any(ball.lock_location):  # an older file: it could not be clicked on
@@ -75,10 +88,10 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
         bed for bed in _beds() if view.fingertip_of(bed) is None and _lacks_part(bed, FINGER, known, mended)
     ]
     tips = (thing for thing in bpy.data.objects if thing.get(ROLE) == FINGERTIP and not thing.library)
-    bare += [tip for tip in tips if parts.is_linked(tip) and _lacks_part(tip, BALL, known, mended)]
+    bare += [tip for tip in tips if is_linked(tip) and _lacks_part(tip, BALL, known, mended)]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
     # Deleted along with its bed a fingertip may stand nowhere, and have no user any more.
-    left = [thing for thing in mine if not thing.users or (parts.is_linked(thing) and _is_orphan(thing))]
+    left = [thing for thing in mine if not thing.users or (is_linked(thing) and _is_orphan(thing))]
     shown = {thing for scene in bpy.data.scenes for thing in scene.objects if thing.get(ROLE) in (PIN, BAKE)}
     strewn = [thing for thing in shown if thing.session_uid not in known - mended and not thing.library]
     return Faults(bare, left, strewn)
@@ -124,7 +137,7 @@ def follow_visibility() -> None:
         if tip is None:
             continue
         _hide_along(bed, tip)
-        ball = parts.ellipsoid(tip)
+        ball = ellipsoid(tip)
         if ball is not None:
             _hide_along(tip, ball)
 
@@ -133,7 +146,7 @@ def follow_selection() -> None:
     """Have a fingertip selected where its ellipsoid is, and active: a click on the ball takes hold of it."""
     layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers]
     for tip in filter(None, map(view.fingertip_of, _beds())):
-        ball = parts.ellipsoid(tip)
+        ball = ellipsoid(tip)
         if ball is None:
             continue
         for layer in layers:
@@ -150,11 +163,7 @@ def follow_selection() -> None:
 def _beds() -> list[Any]:
     """Return the beds of this file that stand in a collection."""
     every = (thing for thing in bpy.data.objects if thing.get(ROLE) == BED)
-    return [
-        thing
-        for thing in every
-        if not thing.library and not thing.override_library and parts.is_linked(thing)
-    ]
+    return [thing for thing in every if not thing.library and not thing.override_library and is_linked(thing)]
 
 
 def _lacks_part(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) -> bool:
@@ -175,10 +184,10 @@ def _is_orphan(part: Any) -> bool:
     """Return whether nothing that stands has this part any more."""
     kind, held = (FINGERTIP, BALL) if part.get(ROLE) == ELLIPSOID else (BED, FINGER)
     owner = part.parent
-    if owner is not None and owner.get(ROLE) == kind and parts.is_linked(owner):
+    if owner is not None and owner.get(ROLE) == kind and is_linked(owner):
         return False
     # With its parent cleared or exchanged by hand it is still held by its bed, and stays as long as that.
-    return not any(thing.get(held) == part and parts.is_linked(thing) for thing in bpy.data.objects)
+    return not any(thing.get(held) == part and is_linked(thing) for thing in bpy.data.objects)
 
 
 def _complete(bed: Any) -> None:

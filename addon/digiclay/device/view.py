@@ -21,24 +21,45 @@ from ..compat import node_setting, set_node_setting
 from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
+from ..roles import (
+    BED,
+    ELLIPSOID,
+    FINGERTIP,
+    HOUSING,
+    ROLE,
+    bed_of,
+    ellipsoid,
+    fingertip_of,
+    is_bed,
+    is_edited,
+)
 from . import parts
 from .form import find_modifier, require_modifier
 from .instant import Instant
 from .node_tree import ARROW_LENGTH, ARROWS, CASE, COLOR_BY_FORCE, SOURCES, TOP_FORCE, bed_nodes
-from .parts import is_linked, material
-from .primitives import BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, ROLE
+from .parts import material
 
 __all__ = [
     "BED", "COLORINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "add_modifier", "arrow_length",
     "bed_of", "build", "color_by", "color_source", "fingertip_of", "hold_parts", "housing_of", "is_bed",
-    "is_drawn", "is_edited", "material", "scale_arrows", "scale_colors", "show", "show_arrows", "show_state",
-    "shows_arrows", "shows_force", "sources_of", "top_color", "underside", "wants_force",
+    "is_drawn", "is_edited", "material", "picked_pins", "scale_arrows", "scale_colors", "show",
+    "show_arrows", "show_state", "shows_arrows", "shows_force", "sources_of", "top_color", "underside",
+    "wants_force",
 ]  # fmt: skip
 
 #: What the color of a pin can tell.
 COLORINGS = ("mode", "force")
 #: Name of the bed's modifier.
 MODIFIER = "Pins"
+
+#: Marks a place no pin is picked for.
+NO_PIN = -1
+
+
+def picked_pins(bed: Any) -> tuple[int, ...]:
+    """Return the pins whose heights the overlay shows, in the order they were picked."""
+    display = getattr(bed, "digiclay_display", None)
+    return () if display is None else tuple(pin for pin in display.picked if pin != NO_PIN)
 
 
 def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
@@ -146,7 +167,7 @@ def show_arrows(bed: Any, on: bool) -> None:
     """
     set_node_setting(require_modifier(bed), ARROWS, bool(on))
     tip = fingertip_of(bed)
-    ball = parts.ellipsoid(tip) if tip is not None else None
+    ball = ellipsoid(tip) if tip is not None else None
     if ball is not None:
         ball.material_slots[0].material = parts.finger_material(clear=bool(on))
 
@@ -174,33 +195,6 @@ def wants_force(bed: Any) -> bool:
 def is_drawn(bed: Any) -> bool:
     """Return whether the bed still has the modifier that draws its pins."""
     return find_modifier(bed) is not None
-
-
-def is_bed(thing: Any) -> bool:
-    """Return whether an object is a bed of this extension."""
-    return thing is not None and thing.get(ROLE) == BED and thing.type == "MESH"
-
-
-def bed_of(context: Any) -> Any:
-    """Return the bed the active object is or belongs to, be it fingertip, housing or a part; None without."""
-    thing = getattr(context, "object", None)
-    while thing is not None and not is_bed(thing):
-        thing = thing.parent
-    return thing
-
-
-def is_edited(context: Any) -> bool:
-    """Return whether the active object, or the bed it belongs to, is being edited, painted or posed."""
-    bed = bed_of(context)
-    return context.mode != "OBJECT" or (bed is not None and bed.mode != "OBJECT")
-
-
-def fingertip_of(bed: Any) -> Any | None:
-    """Return the fingertip that belongs to a bed, or None when the user has deleted it."""
-    tip = bed.get(FINGER)
-    if tip is None:  # older files do not have it as a property
-        tip = next((child for child in bed.children if child.get(ROLE) == FINGERTIP), None)
-    return tip if tip is not None and tip.parent == bed and is_linked(tip) else None
 
 
 def housing_of(bed: Any) -> Any | None:

@@ -22,8 +22,7 @@ from ..core.model.fingertip import Fingertip
 from ..core.scene.scene_source import read_table
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
-from ..settings.beds import BEDS
-from ..settings.devices import change_finger
+from ..settings.devices import BEDS, change_finger
 from .running import Running
 from .sculpting import change_scene, follow_finger
 from .stroke import DEEPEST, SHALLOWEST, SYMMETRIES, Brush, Stroke, draw, lay_line, lay_path, lay_ring, pull

@@ -13,7 +13,7 @@ import numpy as np
 from .. import bridge, preferences
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError, DivergenceError, MethodError
-from ..device import display, unit, view
+from ..device import unit, view
 from ..device.instant import find_ellipsoid
 from ..recorded import takes
 from ..recorded.bake import is_baked
@@ -162,7 +162,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         # The finger of a stroke is where the session has put it.
         pose = session.pose if session.strokes else followed
         pose = bridge.pose(view.fingertip_of(bed)) if pose is None else pose
-        later = sculpting.advance(session, pose, now, most, display.picked_pins(bed))
+        later = sculpting.advance(session, pose, now, most, view.picked_pins(bed))
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)

@@ -1,23 +1,23 @@
 """Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip; Rebuild: a bed from its settings."""
 
+from collections.abc import Iterable
 from typing import Any
 
-from .. import preferences
+from .. import bridge, preferences
 from ..compat import bpy
 from ..core.control.methods import METHODS
 from ..core.model.layout import ARRANGEMENTS, Layout
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
-from ..device import palettes, rebuild, view
+from ..device import palettes, view
 from ..device.instant import Instant, find_ellipsoid
-from ..device.primitives import BALL
 from ..device.view import bed_of
-from ..live import running
+from ..live import bed_state, running
 from ..press.free_place import find_free_place
+from ..roles import BALL, FINGER
 from ..settings import own_presets, properties
-from ..settings.beds import BEDS, FIRST, UNNAMED
 from ..settings.declared import title
-from ..settings.devices import make_scene
+from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import SHOWN, to_si
 from ..ui_text import localize
@@ -183,7 +183,7 @@ class Rebuild(Action, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         """Make it anew."""
-        scene = rebuild.rebuild(bed_of(context))
+        scene = rebuild(bed_of(context))
         self.report(
             {"INFO"}, localize("The bed has {} x {} pins now", scene.layout.rows, scene.layout.columns)
         )
@@ -234,6 +234,64 @@ def frame(context: Any, bed: Any) -> None:
         bpy.ops.view3d.view_selected()
     for part in parts:
         part.select_set(False)
+
+
+def rebuild(bed: Any) -> Scene:
+    """Make a bed anew, at rest; its place, its fingertip and what else hangs on the object stay.
+
+    The state of a session is forgotten: it is of no use to other pins.
+
+    Returns what the bed now is. Raises ParameterError when the settings do not go together; the bed stays as
+    it is.
+    """
+    scene = properties.read_scene(bed)
+    instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
+    old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _node_modifiers(bed)]
+    made = view.build(instant, bed.users_collection[0], lowest=0.0)
+    bed.data = made.data
+    # The modifier stays, and with it how the bed is colored; only what it draws is another.
+    for kept, new in zip(_node_modifiers(bed), _node_modifiers(made), strict=False):
+        kept.node_group = new.node_group
+    tip = view.fingertip_of(bed)
+    if tip is None:
+        bed[FINGER] = view.fingertip_of(made)
+        bed[FINGER].parent = bed
+    else:
+        bridge.resize_fingertip(tip, instant.finger)
+    view.hold_parts(bed)
+    cases = [child for child in bed.children if child.get(view.ROLE) == view.HOUSING]
+    _remove_objects([*cases, *made.children_recursive, made])
+    for tree in old_trees:
+        _discard_tree(tree)
+    if not old_mesh.users:
+        bpy.data.meshes.remove(old_mesh)
+    bed_state.clear(bed)
+    return scene
+
+
+def _node_modifiers(bed: Any) -> list[Any]:
+    """Return the modifiers that draw a bed's pins."""
+    return [modifier for modifier in bed.modifiers if modifier.type == "NODES" and modifier.node_group]
+
+
+def _discard_tree(tree: Any) -> None:
+    """Remove the nodes that drew pins, with the pins; a copy of the bed may still be drawn by them."""
+    if tree.users:
+        return
+    held = [getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs]
+    collections = {thing for thing in held if isinstance(thing, bpy.types.Collection)}
+    objects = {thing for thing in held if isinstance(thing, bpy.types.Object)}
+    objects.update(*(collection.objects for collection in collections))
+    bpy.data.batch_remove([tree, *collections])
+    _remove_objects(objects)
+
+
+def _remove_objects(objects: Iterable[Any]) -> None:
+    """Remove objects, and the meshes only they have."""
+    objects = list(objects)
+    meshes = {thing.data for thing in objects if thing.type == "MESH"}
+    bpy.data.batch_remove(objects)
+    bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
 
 
 def entry(menu: Any, context: Any) -> None:

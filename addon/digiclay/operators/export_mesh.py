@@ -10,7 +10,7 @@ from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..device.view import bed_of
 from ..exchange import formed_bed
 from ..ui_text import localize
-from .mesh_options import SurfaceOptions, chosen_bed, sentence
+from .make_mesh import SurfaceOptions, chosen_bed, sentence
 
 #: Entries of the menu: words, icon, and the properties they stand for.
 ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (

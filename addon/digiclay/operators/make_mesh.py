@@ -1,4 +1,4 @@
-"""Make Mesh: the formed surface of a bed as new mesh objects."""
+"""Formed surface as mesh objects and as a list of features; options of these and of the export."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,11 +7,184 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.mesh_io.export_model import make_bodies
+from ..core.base.errors import OutputError
+from ..core.base.quantity import list_quantities
+from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
+from ..core.surface.features import Finding, summarize
+from ..core.surface.skins import SKINS
+from ..device.view import bed_of
 from ..exchange import body_mesh, formed_bed
+from ..panels.shape_exchange import LISTED
 from ..ui_text import localize
+from .action import Action
 from .add_bed import select_only
-from .mesh_options import SurfaceOptions, chosen_bed
+from .poll_messages import no_surface
+
+MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
+
+
+def sentence(text: str) -> str:
+    """Return a text as a tooltip: with a capital letter."""
+    return text[:1].upper() + text[1:]
+
+
+class SurfaceAction(Action):
+    """Mixin of an action on the surface of the active bed."""
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed with a surface is needed."""
+        return no_surface(context)
+
+
+class FindingOptions(SurfaceAction):
+    """Criteria of a feature."""
+
+    threshold: bpy.props.FloatProperty(
+        name="Threshold (mm)",
+        description=sentence(FINDING["threshold"].doc) + ", in mm",
+        default=Finding().threshold * 1e3,
+        min=0.001,
+        max=100.0,
+        precision=3,
+        step=10,
+    )
+    smallest: bpy.props.IntProperty(
+        name="Smallest (pins)",
+        description=sentence(FINDING["smallest"].doc),
+        default=Finding().smallest,
+        min=1,
+        max=1_000_000,
+        soft_max=100,
+    )
+
+    def finding(self) -> Finding:
+        """Return what counts as a feature."""
+        return Finding(threshold=float(f"{self.threshold:.7g}") * 1e-3, smallest=self.smallest)
+
+
+class SurfaceOptions(FindingOptions):
+    """Kind of mesh and skin."""
+
+    kind: bpy.props.EnumProperty(
+        name="Mesh",
+        description="Kind of mesh made of the formed surface",
+        items=[(name, sentence(name), sentence(said)) for name, said in KINDS.items()],
+        default=Model().kind,
+    )
+    skin: bpy.props.EnumProperty(
+        name="Skin",
+        description="Interpolation of the surface between the pins",
+        items=[(name, sentence(name), sentence(said)) for name, said in SKINS.items()],
+        default=Model().skin,
+    )
+    resolution: bpy.props.IntProperty(
+        name="Points a Pitch",
+        description=sentence(MODEL["resolution"].doc),
+        default=0,
+        min=0,
+        max=64,
+        soft_max=16,
+    )
+    base_thickness: bpy.props.FloatProperty(
+        name="Base (mm)",
+        description=sentence(MODEL["base_thickness"].doc) + ", in mm",
+        default=Model().base_thickness * 1e3,
+        min=0.01,
+        max=1000.0,
+        soft_max=50.0,
+        precision=2,
+        step=10,
+    )
+
+    def model(self, bed: Any) -> Model:
+        """Return what is to be made of a bed."""
+        return formed_bed.model(
+            bed,
+            kind=self.kind,
+            skin=self.skin,
+            resolution=self.resolution,
+            base_thickness=float(f"{self.base_thickness:.7g}") * 1e-3,
+        )
+
+    def draw_surface(self, layout: Any) -> None:
+        """Draw the properties; those without effect on what is made are grayed out."""
+        layout.prop(self, "kind")
+        column = layout.column()
+        column.active = self.kind != "pins"
+        column.prop(self, "skin")
+        column.prop(self, "resolution")
+        row = layout.row()
+        row.active = self.kind in ("solid", "pins")
+        row.prop(self, "base_thickness")
+        column = layout.column(heading="Features")
+        column.prop(self, "threshold")
+        column.prop(self, "smallest")
+
+
+def chosen_bed(context: Any) -> Any:
+    """Return the bed to work on. Raises OutputError when it has gone since the operator was called."""
+    bed = bed_of(context)
+    if bed is None:
+        raise OutputError("There is no bed any more: select one, or its fingertip.")
+    return bed
+
+
+class FindFeatures(FindingOptions, bpy.types.Operator):
+    """Find the bosses and creases of the active bed and list them in the panel"""
+
+    bl_idname = "digiclay.find_features"
+    bl_label = "List Features"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def perform(self, context: Any) -> None:
+        """Find them."""
+        bed = chosen_bed(context)
+        found = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
+        lines = [summarize(found)]
+        for one in found:
+            extreme = f"{one.extreme * 1e3:.1f} mm {'high' if one.kind == 'boss' else 'deep'}"
+            crest = f", crest {one.crest_length * 1e3:.0f} mm" if one.crests else ""
+            lines.append(f"{one.name}: {extreme}{crest}, {one.form}")
+            lines.append(f"    {one.area * 1e6:.0f} mm², {one.volume * 1e9:.0f} mm³, {len(one.pins)} pins")
+        bed[LISTED] = "\n".join(lines)
+        self.report({"INFO"}, lines[0])
+
+
+class KeepSurface(SurfaceAction, bpy.types.Operator):
+    """Measure features from the current surface"""
+
+    bl_idname = "digiclay.keep_surface"
+    bl_label = "Measure from Here"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def perform(self, context: Any) -> None:
+        """Keep the surface."""
+        formed_bed.set_reference(chosen_bed(context))
+
+
+class ForgetSurface(SurfaceAction, bpy.types.Operator):
+    """Measure features from the bed at rest again"""
+
+    bl_idname = "digiclay.forget_surface"
+    bl_label = "Measure from Rest"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed is needed whose surface was kept."""
+        return no_surface(context) or _from_rest(context)
+
+    def perform(self, context: Any) -> None:
+        """Forget the surface."""
+        formed_bed.clear_reference(chosen_bed(context))
+
+
+def _from_rest(context: Any) -> str:
+    """No surface was kept to measure features from."""
+    kept = formed_bed.has_reference(chosen_bed(context))
+    return "" if kept else "Features are measured from the bed at rest already"
+
 
 #: Space between the bed and what is put beside it, in widths of the bed.
 GAP = 0.35

@@ -1,4 +1,4 @@
-"""Scene files and samples as beds: Add menu, file dialog, drop into the 3D view."""
+"""Scene files, samples and recorded runs as beds: menus, file dialogs, drop into the 3D view."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,14 +13,42 @@ from ..core.scene.toml_table import resolve
 from ..core.shapes.request import Shape
 from ..core.shapes.source_file import list_shapes
 from ..device import view
-from ..device.instant import find_ellipsoid, pick_pose
+from ..device.instant import find_ellipsoid, pick_pose, read
 from ..exchange import shape_show
 from ..recorded import takes
 from ..settings.declared import title
 from ..ui_text import localize
 from .action import Action, FileAction
-from .add_bed import Placed, add
+from .add_bed import Placed, add, add_shown
 from .poll_messages import edited
+
+
+class ImportRun(Placed, FileAction, bpy.types.Operator):
+    """Show one instant of a Digital Clay run as a bed of pins"""
+
+    bl_idname = "import_scene.digital_clay_run"
+    bl_label = "Import Digital Clay Run"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})
+    filter_glob: bpy.props.StringProperty(default="*.npz", options={"HIDDEN"})
+    row: bpy.props.IntProperty(
+        name="Row",
+        description="Recorded row to show: 0 is the first, -1 the last",
+        default=-1,
+    )
+
+    def perform(self, context: Any) -> None:
+        """Read the run and build the bed at the 3D cursor."""
+        path = Path(bpy.path.abspath(self.filepath))
+        instant, scene = read(path, self.row), load(path.with_name("scene.toml"))
+        bed = add_shown(context, scene, instant)
+        self.place(context, bed)
+
+
+def import_entry(menu: Any, context: Any) -> None:
+    """Draw the import_entry in File > Import. `menu` bpy.types.Menu; `context` bpy.types.Context."""
+    menu.layout.operator(ImportRun.bl_idname, text="Digital Clay run (.npz)")
 
 
 class AddSceneAction(Placed, Action):

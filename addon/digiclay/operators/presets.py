@@ -1,13 +1,14 @@
-"""Presets of a device: apply, save, remove."""
+"""Presets of a device: apply, save, remove; own control methods are loaded again."""
 
 from dataclasses import replace
 from typing import Any
 
+from .. import preferences
 from ..compat import bpy
 from ..core.scene.scene_source import load
 from ..core.scene.toml_table import PRESETS
 from ..device.view import bed_of
-from ..settings import own_presets, properties
+from ..settings import own_folder, own_presets, properties
 from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
 from ..ui_text import localize
@@ -108,3 +109,24 @@ def _no_own_preset(context: Any) -> str:
     """The bed's parameters are of no preset of the user's own."""
     own = bed_of(context).digiclay.own_preset in own_presets.names()
     return "" if own else "Apply a preset of your own first: those that come along cannot be removed"
+
+
+class ReloadMethods(Action, bpy.types.Operator):
+    """Run the Python files of the folder of own control methods again; running sessions keep their method"""
+
+    bl_idname = "digiclay.methods_reload"
+    bl_label = "Reload Methods"
+    in_any_mode = True
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """The preferences must allow code of the folder."""
+        return "" if preferences.get(context).run_own_methods else "Turn on Run Own Methods first"
+
+    def perform(self, context: Any) -> None:
+        """Run them."""
+        preferences.take_methods(preferences.get(context), context)
+        found = own_folder.read_present()
+        for line in found.refused:
+            self.report({"WARNING"}, line)
+        self.report({"INFO"}, localize("{} control methods loaded", len(found.names)))

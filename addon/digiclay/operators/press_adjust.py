@@ -1,18 +1,220 @@
-"""Size, depth and strength of the Press tool."""
+"""Size, depth and strength of the Press tool, by changed by the mouse as in Blender's radial control."""
 
 from typing import Any
 
 import numpy as np
 
+from .. import bridge
 from ..compat import bpy
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
+from ..device import view
 from ..live.stroke import DEEPEST, SHALLOWEST, Brush
-from ..press import aim, brush
+from ..press import aim, brush, marks
 from ..settings import finger_size
 from ..ui_text import localize
-from .action import Action
-from .radial import AdjustMixin, no_bed
+from . import status
+from .action import Action, Polled
+
+#: Factor of the mouse's way with Shift held.
+PRECISE = 0.1
+#: Events that are Blender's: timers, on which sessions go on, and the ways to turn the view.
+PASSED = ("TIMER", "MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF")
+KEYS = (
+    "{}  |  Move sideways or type a value  |  Ctrl: steps, Shift: precise  |  "
+    "Enter or click: confirm  |  Esc or right click: cancel"
+)
+
+
+class AdjustMixin(Polled):
+    """Mixin of an operator that changes one number by the mouse or the keyboard.
+
+    A subclass reads, writes, parses and names its number, in SI.
+    """
+
+    #: Range of the number, and the steps it takes with Ctrl held.
+    low: float
+    high: float
+    snap: float
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """The Press tool is needed, and a bed with a fingertip."""
+        return no_tool(context)
+
+    def read(self, bed: Any, settings: Any) -> float:
+        """Return the number now, from the bed or from the settings of the tool.
+
+        `bed` bpy.types.Object; `settings` bpy.types.PropertyGroup, of the tool.
+        """
+        raise NotImplementedError
+
+    def write(self, bed: Any, settings: Any, value: float) -> None:
+        """Set the number. `bed` bpy.types.Object; `settings` bpy.types.PropertyGroup, of the tool."""
+        raise NotImplementedError
+
+    def parse(self, text: str) -> float:
+        """Return the number of a typed text; a ValueError tells that it is none."""
+        return float(bpy.utils.units.to_value("METRIC", "LENGTH", text, str_ref_unit="mm"))
+
+    def rate(self, context: Any, bed: Any) -> float:
+        """Return the change of the number for a pixel.
+
+        `context` bpy.types.Context; `bed` bpy.types.Object.
+        """
+        raise NotImplementedError
+
+    def say(self, value: float) -> str:
+        """Return the number with its name and unit."""
+        raise NotImplementedError
+
+    def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
+        """Return outlines (k, 2) about the place pointed at that show the number, m.
+
+        `turn` sequence of float, quaternion wxyz; `depth`, `value`: m; the number.
+        """
+        raise NotImplementedError
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Begin at the place under the mouse; beside a bed, in the middle of the one it is about."""
+        xy = event.mouse_region_x, event.mouse_region_y
+        bed, center = find_place(context, xy)
+        self.uid, self.center = bed.session_uid, center
+        self.start = self.value = self.read(bed, brush.tool_settings(context))
+        self.before, self.text, self.snapped, self.region = event.mouse_x, "", False, context.region
+        self.handler = bpy.types.SpaceView3D.draw_handler_add(
+            self._draw, (context.area,), "WINDOW", "POST_PIXEL"
+        )
+        context.window_manager.modal_handler_add(self)
+        self._tell(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Follow the mouse or the keyboard, until confirmed or cancelled."""
+        bed = brush.find_bed(context, self.uid)
+        if bed is None or not self.poll(context):
+            return self._end(context, {"CANCELLED", "PASS_THROUGH"})
+        if event.type.startswith(PASSED):
+            return {"PASS_THROUGH"}
+        self.snapped = event.ctrl
+        if event.type == "MOUSEMOVE":
+            self._move(context, bed, event)
+        elif event.value == "PRESS" and event.type in ("LEFTMOUSE", "RET", "NUMPAD_ENTER"):
+            value = self._shown()
+            if value != self.start:
+                self.write(bed, brush.tool_settings(context), value)
+            return self._end(context, {"FINISHED" if value != self.start else "CANCELLED"})
+        elif event.value == "PRESS" and event.type in ("ESC", "RIGHTMOUSE"):
+            return self._end(context, {"CANCELLED"})
+        elif event.value == "PRESS":
+            self._type(event)
+        self._tell(context)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: Any) -> None:
+        """Blender ends the operator, for instance to load a file."""
+        self._end(context, set())
+
+    def _move(self, context: Any, bed: Any, event: Any) -> None:
+        """Follow the mouse sideways; what is typed holds against it."""
+        way, self.before = event.mouse_x - self.before, event.mouse_x
+        if not self.text:
+            share = PRECISE if event.shift else 1.0
+            with context.temp_override(region=self.region):
+                rate = self.rate(bpy.context, bed)
+            self.value = min(max(self.value + way * share * rate, self.low), self.high)
+
+    def _type(self, event: Any) -> None:
+        """Take a typed letter."""
+        if event.type == "BACK_SPACE":
+            self.text = self.text[:-1]
+        elif event.ascii and event.ascii.isprintable():
+            self.text += event.ascii
+
+    def _shown(self) -> float:
+        """Return the number as it is shown, and would be set."""
+        if self.text:
+            try:
+                value = self.parse(self.text)
+            except ValueError:
+                return self.start
+        else:
+            value = round(self.value / self.snap) * self.snap if self.snapped else self.value
+        return min(max(value, self.low), self.high) if np.isfinite(value) else self.start
+
+    def _tell(self, context: Any) -> None:
+        """Show the number in the status bar, and draw it."""
+        value = self._shown()
+        typed = f"   [{self.text}]" if self.text else ""
+        self.words = self.say(value) + typed
+        status.show(context, localize(KEYS, self.words))
+        for area in context.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+    def _draw(self, area: Any) -> None:
+        """Draw outline and number in the view the operator was called in."""
+        context = bpy.context
+        bed = brush.find_bed(context, self.uid)
+        tip = bed and view.fingertip_of(bed)
+        if tip is None or context.area != area or not self.poll(context):
+            return
+        from ..overlay.draw import cursor
+
+        settings = brush.tool_settings(context)
+        depth = 1e-3 * settings.depth if settings else DEEPEST
+        finger, turn = bridge.finger_of(tip), bridge.pose(tip)[3:]
+        rims = self.outlines(finger, turn, depth, self._shown())
+        places = [np.column_stack([rim, np.zeros(len(rim))]) + self.center for rim in rims]
+        lines = [aim.project(context, bed, place) for place in places]
+        middle = aim.project(context, bed, self.center[None])[0]
+        scale = context.preferences.system.ui_scale
+        shown = [np.concatenate([line, line[:1]]) for line in lines if np.isfinite(line).all()]
+        cursor(
+            marks.make_lines(shown, context.preferences.system.pixel_size),
+            marks.make_label(self.words, (middle[0], middle[1]), scale),
+        )
+
+    def _end(self, context: Any, result: set[str]) -> set[str]:
+        """Give back status bar and view."""
+        status.clear()
+        if self.handler is not None:
+            bpy.types.SpaceView3D.draw_handler_remove(self.handler, "WINDOW")
+            self.handler = None
+        for area in context.screen.areas if context.screen else ():
+            area.tag_redraw()
+        return result
+
+
+def no_tool(context: Any) -> str:
+    """There is no view with the Press tool, or no bed for it."""
+    if context.area is None or context.area.type != "VIEW_3D" or brush.tool_settings(context) is None:
+        return "Select the Press tool in a 3D view"
+    return no_finger(context)
+
+
+def no_finger(context: Any) -> str:
+    """There is no bed whose fingertip could be scaled."""
+    bed = brush.bed_in_use(context)
+    if bed is None or view.fingertip_of(bed) is None:
+        return "Select a bed of Digital Clay, or its fingertip"
+    if bed.library is not None:
+        return "The bed is linked from another file: make it local first"
+    return bridge.find_scale_fault(bed)
+
+
+def find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:
+    """Return the bed under the mouse and the place there, m; or the bed in use and its middle.
+
+    `context` bpy.types.Context; `xy` (float, float), pixels in the region.
+    """
+    found = aim.find_target(context, xy)
+    if found is not None and view.fingertip_of(found.bed) is not None and found.bed.library is None:
+        return found.bed, found.point
+    bed: Any = brush.bed_in_use(context)
+    height = bridge.read_cells(bed.data)["height"]
+    return bed, np.array([0.0, 0.0, float(height.mean())])
+
 
 #: Change of the depth, m, and of the strength, for a pixel at a UI scale of 1.
 DEPTH_PIXEL, STRENGTH_PIXEL = 0.05e-3, 0.005
@@ -131,7 +333,7 @@ class ScaleSize(Action, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """A bed with a fingertip is needed."""
-        return no_bed(context)
+        return no_finger(context)
 
     def perform(self, context: Any) -> None:
         """Scale it."""

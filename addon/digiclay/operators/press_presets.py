@@ -1,4 +1,4 @@
-"""Brush presets: menu, and operators that apply, save and remove one."""
+"""Presets of the Press tool: fingers and brushes."""
 
 from typing import Any
 
@@ -7,8 +7,59 @@ from bl_operators.presets import AddPresetBase  # type: ignore[import-not-found]
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..press import brush, brush_presets
+from ..press.fingers import FINGERS
+from ..settings import finger_size
+from ..ui_text import localize
 from .action import Action, Polled
-from .radial import no_tool
+from .press_adjust import no_finger, no_tool
+
+
+class TakeFinger(Action, bpy.types.Operator):
+    """Give the fingertip the form of a finger, a palm or a tool; its blister follows"""
+
+    bl_idname = "digiclay.press_finger"
+    bl_label = "Preset Finger"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: bpy.props.EnumProperty(
+        name="Finger",
+        description="Form and size of the fingertip",
+        items=[(name, kind.label, kind.source) for name, kind in FINGERS.items()],
+    )
+
+    @classmethod
+    def description(cls, context: Any, chosen: Any) -> str:
+        """Return measures and source of a finger.
+
+        `context` bpy.types.Context; `chosen` bpy.types.OperatorProperties, the operator's settings.
+        """
+        kind = FINGERS[chosen.kind]
+        axes = (kind.finger.length, kind.finger.width, kind.finger.height)
+        measures = " × ".join(f"{2e3 * axis:g}" for axis in axes)
+        return localize("{} mm: {}. The blister follows, the contact law stays", measures, kind.source)
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed with a fingertip is needed."""
+        return no_finger(context)
+
+    def perform(self, context: Any) -> None:
+        """Give it the form."""
+        bed: Any = brush.bed_in_use(context)
+        finger_size.resize(bed.digiclay, FINGERS[self.kind].finger)
+
+
+class FingerMenu(bpy.types.Menu):
+    """Preset fingers."""
+
+    bl_idname = "DIGICLAY_MT_fingers"
+    bl_label = "Finger"
+
+    def draw(self, context: Any) -> None:
+        """Draw one entry a finger."""
+        for name, kind in FINGERS.items():
+            entry = self.layout.operator(TakeFinger.bl_idname, text=kind.label)
+            entry.kind = name
 
 
 class ApplyBrush(Action, bpy.types.Operator):

@@ -1,4 +1,4 @@
-"""Actions on takes: record, keep, write as a scene file for `digiclay run`, remove."""
+"""Actions on takes: record, keep, export, remove; recorded strokes are played."""
 
 from pathlib import Path
 from typing import Any
@@ -9,11 +9,12 @@ from ..core.files.run_folder import write_whole
 from ..core.scene.toml_table import format_scene
 from ..core.session.take import to_scene
 from ..device.view import bed_of
-from ..live import handlers, running, sculpting
+from ..live import handlers, running, sculpting, tick
+from ..live.recorded_strokes import play_strokes, read_strokes
 from ..recorded import takes
 from ..ui_text import localize
 from .action import Action, FileAction
-from .poll_messages import no_bed, no_take
+from .poll_messages import baked, linked, no_bed, no_take, session_runs
 
 
 class ChosenTake:
@@ -128,3 +129,35 @@ class RemoveTake(ChosenTake, Action, bpy.types.Operator):
     def perform(self, context: Any) -> None:
         """Remove it."""
         takes.remove(bed_of(context), self.chosen_take(context).number)
+
+
+class PlayStrokes(FileAction, bpy.types.Operator):
+    """Form recorded strokes of the Press tool on the bed, from a file, as fast as they can be simulated"""
+
+    bl_idname = "digiclay.play_strokes"
+    bl_label = "Play Strokes"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH")
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed is needed that a session could begin on."""
+        return no_bed(context) or session_runs(context) or linked(context) or baked(context)
+
+    def perform(self, context: Any) -> None:
+        """Play them in a session of their own; when one of them fails, the bed stays as it was."""
+        recorded = read_strokes(Path(bpy.path.abspath(self.filepath)))
+        bed = bed_of(context)
+        for note in tick.start(context, bed):
+            self.report({note.level}, note.message)
+        try:
+            session = running.find(bed)
+            assert session is not None  # it has just been started
+            *_, session = play_strokes(session, recorded.strokes)
+            tick.show(bed, session)
+            tick.place_finger(context, bed, session)
+        finally:
+            tick.stop(bed.session_uid)
+        self.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..device.view import bed_of, is_edited
 
-__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_number", "is_edited"]
+__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_property", "is_edited"]
 
 CATEGORY = "Digital Clay"
 #: Letters a line of the sidebar holds at its usual width.
@@ -39,11 +39,10 @@ def draw_lines(layout: Any, words: str, icon: str) -> None:
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
-def draw_number(layout: Any, owner: Any, name: str) -> None:
-    """Draw a number with its label in the field: beside it the sidebar would cut off the unit.
-
-    `layout` bpy.types.UILayout; `owner` bpy.types.bpy_struct; `name`: of its property.
-    """
-    place = layout.row(align=True)
-    place.use_property_split = False
-    place.prop(owner, name)
+def draw_property(layout: Any, owner: Any, name: str, active: bool = True, expand: bool = False) -> None:
+    """Draw a property in a row of its own; a number's label in its field: beside it the unit is cut off."""
+    row = layout.row(align=True)
+    row.active = active
+    if owner.bl_rna.properties[name].type in {"FLOAT", "INT"}:
+        row.use_property_split = False
+    row.prop(owner, name, expand=expand)

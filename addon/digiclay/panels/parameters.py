@@ -11,8 +11,8 @@ from ..core.scene.schema import NEEDS, OPTIONAL, import_parameters
 from ..core.scene.toml_table import PRESETS
 from ..live import running
 from ..settings import own_presets, properties
-from ..settings.chosen_method import method_of, method_property
 from ..settings.declared import WHOLE, title
+from ..settings.groups import method_of, method_property
 from ..settings.properties import part_group
 from ..ui_text import localize
 from .base import Panel, bed_of, draw_lines, is_edited

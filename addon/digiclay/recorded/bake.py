@@ -21,7 +21,7 @@ from ..core.session.live_periods import simulate_path
 from ..core.session.take import Take
 from ..device import view
 from ..device.instant import pick_pose
-from ..device.primitives import BAKE
+from ..roles import BAKE
 from .bake_tree import MOMENT, playback_nodes
 
 #: Name of the modifier.

@@ -10,10 +10,10 @@ from ..core.base.errors import DigiclayError
 from ..core.control.blister import Blister
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
-from ..device import view
+from ..roles import fingertip_of
+from .declared import assign, read
 from .devices import fit_blister
 from .shown_units import SHOWN, to_si
-from .table import assign, read
 
 #: Least and largest size, m: narrower than that a finger falls between pins, wider than that no hand is.
 SMALLEST, LARGEST = 1e-3, 0.2
@@ -46,7 +46,7 @@ def set_size(settings: Any, size: float) -> None:
 
 def resize(settings: Any, finger: Fingertip) -> None:
     """Give a bed's fingertip another size; its lowest point stays, its blister follows, if that is on."""
-    before, tip = read_finger(settings), view.fingertip_of(settings.id_data)
+    before, tip = read_finger(settings), fingertip_of(settings.id_data)
     lowest = _pose(tip)
     for name in ("length", "width", "height"):
         assign(settings.fingertip, Fingertip, name, getattr(finger, name))

@@ -10,9 +10,8 @@ from ..core.control.methods import remove_method
 from ..core.scene.schema import import_parameters
 from ..plugins.method_folder import FolderMethods, load_folder
 from ..ui_text import localize
-from .chosen_method import name_pointer
 from .declared import group, title
-from .groups import CONTROL
+from .groups import CONTROL, name_pointer
 
 #: What is told of a folder whose place depends on the file that is open.
 RELATIVE = "Own Methods must be a full path (got {!r}): choose the folder again, after the .blend was saved."

@@ -18,11 +18,9 @@ from ..core.control.methods import METHODS, find_method, list_methods
 from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, resolve
-from .chosen_method import find_group, method_of
-from .declared import title
-from .groups import CLASSES, SETTINGS
+from .declared import Notes, read, title, write
+from .groups import CLASSES, SETTINGS, find_group, method_of
 from .shown_units import convert_units
-from .table import Notes, read, write
 
 _NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
 

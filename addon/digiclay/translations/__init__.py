@@ -12,7 +12,7 @@ from typing import Any
 from .. import operators, panels, preferences, ui_text
 from ..compat import bpy
 from ..core.scene.toml_table import PRESETS
-from ..device import display
+from ..panels import display
 from ..press.tool import PressTool
 from ..settings import groups
 from ..settings.declared import title

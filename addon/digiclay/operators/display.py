@@ -1,19 +1,35 @@
-"""Selection of the pins whose heights the overlay shows."""
+"""Operators on what is seen of a bed: pins picked for the overlay, and the live skin."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
-from ..device import display
+from ..core.session.recent_trace import PICKED
+from ..device import detail, form, view
 from ..device.view import bed_of
+from ..overlay import views
 from ..press import aim
 from ..ui_text import localize
 from . import status
 from .action import Action, Polled
-from .poll_messages import no_bed
+from .poll_messages import linked, no_bed, no_skin
 
 NO_BED = "Select a bed of pins first"
+#: Keys of the operator.
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
+
+
+def pick_pins(bed: Any, pins: Iterable[int]) -> None:
+    """Choose the pins whose heights the overlay shows: at most 6 different ones of the bed."""
+    chosen, count = tuple(pins), len(bed.data.vertices)
+    if len(chosen) > PICKED or len(set(chosen)) != len(chosen):
+        raise DigiclayError(f"Display.picked must be at most {PICKED} different pins (got {list(chosen)}).")
+    unknown = [pin for pin in chosen if not 0 <= pin < count]
+    if unknown:
+        raise DigiclayError(f"Display.picked must be pins 0 to {count - 1} of {bed.name} (got {unknown[0]}).")
+    bed.digiclay_display.picked = (*chosen, *[view.NO_PIN] * (PICKED - len(chosen)))
+    views.redraw()
 
 
 class PickPins(Polled, bpy.types.Operator):
@@ -60,10 +76,10 @@ class PickPins(Polled, bpy.types.Operator):
             found = aim.find_target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
         if found is None or found.bed != bed_of(context):
             return {"PASS_THROUGH"}
-        present = display.picked_pins(found.bed)
+        present = view.picked_pins(found.bed)
         pins = [pin for pin in present if pin != found.pin]
         try:
-            display.pick_pins(found.bed, pins if found.pin in present else [*pins, found.pin])
+            pick_pins(found.bed, pins if found.pin in present else [*pins, found.pin])
         except DigiclayError as error:
             self.report({"WARNING"}, str(error))
         else:
@@ -91,10 +107,33 @@ class ClearPins(Action, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """There must be picked pins."""
-        return no_bed(context, NO_BED) or (
-            "" if display.picked_pins(bed_of(context)) else "No pins are picked"
-        )
+        return no_bed(context, NO_BED) or ("" if view.picked_pins(bed_of(context)) else "No pins are picked")
 
     def perform(self, context: Any) -> None:
         """Drop them."""
-        display.pick_pins(bed_of(context), ())
+        pick_pins(bed_of(context), ())
+
+
+class ToggleSkin(Action, bpy.types.Operator):
+    """Show the surface of the pins as a skin, or the pins again"""
+
+    bl_idname = "digiclay.skin_toggle"
+    bl_label = "Toggle Skin"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed of this file that has a skin is needed."""
+        return no_bed(context) or linked(context) or no_skin(context)
+
+    def perform(self, context: Any) -> None:
+        """Show pins where a skin is seen, else the skin; by the form there was before, if that does it."""
+        bed = bed_of(context)
+        seen, before = form.is_skin_shown(bed), bed.get(form.BEFORE)
+        if before in form.FORMS:
+            form.set_form(bed, before)
+            detail.follow()
+        if before not in form.FORMS or form.is_skin_shown(bed) == seen:
+            before = before or form.read_form(bed)
+            form.set_form(bed, "pins" if seen else "skin")
+            bed[form.BEFORE] = before

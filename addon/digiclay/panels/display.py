@@ -1,0 +1,202 @@
+"""Display of a bed: its properties, and the sub-panel of colors, arrows, skin and overlay.
+
+Colors, arrows and skin are settings of the bed's geometry nodes; these properties read and write
+them there, so that there is one place they stand in.
+"""
+
+# No postponed annotations here: Blender reads a group's properties from them.
+from collections.abc import Callable
+from typing import Any
+
+from ..compat import bpy
+from ..core.base.errors import DigiclayError
+from ..core.scene.assembly import assemble
+from ..core.session import snapshot
+from ..core.session.recent_trace import PICKED, SPAN
+from ..device import form, heat, view
+from ..device.node_tree import LENGTH
+from ..live import bed_state, running
+from ..overlay import views
+from ..settings import properties
+from ..ui_text import localize
+from .base import Panel, bed_of, draw_property, is_edited
+
+COLORINGS = (
+    ("mode", "Mode", "Color the pins by what they do"),
+    ("force", "Force", "Color the pins by the force on them"),
+)
+FORMS = (
+    ("automatic", "Automatic", "Pins, and the skin instead where they are smaller than about 3 pixels"),
+    ("pins", "Pins", "Pins alone"),
+    ("skin", "Skin", "The surface of the pins as a skin, without the pins"),
+    ("both", "Both", "Pins under a clear skin"),
+)
+SKINS = (
+    ("smooth", "Smooth", "Smooth through the tops of the pins, and never beyond them"),
+    ("membrane", "Membrane", "Stretched over the flat ends of the pins"),
+)
+
+
+def _write_forces(bed: Any) -> None:
+    """Write the forces, which nothing drew until now; those stored last where no session runs."""
+    session, stored = running.find(bed), bed_state.read_snapshot(bed)
+    try:
+        if session is not None:
+            view.show_state(bed, session.system, session.state)
+        elif stored is not None:
+            system = assemble(properties.scene_of(bed))
+            view.show_state(bed, system, snapshot.load(system, stored))
+    except DigiclayError:
+        # The bed is edited, or its settings have changed since the state was kept: what was last drawn stays.
+        return
+
+
+def _in_nodes(
+    read: Callable[[Any], Any], write: Callable[[Any, Any], None], default: Any, can: Any = view.is_drawn
+) -> dict[str, Any]:
+    """Return `get` and `set` of a property stored in a bed's geometry nodes; the default without them."""
+
+    def put(display: Any, value: Any) -> None:
+        if can(display.id_data):
+            write(display.id_data, value)
+
+    return {"get": lambda display: read(display.id_data) if can(display.id_data) else default, "set": put}
+
+
+def _color(bed: Any, code: int) -> None:
+    view.color_by(bed, COLORINGS[code][0])
+    _write_forces(bed)
+
+
+def _arrows(bed: Any, on: bool) -> None:
+    view.show_arrows(bed, on)
+    _write_forces(bed)
+
+
+def _follow_overlay(display: Any, context: Any) -> None:
+    views.follow()
+
+
+class Display(bpy.types.PropertyGroup):
+    """Display properties of a bed."""
+
+    form: bpy.props.EnumProperty(
+        name="Show",
+        description="What is seen of the bed, also in renders: pins, or the surface they form as a skin",
+        items=FORMS,
+        **_in_nodes(
+            lambda bed: form.FORMS.index(form.read_form(bed)),
+            lambda bed, code: form.set_form(bed, form.FORMS[code]),
+            form.FORMS.index("pins"),
+            form.can_show_skin,
+        ),
+    )
+    skin: bpy.props.EnumProperty(
+        name="Skin",
+        description="How the skin runs between the pins",
+        items=SKINS,
+        **_in_nodes(
+            lambda bed: form.KINDS.index(form.read_kind(bed)),
+            lambda bed, code: form.set_kind(bed, form.KINDS[code]),
+            0,
+            form.can_show_skin,
+        ),
+    )
+    color: bpy.props.EnumProperty(
+        name="Color",
+        description="Quantity shown by the color of a pin",
+        items=COLORINGS,
+        **_in_nodes(lambda bed: int(view.color_source(bed) == "force"), _color, 0),
+    )
+    top_force: bpy.props.FloatProperty(
+        name="Top Color at (N)", description="Force of the last color, in N",
+        min=1e-3, max=1e3, soft_max=2.0, precision=3, step=1,
+        **_in_nodes(view.top_color, view.scale_colors, heat.TOP),
+    )  # fmt: skip
+    arrows: bpy.props.BoolProperty(
+        name="Force Arrows",
+        description="Draw the force on each pin as an arrow, with a transparent fingertip; also in renders",
+        **_in_nodes(view.shows_arrows, _arrows, False),
+    )
+    arrow_length: bpy.props.FloatProperty(
+        name="Arrow Length (mm/N)", description="Length of the arrow of 1 N, in mm of the device",
+        min=0.1, max=1e5, soft_min=10.0, soft_max=1000.0, precision=1, step=1000,
+        **_in_nodes(
+            lambda bed: 1e3 * view.arrow_length(bed),
+            lambda bed, length: view.scale_arrows(bed, 1e-3 * length),
+            LENGTH,
+        ),
+    )  # fmt: skip
+    overlay: bpy.props.BoolProperty(
+        name="Overlay",
+        description="While a session runs, show force and state in a corner of the 3D view",
+        default=True,
+        update=_follow_overlay,
+    )
+    overlay_full: bpy.props.BoolProperty(
+        name="Overlay Details",
+        description="Show curves, heights of picked pins and modes in the overlay, not force and state alone",
+        update=_follow_overlay,
+    )
+    seconds: bpy.props.FloatProperty(
+        name="Past (s)", description="Time span of the overlay's curves, in s",
+        default=5.0, min=0.5, max=SPAN, precision=1, step=50,
+    )  # fmt: skip
+    picked: bpy.props.IntVectorProperty(
+        name="Picked Pins", description="Pins whose heights the overlay shows; -1 for none",
+        size=PICKED, default=[view.NO_PIN] * PICKED, min=view.NO_PIN,
+    )  # fmt: skip
+
+
+class DisplayPanel(Panel, bpy.types.Panel):
+    """Display of the bed; a disabled item takes no time."""
+
+    bl_label = "Display"
+    bl_idname = "DIGICLAY_PT_display"
+    bl_order = 30
+
+    def draw(self, context: Any) -> None:
+        """Draw the panel."""
+        bed, layout = bed_of(context), self.layout
+        layout.enabled = not is_edited(context)
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        shown, drawn = bed.digiclay_display, view.is_drawn(bed)
+        if not drawn:
+            layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
+        column = layout.column()
+        column.enabled = drawn
+        skin = column.column()
+        skin.enabled = form.can_show_skin(bed)
+        draw_property(skin, shown, "form")
+        draw_property(skin, shown, "skin", shown.form != "pins", expand=True)
+        draw_property(column, shown, "color", expand=True)
+        draw_property(column, shown, "top_force", shown.color == "force")
+        draw_property(column, shown, "arrows")
+        draw_property(column, shown, "arrow_length", shown.arrows)
+        draw_property(layout, shown, "overlay")
+        column = layout.column()
+        column.active = shown.overlay
+        draw_property(column, shown, "overlay_full")
+        draw_property(column, shown, "seconds", shown.overlay_full)
+        pins = ", ".join(map(str, view.picked_pins(bed)))
+        column.label(text=localize("Picked pins: {}", pins or localize("none")))
+        row = column.row(align=True)
+        row.operator("digiclay.pick_pins")
+        row.operator("digiclay.clear_pins")
+
+
+CLASSES = (DisplayPanel,)
+
+
+def register() -> None:
+    """Register the properties and hang them onto objects."""
+    bpy.utils.register_class(Display)
+    bpy.types.Object.digiclay_display = bpy.props.PointerProperty(type=Display, name="Digital Clay Display")
+
+
+def unregister() -> None:
+    """Undo `register`; the overlay's draw handler goes as well."""
+    views.stop()
+    del bpy.types.Object.digiclay_display
+    bpy.utils.unregister_class(Display)

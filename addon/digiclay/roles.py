@@ -1,0 +1,58 @@
+"""Roles of Blender's objects: which is a bed, its fingertip, the ellipsoid in that, or another part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+#: Property that holds an object's role.
+ROLE = "digiclay_role"
+#: A housing is an object of its own in older files only. A pin is whatever the bed's nodes draw, and a bake
+#: holds baked pins: both stand in no scene.
+BED, FINGERTIP, ELLIPSOID, HOUSING, PIN, BAKE = "bed", "fingertip", "ellipsoid", "housing", "pin", "bake"
+#: Properties by which a bed holds its fingertip, and that its ellipsoid: what is held is appended along.
+FINGER, BALL = "digiclay_fingertip", "digiclay_ellipsoid"
+#: Marks what was seen to belong to a bed: only that can be left behind by one. What older files have lying
+#: about without a bed stays.
+OWNED = "digiclay_owned"
+
+
+def is_bed(thing: Any) -> bool:
+    """Return whether an object is a bed of this extension."""
+    return thing is not None and thing.get(ROLE) == BED and thing.type == "MESH"
+
+
+def bed_of(context: Any) -> Any:
+    """Return the bed the active object is or belongs to, be it fingertip, housing or a part; None without."""
+    thing = getattr(context, "object", None)
+    while thing is not None and not is_bed(thing):
+        thing = thing.parent
+    return thing
+
+
+def is_edited(context: Any) -> bool:
+    """Return whether the active object, or the bed it belongs to, is being edited, painted or posed."""
+    bed = bed_of(context)
+    return context.mode != "OBJECT" or (bed is not None and bed.mode != "OBJECT")
+
+
+def is_linked(thing: Any) -> bool:
+    """Return whether an object stands in any collection: what is deleted but held by a property does not."""
+    return bool(thing.users_collection)
+
+
+def fingertip_of(bed: Any) -> Any | None:
+    """Return the fingertip that belongs to a bed, or None when the user has deleted it."""
+    return _part(bed, FINGER, FINGERTIP)
+
+
+def ellipsoid(tip: Any) -> Any | None:
+    """Return the ellipsoid of a fingertip, or None when the user has deleted it."""
+    return _part(tip, BALL, ELLIPSOID)
+
+
+def _part(owner: Any, name: str, role: str) -> Any | None:
+    """Return the part that an object holds as a property, if it still is its child in a collection."""
+    part = owner.get(name)
+    if part is None:  # older files do not have it as a property
+        part = next((child for child in owner.children if child.get(ROLE) == role), None)
+    return part if part is not None and part.parent == owner and is_linked(part) else None
