@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.master import Master, Phase, VirtualMaster
+from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load

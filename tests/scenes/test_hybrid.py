@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.hybrid import Hybrid
-from digiclay.core.control.master import Phase
+from digiclay.core.control.virtual_master import Phase
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.trajectory import Path, Waypoint

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.control.master import Master, Phase, make_master_cell
 from digiclay.core.control.travel import Heading
+from digiclay.core.control.virtual_master import Master, Phase, make_master_cell
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.physics import Cell
 from digiclay.core.model.valve import Fluid, Valve

@@ -9,9 +9,9 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.drive import DriveParameters
 from digiclay.core.control.exchange import make_exchange
-from digiclay.core.control.master import Master, Phase
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.smoothing import find_fault, order_periods
+from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.model.control_interface import Controller, Measurement

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.base.quantity import Parameters, list_quantities
-from ..core.control.master import make_master_cell
+from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene

@@ -246,11 +246,6 @@ class OwnRow(Method):
         source, own = self.source, copy.deepcopy(device)  # whatever it does to it, the bed's is another
         return guard(lambda: parameters.build(own), self.name, source.label, source.file, own.period)
 
-    def describe(self) -> str:
-        """Return what it does, in the first line of its class, where it has one of its own."""
-        line = (self.kind.__doc__ or "").strip().partition("\n")[0].removesuffix(".")
-        return "" if line.startswith(f"{self.kind.__name__}(") else line
-
 
 def load_method(word: str) -> str:
     """Load the method that a word of the command line names; return its name, or a word that names none."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..core.base.quantity import list_quantities
-from ..core.control.master import VirtualMaster
+from ..core.control.virtual_master import VirtualMaster
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..core.scene.scene_source import load

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+#: Codes of `Mode`.
+Modes = NDArray[np.int8]
 #: Numbers of cells.
 Cells = NDArray[np.intp]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import DivergenceError
-from ..control.runs import BatchControl
+from ..control.servo import BatchControl
 from ..engine.simulation import find_divergence, simulate_period
 from ..engine.state import State, make_initial_state
 from ..engine.system import System

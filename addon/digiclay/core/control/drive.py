@@ -1,28 +1,27 @@
 """Pin motion by speed, height or force: common part of the behaviors.
 
 A valve's flow goes with the square of its opening, so a height control that is proportional in the
-opening comes in like 1/t. Here the opening is worked out from the wanted speed instead, by the flow law
+opening comes in like 1/t. Here the opening follows from the wanted speed instead, by the flow law
 of a pin without load, and heights come in exponentially.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Modes
 from ..base.errors import ParameterError
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Measurement
 from ..model.physics import Cell
 from .methods import ControlParameters
-from .runs import BatchControl
-from .servo import declare_dead_band, lock_overloaded
+from .servo import BatchControl, Tracking, declare_again, lock_overloaded
 
-#: Openings at which the speed is worked out; in between it is interpolated.
+#: Openings at which the speed is tabulated; in between it is interpolated.
 OPENINGS = np.linspace(0.0, 1.0, 129)
 
 
@@ -33,7 +32,7 @@ class DriveParameters(ControlParameters):
     settling_time: float = quantity(
         20e-3, "time constant of a free pin's approach to its height", unit="s", symbol="τ_s", above=0.0
     )
-    dead_band: float = declare_dead_band()
+    dead_band: float = declare_again(Tracking, "dead_band")
 
 
 @dataclass(frozen=True)
@@ -53,10 +52,7 @@ Touch = TypeVar("Touch", bound=TouchParameters)
 
 
 def raise_felt_force(floor: float, parameters: Touch) -> Touch:
-    """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0.
-
-    `floor`, N.
-    """
+    """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0."""
     return replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
 
 
@@ -83,10 +79,7 @@ class Drive:
     lift: float
 
     def command(self, speed: Floats, force: Floats) -> Floats:
-        """Return valve commands for some speeds; a pin pressed harder than can be lifted is locked.
-
-        `speed` (m,) or (m, b), as in `open_for`, m/s; `force` (m,) or (m, b), N.
-        """
+        """Return valve commands for speeds, m/s, under forces, N; an overloaded pin is locked."""
         return lock_overloaded(self.open_for(speed), force, self.lift)
 
     def open_for(self, speed: Floats) -> Floats:
@@ -102,6 +95,11 @@ class Drive:
         speed: Floats = np.where(np.abs(error) > self.dead_band, error / self.settling_time, 0.0)
         return speed
 
+    def mark_formed(self, target: Floats, rest: float) -> Modes:
+        """Return HOLD for cells commanded farther from rest than the dead band, m, REST for the others."""
+        modes: Modes = (np.abs(target - rest) > self.dead_band).view(np.int8)
+        return modes
+
 
 @dataclass(frozen=True, eq=False)
 class CellwiseControl(BatchControl):
@@ -116,17 +114,13 @@ class CellwiseControl(BatchControl):
     def begin(self) -> None:
         """Nothing to remember but the cells' own rows."""
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, None]:
+    def locate(self, memory: None, touched: Measurement) -> tuple[None, None]:
         """Request the cells near the fingertip and those in motion only; see `Controller`."""
         return memory, None
 
 
 def _look_up(speed: Floats, speeds: Floats) -> Floats:
-    """Return the openings that give some speeds.
-
-    `speed` (m,) or (m, b), m/s; `speeds` (129,) or (129, b), at `OPENINGS`, m/s; a table a run where they
-    differ.
-    """
+    """Return the openings of speeds (m[, b]), m/s, by tables (129[, b]) of the speeds at `OPENINGS`."""
     if speeds.ndim == 1:
         openings: Floats = np.interp(speed, speeds, OPENINGS)
         return openings
@@ -135,11 +129,9 @@ def _look_up(speed: Floats, speeds: Floats) -> Floats:
 
 
 def find_free_speeds(cell: Cell, pressure: float) -> Floats:
-    """Return the speeds of a pin without load at `OPENINGS`, growing, (129,), m/s.
+    """Return the growing speeds, (129,), m/s, of a free pin at `OPENINGS` to a reservoir of a pressure, Pa.
 
     A reservoir that cannot move a pin gets the valve wide open.
-
-    `pressure`: of the reservoir, towards it, Pa.
     """
     free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / cell.actuator.area
     rising: Floats = np.maximum(free, 0.0) + 1e-12 * OPENINGS
@@ -147,11 +139,7 @@ def find_free_speeds(cell: Cell, pressure: float) -> Floats:
 
 
 def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
-    """Make the drive for a device.
-
-    `period`: control period, s. Raises ParameterError when the height control would be faster than it is
-    asked.
-    """
+    """Make the drive; ParameterError when the height control would be faster than its control period, s."""
     if parameters.settling_time < 2.0 * period:
         rule = f"must be at least two control periods, {2.0 * period:g} s"
         raise ParameterError("control", "settling_time", rule, f"{parameters.settling_time:g} s")
@@ -172,8 +160,6 @@ def check_damping(damping: float, cell: Cell, period: float, stiffness: float = 
     force in a control period. With the dead time and the lag of the default valve it swings from about
     2 on, so 1 is allowed. The pulp is stiffest at the largest force a pin can lift,
     ``k = f_d b exp(m (x - x0)) = f_d b + m F``; a spring under the pin, `stiffness` in N/m, adds to it.
-
-    `damping`: c, N s/m; `period`: T_c, s; `stiffness`: of a spring under the pin, N/m. Raises ParameterError.
     """
     if cell.touch is None:
         return

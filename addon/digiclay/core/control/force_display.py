@@ -15,7 +15,7 @@ from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 from .named_shapes import FILE, check_shape, evaluate_shape, read_values
-from .runs import take_cells
+from .servo import take_cells
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ..base.arrays import Flags, Floats
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from .blister import Blister
-from .runs import sum_weighted
+from .servo import sum_weighted
 
 #: Least weight of a cell in the ground under the finger, N: a blister that nobody touches has a ground, too.
 UNTOUCHED = 1e-9

@@ -31,12 +31,11 @@ from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Estimate, FingerFilter, Spread
 from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import Follower, LeadProfile, LedBlister, Region
-from .master import LossRule, Master, Phase
 from .methods import ControlParameters
 from .pulp_estimate import PulpEstimate, Reach, find_top, lead_heights
-from .servo import declare_dead_band
+from .servo import declare_again
 from .travel import Heading, update_heading
-from .virtual_master import HEAVIEST, VirtualMaster, VirtualMasterControl
+from .virtual_master import HEAVIEST, LossRule, Master, Phase, VirtualMaster, VirtualMasterControl
 from .virtual_master import build as build_master
 
 
@@ -83,20 +82,12 @@ class Hybrid(ControlParameters):
         symbol="v_s",
         at_least=0.0,
     )
-    travel: float = quantity(
-        1.5e-3, "distance traveled that determines the direction", unit="m", symbol="d_t", above=0.0
-    )
-    behind: float = quantity(
-        -0.05, "cosine below which a cell lies behind the fingertip", symbol="cos_f", at_least=-1.0, below=0.0
-    )
-    release_force: float = quantity(
-        0.02, "force that releases a frozen cell", unit="N", symbol="F_free", above=0.0
-    )
-    loss_time: float = quantity(
-        50e-3, "time without force until a loss", unit="s", symbol="t_l", at_least=0.0
-    )
+    travel: float = declare_again(VirtualMaster, "travel")
+    behind: float = declare_again(VirtualMaster, "behind", -0.05)
+    release_force: float = declare_again(VirtualMaster, "release_force")
+    loss_time: float = declare_again(VirtualMaster, "loss_time")
     # A pin on its way stands still within the band: at 10 µm a slow lift swings from period to period.
-    dead_band: float = declare_dead_band(1e-6)
+    dead_band: float = declare_again(VirtualMaster, "dead_band", 1e-6)
 
     @property
     def set_point(self) -> SetPoint:

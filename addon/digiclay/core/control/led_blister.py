@@ -16,8 +16,8 @@ from ..model.layout import Disc, enclose_discs
 from .blister import Blister, BlisterCells, BlisterRule
 from .finger_estimate import STATES, Estimate
 from .ground import EdgeGround
-from .master import Master, Phase
 from .travel import Heading
+from .virtual_master import Master, Phase
 
 #: A finger slower than this has no direction, m/s.
 SLOWEST = 1e-3

@@ -67,8 +67,10 @@ class Method:
         return self._import().build(parameters, device)
 
     def describe(self) -> str:
-        """Return what it does, in the first line of its module."""
-        return (self._import().__doc__ or "").partition("\n")[0].removesuffix(".")
+        """Return what it does, in the first line of its class, where it has one of its own."""
+        kind = self.import_parameters()
+        line = (kind.__doc__ or "").strip().partition("\n")[0].removesuffix(".")
+        return "" if line.startswith(f"{kind.__name__}(") else line
 
     def _import(self) -> Any:
         """Import its module."""
@@ -81,9 +83,9 @@ METHODS: dict[str, Method] = {
     "cell_states": Method(
         "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
     ),
-    "elastic": Method("control.elastic", "Elastic", recovers=True),
-    "plastic": Method("control.plastic", "Plastic"),
-    "viscous": Method("control.viscous", "Viscous", recovers=True, by_set=True),
+    "elastic": Method("control.behaviors", "Elastic", recovers=True),
+    "plastic": Method("control.behaviors", "Plastic"),
+    "viscous": Method("control.behaviors", "Viscous", recovers=True, by_set=True),
     "push_pull": Method("control.push_pull", "PushPull", by_set=True),
     "force_display": Method("control.force_display", "ForceDisplay", recovers=True),
     "shape_display": Method("control.shape_display", "ShapeDisplay"),

@@ -17,103 +17,44 @@ from ..model.layout import Grid
 FILE = ".npy"
 
 
-def dome(x: Floats, y: Floats) -> Floats:
-    """Return a paraboloid, 1 in the middle, 0 on the unit circle and beyond.
-
-    `x`, `y` (n,), -1 to 1 over the bed.
-    """
-    bump: Floats = np.maximum(1.0 - x * x - y * y, 0.0)
-    return bump
-
-
-def saddle(x: Floats, y: Floats) -> Floats:
-    """Return a saddle, 1 at x = ±1, -1 at y = ±1. `x`, `y` (n,), -1 to 1 over the bed."""
-    seat: Floats = x * x - y * y
-    return seat
+#: Values from -1 to 1 over the square bed -1 to 1, in x and y.
+SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
+    "dome": lambda x, y: np.maximum(1.0 - x * x - y * y, 0.0),
+    "saddle": lambda x, y: x * x - y * y,
+    "wave": lambda x, y: np.sin(2.0 * math.pi * x),
+    "ripple": lambda x, y: np.cos(3.0 * math.pi * np.hypot(x, y)),
+    "crater": lambda x, y: _crater(np.hypot(x, y)),
+    "pyramid": lambda x, y: 1.0 - np.maximum(np.abs(x), np.abs(y)),
+    "ramp": lambda x, y: x,
+    "flat": lambda x, y: 0.0 * x,
+}
 
 
-def wave(x: Floats, y: Floats) -> Floats:
-    """Return two waves along x. `x`, `y` (n,), -1 to 1 over the bed."""
-    waves: Floats = np.sin(2.0 * math.pi * x)
-    return waves
-
-
-def ripple(x: Floats, y: Floats) -> Floats:
-    """Return waves around the middle. `x`, `y` (n,), -1 to 1 over the bed."""
-    waves: Floats = np.cos(3.0 * math.pi * np.hypot(x, y))
-    return waves
-
-
-def crater(x: Floats, y: Floats) -> Floats:
-    """Return a ring wall, 1 high at radius 0.6, around a hollow of depth 0.6.
-
-    `x`, `y` (n,), -1 to 1 over the bed.
-    """
-    r = np.hypot(x, y)
+def _crater(r: Floats) -> Floats:
+    """Return a ring wall, 1 high at radius 0.6, around a hollow of depth 0.6."""
     ring: Floats = np.exp(-(((r - 0.6) / 0.18) ** 2)) - 0.6 * np.exp(-((r / 0.3) ** 2))
     return ring
 
 
-def pyramid(x: Floats, y: Floats) -> Floats:
-    """Return a four-sided pyramid, 1 in the middle. `x`, `y` (n,), -1 to 1 over the bed."""
-    sides: Floats = 1.0 - np.maximum(np.abs(x), np.abs(y))
-    return sides
-
-
-def ramp(x: Floats, y: Floats) -> Floats:
-    """Return a plane that rises along x, from -1 to 1. `x`, `y` (n,), -1 to 1 over the bed."""
-    return x
-
-
-def flat(x: Floats, y: Floats) -> Floats:
-    """Return 0. `x`, `y` (n,), -1 to 1 over the bed."""
-    return 0.0 * x
-
-
-#: Values from -1 to 1 over the square bed -1 to 1, in x and y.
-SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
-    "dome": dome,
-    "saddle": saddle,
-    "wave": wave,
-    "ripple": ripple,
-    "crater": crater,
-    "pyramid": pyramid,
-    "ramp": ramp,
-    "flat": flat,
-}
-
-
 def check_shape(owner: str, field: str, shape: str) -> None:
-    """Refuse what is neither a shape's name nor a file's.
-
-    `owner`, `field`: what the message calls it. Raises ParameterError.
-    """
+    """Refuse what is neither a shape's name nor a file's; `owner`, `field`: what the message calls it."""
     if shape not in SHAPES and not shape.endswith(FILE):
         rule = f"must be one of {', '.join(SHAPES)}, or a file {FILE}"
         raise ParameterError(owner, field, rule, repr(shape))
 
 
 def evaluate_shape(shape: str, grid: Grid) -> Floats:
-    """Return the values of a named shape for all cells of a bed, shape (n,), from -1 to 1.
-
-    A shape's square is the bed; a bed longer than wide stretches it.
-    """
-    middle_x, middle_y = grid.x / _half(grid.x), grid.y / _half(grid.y)
+    """Return the values of a named shape for all cells of a bed, (n,), whose extent is the shape's square."""
+    # A bed of a single row or column has no extent.
+    middle_x, middle_y = (values / (float(np.abs(values).max()) or 1.0) for values in (grid.x, grid.y))
     return SHAPES[shape](middle_x, middle_y)
 
 
-def _half(values: Floats) -> float:
-    """Return half the extent of a bed, m; 1 for a single row or column."""
-    return float(np.abs(values).max()) or 1.0
-
-
 def read_values(field: str, path: str, grid: Grid, low: float, high: float, unit: str) -> Floats:
-    """Return the values a file of numpy's gives for all cells, shape (n,).
+    """Return the values for all cells, (n,), from `low` to `high`, of a file of numpy's, (rows, columns).
 
-    `field`: the key of the section ``control`` that names the file, for messages; `path`: relative to where
-    the command runs. Holds an array (rows, columns): the first row lies at the lowest y; `low`, `high`:
-    bounds of the values; `unit`: their unit. Raises ParameterError when it cannot be read, or does not fit
-    the bed.
+    Raises ParameterError about the key `field` of the section ``control`` when it cannot be read, or does not
+    fit the bed, whose first row lies at the lowest y. `path`: relative to where the command runs.
     """
     plan = grid.layout
     try:
@@ -122,8 +63,8 @@ def read_values(field: str, path: str, grid: Grid, low: float, high: float, unit
         # Only what fits the bed is read.
         values = np.asarray(read if shape == (plan.rows, plan.columns) else 0.0, dtype=np.float64)
     except OSError as error:
-        said = error.strerror or "not an array"
-        raise ParameterError("control", field, "must be a file that can be read", f"{path}: {said}") from None
+        rule, why = "must be a file that can be read", error.strerror or "not an array"
+        raise ParameterError("control", field, rule, f"{path}: {why}") from None
     except (ValueError, TypeError):
         rule = "must be a file that holds one array of numbers"
         raise ParameterError("control", field, rule, path) from None

@@ -1,21 +1,22 @@
-"""Height control of the tracking methods, and the lock of overloaded cells."""
+"""Common parts of the controllers: height control, lock of overloaded cells, one run or a batch.
+
+The cells of one run are arrays (m,), those of a batch of b runs (m, b). A number that differs from run to run
+is an array (b,), which numpy puts against the last axis by itself.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import dataclasses
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..base.arrays import Constants, Floats, any_true
+from ..base.arrays import Cells, Constants, Flags, Floats, any_true
 from ..base.quantity import quantity
 from .methods import ControlParameters
-
-
-def declare_dead_band(default: float = 10e-6) -> Any:
-    """Declare the parameter that every height control has."""
-    return quantity(default, "height error without a command", unit="m", symbol="δ", at_least=0.0)
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Tracking(ControlParameters):
     position_gain: float = quantity(
         500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
     )
-    dead_band: float = declare_dead_band()
+    dead_band: float = quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
     travel: float = quantity(
         1.5e-3, "distance traveled that determines the direction", unit="m", symbol="d_t", above=0.0
     )
@@ -38,8 +39,6 @@ class Tracking(ControlParameters):
 
         The flow goes with the square of the opening, so a cell comes in like 1/t and would
         never be at rest without the dead band.
-
-        `target`, `height` (m,) or (m, b), commanded and measured, m.
         """
         gain, band, most, least, none = self._constants[target.shape]
         error = target - height
@@ -56,16 +55,50 @@ class Tracking(ControlParameters):
         return Constants((self.position_gain, self.dead_band, 1.0, -1.0, 0.0))
 
 
-def lock_overloaded(command: Floats, force: Floats, limit: Any) -> Floats:
-    """Lock cells that are pressed harder than the high reservoir can lift, in place; return the commands.
+def declare_again(owner: type[ControlParameters], name: str, default: float | None = None) -> Any:
+    """Declare a parameter as another class does, with a default of its own or the same one."""
+    field = next(field for field in dataclasses.fields(owner) if field.name == name)
+    return dataclasses.field(default=field.default if default is None else default, metadata=field.metadata)
+
+
+def lock_overloaded(command: Floats, force: Floats, limit: float | Floats) -> Floats:
+    """Lock cells pressed harder than the high reservoir lifts, `limit` N, in place; return the commands.
 
     Opening to it would lower them, and a proportional controller would open further.
-
-    `command` (m,) or (m, b); `force` (m,) or (m, b), N; `limit` (b,), force the high reservoir can lift,
-    ``P_high A_a``, N.
     """
     overload = force >= limit
     if any_true(overload):
         overload &= command > 0.0
         np.putmask(command, overload, 0.0)
     return command
+
+
+@dataclass(frozen=True, eq=False)
+class BatchControl:
+    """Controller whose formulas hold for the cells of one run and for those of a batch.
+
+    The memory of a batch is a list, one memory a run.
+
+    Attributes
+    ----------
+    runs : tuple of BatchControl
+        In a batch the controllers of its runs, with plain numbers; empty in a single run.
+    """
+
+    runs: tuple[Any, ...] = field(default=(), kw_only=True)
+
+    @property
+    def batch_class(self) -> type[BatchControl]:
+        """Class of the controller of a batch, with the same fields."""
+        return type(self)
+
+
+def take_cells(values: NDArray[Any], cells: Cells) -> NDArray[Any]:
+    """Return the values of cells (m[, b]) out of those of the bed, (n,), or of each run's bed, (n, b)."""
+    return values.take(cells) if values.ndim == 1 else np.take_along_axis(values, cells, axis=0)
+
+
+def sum_weighted(rows: Floats, weights: Floats | Flags) -> Floats:
+    """Return the sums ([k][, b]) over cells of rows ([k,] m[, b]) times weights, or where a test holds."""
+    sums: Floats = rows.dot(weights) if weights.ndim == 1 else np.einsum("...mb,mb->...b", rows, weights)
+    return sums

@@ -1,47 +1,259 @@
 """Method I: a virtual master cell under the fingertip that leads the blister (Fig. 3 of the paper).
 
-Locate, control, model, create: where the finger presses; a virtual spring until the force
+Locate, control, model, create: where the fingertip presses; a virtual spring until the force
 reaches its set point, then force control; a cylinder and valve like a real one turns the
 effort into the master's height; the cells around follow the blister's profile.
 
-What concerns cells holds for those of one run, (m,), and of a stack, (m, b); what concerns a
+What concerns cells holds for those of one run, (m,), and of a batch, (m, b); what concerns a
 master is decided in plain numbers, run by run.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants, Floats, any_true, count_true
-from ..model.control_interface import Commands, Measurement
-from ..model.layout import RELATIVE_TOLERANCE
-from .blister import BlisterRule
+from ..base.arrays import Constants, Floats, Modes, any_true, count_true
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.control_interface import Commands, Measurement, SetPoint
+from ..model.delay import Queue
+from ..model.interfaces import Flow
+from ..model.layout import RELATIVE_TOLERANCE, Disc
+from ..model.physics import GAUSS, Cell
+from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .ground import GROUNDS, EdgeGround, OwnGround
-from .master import Master, MasterControl, Phase, VirtualMaster, make_master_cell
-from .runs import decide_by_any, decide_by_run, gather_by_run, sum_weighted
-from .servo import lock_overloaded
-from .travel import measure_excess
+from .servo import BatchControl, Tracking, lock_overloaded, sum_weighted
+from .travel import Heading, measure_excess, update_heading
 
-__all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterBatch", "VirtualMasterControl", "build"]
-
-#: Share of the total force that the cell in the middle of the finger carries while shaping, at least: 0.23
-#: to 0.33 of it measured while the finger moves slowly.
+#: Share of the total force that the cell in the middle of the fingertip carries while shaping, at least: 0.23
+#: to 0.33 of it measured while the fingertip moves slowly.
 HEAVIEST = 0.25
 NONE = Constants((0.0,))
+#: Where an idle master stands, m: so far away that no cell is in its blister.
+NOWHERE = 1e3
+#: Share of its radius that a blister in search of the fingertip may take along what is frozen: 1.5 of 15 mm.
+#: The paper's pins rise by 1.2 mm within the loss time, quick ones by 5 mm, which would be left as spikes.
+CARRIED = 0.1
+#: Plain numbers: numpy takes an enumeration's member ten times as long.
+SPRING, FORCE_FOLLOW = int(Mode.SPRING), int(Mode.FORCE_FOLLOW)
+
+
+class Phase(IntEnum):
+    """Phase of the master."""
+
+    IDLE = 0
+    SPRING = 1
+    SHAPING = 2
+
+
+@dataclass(frozen=True)
+class LossRule:
+    """Rule by which a fingertip that is no longer felt is given up.
+
+    Attributes
+    ----------
+    period : float
+        Control period, s.
+    time : float
+        Time without force until a loss, s.
+    """
+
+    period: float
+    time: float
+
+    def is_given_up(self, alone: int) -> bool:
+        """Tell whether a fingertip not felt for some control periods has been away for the loss time."""
+        return alone * self.period >= self.time * (1.0 - 1e-9)
+
+    def wait(self, memory: Any) -> Any:
+        """Count a period without a fingertip in a `Master` or `Follower`; give it up after the loss time."""
+        if memory.phase is Phase.IDLE:
+            return memory
+        if not self.is_given_up(memory.alone):
+            return memory._replace(alone=memory.alone + 1)
+        lost = memory.phase is Phase.SHAPING
+        return memory._replace(phase=Phase.IDLE, losses=memory.losses + lost)
+
+
+class Master(NamedTuple):
+    """Memory of the controller.
+
+    Attributes
+    ----------
+    x, y, height : float
+        Where the master is, m.
+    opening : float
+        Of its own valve.
+    reference : float
+        Surface height at first touch, from which the virtual spring is pressed down, m.
+    edge : float
+        Height of the surface around the blister, m.
+    heading : Heading
+        Direction of travel.
+    felt : float
+        Its height when the fingertip was last felt, m.
+    alone : int
+        Control periods since the fingertip was last felt.
+    losses : int
+        How often the fingertip was lost while shaping.
+    """
+
+    phase: Phase = Phase.IDLE
+    x: float = 0.0
+    y: float = 0.0
+    height: float = 0.0
+    opening: float = 0.0
+    reference: float = 0.0
+    edge: float = 0.0
+    heading: Heading = Heading()
+    felt: float = 0.0
+    alone: int = 0
+    losses: int = 0
+
+    # What changes every period is written out: `_replace` takes nearly twice as long.
+
+    def move_to(self, x: float, y: float, heading: Heading) -> Master:
+        """Return the master where it has felt the fingertip, m."""
+        phase, _, _, height, opening, reference, edge, _, felt, _, losses = self
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, 0, losses)
+
+    def lead(self, phase: Phase, height: float, opening: float) -> Master:
+        """Return the master after a period, at a height, m, with its valve's opening."""
+        _, x, y, _, _, reference, edge, heading, felt, alone, losses = self
+        felt = height if alone == 0 else felt
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
+
+    def with_edge(self, edge: float) -> Master:
+        """Return the master in a surface of a height, m."""
+        phase, x, y, height, opening, reference, _, heading, felt, alone, losses = self
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
+
+
+@dataclass(frozen=True)
+class MasterCell:
+    """One unloaded cell in plain numbers: exact valve opening, averaged flow.
+
+    Attributes
+    ----------
+    openings : tuple of (float, float)
+        The opening at the Gauss points of a control period, then at its end, as
+        ``a K + b K_com``.
+    flow : Flow
+        The law of valve and conduit.
+    laminar : bool
+        No unloaded valve is turbulent.
+    up, down : float
+        Pressures of the reservoirs over the area of a pin, Pa/m².
+    area : float
+        Of a pin, m².
+    stroke : float
+        Upper end stop, m.
+    period : float
+        Control period, s.
+    """
+
+    openings: tuple[tuple[float, float], ...]
+    flow: Flow
+    laminar: bool
+    up: float
+    down: float
+    area: float
+    stroke: float
+    period: float
+
+    def advance(self, height: float, opening: float, command: float) -> tuple[float, float]:
+        """Return height, m, and opening after one period of a constant command."""
+        (a, b), (c, d), (e, f) = self.openings
+        first, second = a * opening + b * command, c * opening + d * command
+        speed = 0.5 * (self.speed(first) + self.speed(second))
+        return min(max(height + self.period * speed, 0.0), self.stroke), e * opening + f * command
+
+    def speed(self, opening: float) -> float:
+        """Return the speed of the unloaded pin, m/s."""
+        drive = self.up if opening > 0.0 else self.down
+        if self.laminar:
+            speed: float = self.flow.laminar_conductance(opening) * drive
+            return speed
+        return float(self.flow.conductance(np.array(opening), np.array(drive * self.area))) * drive
+
+
+def make_master_cell(cell: Cell, period: float) -> MasterCell:
+    """Make the master's cylinder and valve like those of the real cells, for a control period, s."""
+    nodes = cell.lag.response(Queue(), [node * period for node in GAUSS] + [period])
+    # Without a lag there is no column for the opening at the start.
+    openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())
+    laminar = cell.flow.knee > cell.supply.largest
+    area, stroke = cell.actuator.area, cell.actuator.stroke
+    up, down = cell.supply.high / area, cell.supply.low / area
+    return MasterCell(openings, cell.flow, laminar, up, down, area, stroke, period)
+
+
+@dataclass(frozen=True)
+class VirtualMaster(Tracking):
+    """Gains and thresholds of Method I."""
+
+    force_setpoint: float = quantity(
+        0.4,
+        "total force held while shaping, and at which shaping starts",
+        unit="N",
+        symbol="F_ref",
+        above=0.0,
+    )
+    spring_stiffness: float = quantity(
+        200.0, "stiffness of the virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
+    )
+    force_gain: float = quantity(5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0)
+    radius: float = quantity(
+        8e-3,
+        "radius of the search for the fingertip around the master",
+        unit="m",
+        symbol="r_VM",
+        source="P",
+        above=0.0,
+    )
+    release_force: float = quantity(
+        0.02, "force that releases a frozen cell", unit="N", symbol="F_free", above=0.0
+    )
+    felt_force: float = quantity(
+        1e-3, "total force below which there is no contact", unit="N", symbol="F_0", above=0.0
+    )
+    loss_time: float = quantity(
+        50e-3, "time without force until a loss", unit="s", symbol="t_l", at_least=0.0
+    )
+    ground: str = quantity(
+        "edge",
+        "surface from which the blister rises: the mean height at its edge, or each cell's own",
+        choices=("edge", "cell"),
+        later=True,
+    )
+
+    @property
+    def set_point(self) -> SetPoint:
+        """Set point of all cells together."""
+        return SetPoint(self.force_setpoint)
 
 
 @dataclass(frozen=True, eq=False)
-class VirtualMasterControl(MasterControl):
+class VirtualMasterControl(BatchControl):
     """Controller of Method I for a bed.
 
     Attributes
     ----------
+    actuator : Actuator
+        The cells' cylinders.
+    model : MasterCell
+        The master's own cylinder and valve.
+    period : float
+        Control period, s.
     lift : float
         Force the high reservoir can lift, N.
     floor : float
@@ -50,6 +262,11 @@ class VirtualMasterControl(MasterControl):
         Surface from which the blister rises.
     """
 
+    parameters: VirtualMaster
+    blister: Blister
+    actuator: Actuator
+    model: MasterCell
+    period: float
     lift: float
     floor: float = 0.0
     ground: EdgeGround | OwnGround = GROUNDS["edge"]
@@ -61,11 +278,6 @@ class VirtualMasterControl(MasterControl):
         """State rows a cell needs."""
         return self.ground.rows
 
-    @cached_property
-    def reversal(self) -> float:
-        """Distance traveled back that reverses the direction, m."""
-        return max(self.parameters.travel, self.ground.turning * self.blister.flat_radius)
-
     @property
     def batch_class(self) -> type[VirtualMasterControl]:
         """Class of the controller of a batch."""
@@ -75,42 +287,119 @@ class VirtualMasterControl(MasterControl):
         """Return the memory before a session."""
         return Master()
 
+    # Decisions about one master, in plain numbers.
+
+    def follow(
+        self, master: Master, total: float, x: float, y: float, near: float, near_x: float, near_y: float
+    ) -> Master:
+        """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
+
+        `total`, `x`, `y`: sum of the forces on all cells, N, and their moments with x and y, N m; `near`,
+        `near_x`, `near_y`: those of the cells near the master.
+        """
+        gains = self.parameters
+        if total < gains.felt_force:
+            waiting: Master = self._loss.wait(master)
+            return waiting
+        if master.phase is not Phase.IDLE:
+            if near >= gains.felt_force:
+                x, y = near_x / near, near_y / near
+                return master.move_to(x, y, update_heading(master.heading, x, y, gains.travel, self.reversal))
+            # The fingertip has jumped out of reach: this is a new touch elsewhere.
+            master = master._replace(losses=master.losses + 1)
+        x, y = x / total, y / total
+        return Master(Phase.SPRING, x, y, math.nan, heading=Heading(x, y), losses=master.losses)
+
+    def is_new(self, master: Master) -> bool:
+        """Tell whether a master has found a fingertip, and has no height yet."""
+        # A comparison, since a batch asks once a run and period.
+        return not master.height > -math.inf
+
+    def lead(self, master: Master, force: float, surface: float, noise: float = 0.0) -> Master:
+        """VM Control and VM Model: the effort, and the height a real cell would make of it.
+
+        `force`: sum of the forces on all cells, N; `surface`: sum of force times height, N m, which gives a
+        new master its height; `noise`: part of the controlled force that is below the noise floor, N.
+        """
+        gains, phase = self.parameters, master.phase
+        if phase is Phase.IDLE:
+            return master
+        if self.is_new(master):
+            height = surface / force
+            edge = min(max(height, 0.0), self.actuator.stroke)
+            master = master._replace(height=height, reference=height, edge=edge, felt=height)
+        # What it rose in search of the fingertip is taken back, or every lift-off would leave a lump.
+        if self._loss.is_given_up(master.alone):
+            return master._replace(height=master.felt)
+        force += noise
+        if force >= gains.force_setpoint:
+            phase = Phase.SHAPING
+        if phase is Phase.SPRING:
+            effort = gains.position_gain * (master.reference - force / gains.spring_stiffness - master.height)
+        else:
+            effort = gains.force_gain * (gains.force_setpoint - force)
+        height, opening = self.model.advance(master.height, master.opening, min(max(effort, -1.0), 1.0))
+        return master.lead(phase, height, opening)
+
+    def find_disc(self, master: Master) -> Disc | None:
+        """Return the disc that a master controls, m."""
+        return None if master.phase is Phase.IDLE else (master.x, master.y, self.blister.edge_radius)
+
+    def is_active(self, master: Master) -> bool:
+        """Tell whether a master follows a fingertip."""
+        return master.phase is not Phase.IDLE
+
+    def get_pose(self, master: Master) -> tuple[float, float, float, float]:
+        """Return where a master is, m, and its direction of travel."""
+        _, _, toward_x, toward_y = master.heading
+        if master.phase is Phase.IDLE:
+            return NOWHERE, NOWHERE, toward_x, toward_y
+        return master.x, master.y, toward_x, toward_y
+
+    def set_edge(self, master: Master, level: float, count: int) -> Master:
+        """Put a master into a surface whose height is the mean of `count` cells; `level` is their sum, m."""
+        return master.with_edge(min(max(level / count, 0.0), self.actuator.stroke)) if count else master
+
+    def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
+        """Return what the blister is made of.
+
+        Returns heights of the surface around a master and of itself, m; mode of felt cells; whether it has
+        risen farther in search of the fingertip than what is frozen goes along.
+        """
+        kind = FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING
+        beyond = master.alone > 0 and master.height - master.felt > CARRIED * self.blister.radius
+        return master.edge, master.height, kind, beyond
+
+    @cached_property
+    def _loss(self) -> LossRule:
+        """When a fingertip is given up."""
+        return LossRule(self.period, self.parameters.loss_time)
+
+    @cached_property
+    def reversal(self) -> float:
+        """Distance traveled back that reverses the direction, m."""
+        return max(self.parameters.travel, self.ground.turning * self.blister.flat_radius)
+
+    # Sums over cells, and their commands: of one run, or of a batch.
+
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
-        """Locate the finger and move the master; see `Controller`."""
+        """Locate the fingertip and move the master; see `Controller`."""
         basis, force = touched.quadratic_basis, touched.force
         if self._noisy:
             force = suppress_noise(force, self.floor)
-        sums = self._sum_forces(memory, basis, force)
-        held = self._sum_held(memory, touched, sums[0]) if self._noisy else sums[0]
-        memory = self.follow(memory, *sums)
-        if self.is_new(memory):
-            memory = self.set_surface(memory, sums[0], sum_weighted(touched.height, force).tolist())
-        memory = self.lead(memory, held)
-        return memory, self.find_disc(memory)
-
-    def _sum_forces(self, memory: Any, basis: Floats, force: Floats) -> tuple[Any, ...]:
-        """Return what `follow` takes: sums over all cells, and over those near the master."""
+        x, y, *_ = self.get_pose(memory)
+        beyond = measure_excess(x, y, self.parameters.radius * (1.0 + RELATIVE_TOLERANCE), basis)
         (none,) = NONE[force.shape]
-        total, x, y, *_ = sum_weighted(basis, force).tolist()
-        far = self._measure_excess(memory, basis) > none
-        near = sum_weighted(basis, np.where(far, none, force)).tolist()
-        return total, x, y, *near[:3]
-
-    def _sum_held(self, memory: Any, touched: Measurement, felt: Any) -> Any:
-        """Return the force that is controlled, N: of all touched cells, see docs/equations.md.
-
-        Next to the master noise stays in, for what is below the floor adds up; farther off only what is no
-        noise counts. `felt` is the sum of that everywhere, N.
-        """
-        hidden = self._measure_excess(memory, touched.quadratic_basis) <= 0.0
-        hidden &= touched.force < self.floor
-        noise = sum_weighted(touched.force, hidden).tolist()
-        return self.add_noise(memory, felt, noise)
-
-    def _measure_excess(self, memory: Any, basis: Floats) -> Floats:
-        """Return by how much cells are beyond the circle in which the finger is looked for, m²."""
-        x, y = self.get_place(memory)
-        return measure_excess(x, y, self.parameters.radius * (1.0 + RELATIVE_TOLERANCE), basis)
+        total, *center = sum_weighted(basis, force).tolist()
+        near = sum_weighted(basis, np.where(beyond > none, none, force)).tolist()
+        # Next to the master noise stays in the controlled force, for what is below the floor adds up; farther
+        # off only what is no noise counts, see docs/equations.md.
+        hidden = (beyond <= 0.0) & (touched.force < self.floor) if self._noisy else None
+        noise = () if hidden is None else (sum_weighted(touched.force, hidden).tolist(),)
+        memory = self.follow(memory, total, *center[:2], *near[:3])
+        surface = sum_weighted(touched.height, force).tolist() if self.is_new(memory) else total
+        memory = self.lead(memory, total, surface, *noise)
+        return memory, self.find_disc(memory)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
@@ -119,13 +408,13 @@ class VirtualMasterControl(MasterControl):
         off = target - rest
         np.abs(off, off)
         # Outside the blister formed cells hold, the others rest: True and False are the codes of these modes.
-        mode: NDArray[np.int8] = (off > band).view(np.int8)
+        mode: Modes = (off > band).view(np.int8)
         if self.is_active(memory):
             memory, target = self._create_blister(memory, seen, mode)
         command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
         return memory, Commands(target, mode, command)
 
-    def _create_blister(self, memory: Any, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Any, Floats]:
+    def _create_blister(self, memory: Any, seen: Measurement, mode: Modes) -> tuple[Any, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         cells = self._rule.divide(self.get_pose(memory), seen.quadratic_basis)
         facing = self._rule.find_edge(cells)
@@ -156,9 +445,9 @@ class VirtualMasterControl(MasterControl):
     @cached_property
     def _rule(self) -> BlisterRule:
         """Which cells of the blister are frozen, and which are touched."""
-        known = self.parameters
-        release = np.maximum(known.release_force, self.floor) if self._noisy else known.release_force
-        return BlisterRule(self.blister, known.behind, release, self.floor)
+        gains = self.parameters
+        release = np.maximum(gains.release_force, self.floor) if self._noisy else gains.release_force
+        return BlisterRule(self.blister, gains.behind, release, self.floor)
 
     @cached_property
     def _limits(self) -> Constants:
@@ -166,22 +455,34 @@ class VirtualMasterControl(MasterControl):
         return Constants((self.actuator.rest_height, self.parameters.dead_band))
 
 
+def _decide_by_run(
+    decide: Callable[..., Any], join: Callable[[Iterable[Any]], Any] = list
+) -> Callable[..., Any]:
+    """Return a method of a batch's controller: each run's decision on its memory and numbers, joined."""
+
+    def decide_all(batch: VirtualMasterBatch, memory: list[Master], *columns: list[Any]) -> Any:
+        return join(map(decide, batch.runs, memory, *columns))
+
+    return decide_all
+
+
+def _gather(rows: Iterable[tuple[Any, ...]]) -> tuple[Any, ...]:
+    """Return the numbers of each run as arrays (b,)."""
+    return tuple(map(np.array, zip(*rows, strict=True)))
+
+
 @dataclass(frozen=True, eq=False)
 class VirtualMasterBatch(VirtualMasterControl):
-    """Controller of Method I for the beds of a batch: its masters are decided about run by run."""
+    """Controller of Method I for the beds of a batch: its memory is a list of masters."""
 
-    follow = decide_by_run(MasterControl.follow)
-    lead = decide_by_run(MasterControl.lead)
-    set_surface = decide_by_run(MasterControl.set_surface)
-    add_noise = decide_by_run(MasterControl.add_noise)
-    find_disc = decide_by_run(MasterControl.find_disc)
-    set_edge = decide_by_run(MasterControl.set_edge)
-    get_place = gather_by_run(MasterControl.get_place)
-    get_pose = gather_by_run(MasterControl.get_pose)
-    get_heights = gather_by_run(MasterControl.get_heights)
-
-    is_active = decide_by_any(MasterControl.is_active)
-    is_new = decide_by_any(MasterControl.is_new)
+    follow = _decide_by_run(VirtualMasterControl.follow)
+    is_new = _decide_by_run(VirtualMasterControl.is_new, any)
+    lead = _decide_by_run(VirtualMasterControl.lead)
+    find_disc = _decide_by_run(VirtualMasterControl.find_disc)
+    is_active = _decide_by_run(VirtualMasterControl.is_active, any)
+    get_pose = _decide_by_run(VirtualMasterControl.get_pose, _gather)
+    set_edge = _decide_by_run(VirtualMasterControl.set_edge)
+    get_heights = _decide_by_run(VirtualMasterControl.get_heights, _gather)
 
 
 def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl:

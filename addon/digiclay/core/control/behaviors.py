@@ -1,0 +1,226 @@
+"""Elastic, plastic and viscous behaviors: what a pressed pin does, and where it goes when left alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Cells, Flags, Floats, Modes
+from ..base.errors import ParameterError
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.control_interface import Commands, Measurement
+from ..model.layout import Disc
+from .device_info import DeviceInfo, check_floor
+from .drive import CellwiseControl, Drive, TouchParameters, check_damping, make_drive, raise_felt_force
+from .exchange import Exchange, make_exchange
+
+#: Share of the felt force down to which a touched cell stays touched: its spring may press no harder.
+STILL = 0.2
+#: Displacement below which the border of the displaced region is of no interest, in dead bands.
+BORDER = 0.1
+
+
+@dataclass(frozen=True)
+class Elastic(TouchParameters):
+    """Spring and damper under every pin."""
+
+    stiffness: float = quantity(20.0, "stiffness of a cell's spring", unit="N/m", symbol="k", above=0.0)
+    damping: float = quantity(5.0, "force over speed of a pressed pin", unit="N s/m", symbol="c", above=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticControl(CellwiseControl):
+    """Controller of the elastic behavior: a pressed pin yields like a spring and returns.
+
+    Pressed: ``c dH/dt = k (H_0 - H) - F``. Left alone: back to rest, ``dH/dt = (H_0 - H) / τ_s``.
+    """
+
+    parameters: Elastic
+
+    name = "elastic"
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Let pressed cells give way, and the others spring back; see `Controller`."""
+        gains, rest = self.parameters, self.actuator.rest_height
+        error = rest - seen.height
+        pressed = seen.force >= gains.felt_force * np.where(seen.mode == Mode.SPRING, STILL, 1.0)
+        giving = (gains.stiffness * error - seen.force) / gains.damping
+        speed = np.where(pressed, giving, self.drive.approach(error))
+        mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
+        target = np.full(seen.height.shape, rest)
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+
+
+@dataclass(frozen=True)
+class Plastic(TouchParameters):
+    """Bingham body under every pin: rigid up to a yield force, viscous above."""
+
+    yield_force: float = quantity(0.03, "force above which a cell yields", unit="N", symbol="F_y", above=0.0)
+    damping: float = quantity(
+        5.0, "force above yield over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0
+    )
+
+    def check(self) -> None:
+        """The yield force is at least the felt force."""
+        if not self.yield_force >= self.felt_force:
+            rule = f"must be at least felt_force, {self.felt_force:g} N"
+            raise ParameterError("Plastic", "yield_force", rule, f"{self.yield_force:g} N")
+
+
+@dataclass(frozen=True, eq=False)
+class PlasticControl(CellwiseControl):
+    """Controller of the plastic behavior: a pin above its yield force gives way and keeps its lowest height.
+
+    Above yield: ``c dH/dt = -(F - F_y)``, and the height reached is kept as the cell's target. Below:
+    the pin stays; left alone, it goes to the deepest height it was pressed to.
+    """
+
+    parameters: Plastic
+
+    name = "plastic"
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Let cells give way that are pressed beyond yield, hold the others; see `Controller`."""
+        limits = self.parameters
+        pressed = seen.force >= limits.felt_force
+        yielding = seen.force > limits.yield_force
+        target = np.where(yielding, np.minimum(seen.target, seen.height), seen.target)
+        # A pin under the fingertip is not pushed back up: what it sank after yielding is felt as no force.
+        back = self.drive.approach(target - seen.height)
+        speed = np.where(pressed, np.minimum(back, 0.0), back)
+        np.putmask(speed, yielding, (limits.yield_force - seen.force) / limits.damping)
+        mode = self.drive.mark_formed(target, self.actuator.rest_height)
+        np.putmask(mode, pressed, np.int8(Mode.SPRING))
+        np.putmask(mode, yielding, np.int8(Mode.FORCE_FOLLOW))
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+
+
+@dataclass(frozen=True)
+class Viscous(TouchParameters):
+    """Spring and damper in parallel under every pin, and the exchange between neighbors.
+
+    What Materiable calls viscosity: every cell a spring and a damper, and neighbors evened out.
+    """
+
+    damping: float = quantity(10.0, "force over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
+    recovery_time: float = quantity(
+        1.0, "time constant of the surface's recovery", unit="s", symbol="τ_r", above=0.0
+    )
+    diffusivity: float = quantity(
+        10e-6, "diffusivity of the displacement between neighbors", unit="m2/s", symbol="D", at_least=0.0
+    )
+
+
+class Spot(NamedTuple):
+    """Memory of the viscous behavior: the box around all displaced cells, m; empty before any touch."""
+
+    left: float = math.inf
+    right: float = -math.inf
+    bottom: float = math.inf
+    top: float = -math.inf
+
+    def around(self, basis: Floats) -> Spot:
+        """Return a box that holds some places, by rows 1, x, y, ... of (6, m), as well."""
+        if not basis.shape[1]:
+            return self
+        (left, bottom), (right, top) = basis[1:3].min(axis=1).tolist(), basis[1:3].max(axis=1).tolist()
+        return Spot(
+            min(self.left, left), max(self.right, right), min(self.bottom, bottom), max(self.top, top)
+        )
+
+    def disc(self, margin: float) -> Disc | None:
+        """Return a disc that holds the box and a margin, m; None for an empty one."""
+        if self.left > self.right:
+            return None
+        across = math.hypot(self.right - self.left, self.top - self.bottom)
+        return (self.left + self.right) / 2, (self.bottom + self.top) / 2, across / 2 + margin
+
+
+@dataclass(frozen=True, eq=False)
+class ViscousControl:
+    """Controller of the viscous behavior: a pressed pin sinks slowly, displaces its neighbors, and recovers.
+
+    ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbors exchange,
+    then every cell relaxes under its force, exactly. The exchange keeps Σ u, so that the volume of a
+    dent decays with τ_r whatever D is.
+
+    Attributes
+    ----------
+    margin : float
+        How far beyond the displaced cells cells take part, m.
+    """
+
+    parameters: Viscous
+    actuator: Actuator
+    drive: Drive
+    exchange: Exchange
+    period: float
+    margin: float
+
+    name = "viscous"
+    rows = 0
+
+    def begin(self) -> Spot:
+        """Return the memory before a session."""
+        return Spot()
+
+    def locate(self, memory: Spot, touched: Measurement) -> tuple[Spot, Disc | None]:
+        """Request all displaced cells and a margin around them; see `Controller`."""
+        spot = memory.around(touched.quadratic_basis[:, touched.force >= self.parameters.felt_force])
+        return spot, spot.disc(self.margin)
+
+    def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Commands]:
+        """Exchange, relax, and move every cell to its new height; see `Controller`."""
+        gains, actuator = self.parameters, self.actuator
+        rest = actuator.rest_height
+        pressed = seen.force >= gains.felt_force
+        shift = self.exchange.even_out(seen.cells, seen.target - rest)
+        decay = math.exp(-self.period / gains.recovery_time)
+        # Spring k = c / τ_r: the exact solution of c du/dt = -F - k u over the period.
+        shift *= decay
+        shift -= seen.force * pressed * (gains.recovery_time / gains.damping * (1.0 - decay))
+        shift = np.minimum(np.maximum(shift, -rest), actuator.stroke - rest)
+        size = np.abs(shift)
+        if not pressed.any() and size.max(initial=0.0) <= gains.dead_band:
+            memory, shift, size = Spot(), np.zeros(shift.size), np.zeros(shift.size)
+        else:
+            memory = memory.around(seen.quadratic_basis[:, size > BORDER * gains.dead_band])
+        target, formed = rest + shift, size > gains.dead_band
+        # The surface creeps by less than the dead band a period: its own speed is asked for as well.
+        creep = np.where(formed, (target - seen.target) / self.period, 0.0)
+        command = self.drive.command(creep + self.drive.approach(target - seen.height), seen.force)
+        return memory, Commands(target, self._modes(seen.cells, pressed, formed), command)
+
+    def _modes(self, cells: Cells, pressed: Flags, formed: Flags) -> Modes:
+        """Return the modes: pressed, drawn along by a pressed neighbor, recovering, at rest."""
+        drawn = np.zeros(cells.size, np.bool_)
+        if pressed.any():
+            for one, other, _ in self.exchange.find_pairs(cells):
+                drawn[one] |= pressed[other]
+                drawn[other] |= pressed[one]
+        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        np.putmask(mode, drawn & formed, np.int8(Mode.BLISTER))
+        np.putmask(mode, pressed, np.int8(Mode.SPRING))
+        return mode
+
+
+def build(parameters: Any, device: DeviceInfo) -> ElasticControl | PlasticControl | ViscousControl:
+    """Put the behavior with these parameters together for a device."""
+    stiffness = parameters.stiffness if isinstance(parameters, Elastic) else 0.0
+    check_damping(parameters.damping, device.cell, device.period, stiffness)
+    if isinstance(parameters, Plastic):
+        check_floor(parameters.yield_force, "yield_force", parameters.yield_force, device.force_floor)
+    actuator, drive = device.cell.actuator, make_drive(parameters, device.cell, device.period)
+    parameters = raise_felt_force(device.force_floor, parameters)
+    if isinstance(parameters, Elastic):
+        return ElasticControl(parameters, actuator, drive)
+    if isinstance(parameters, Plastic):
+        return PlasticControl(parameters, actuator, drive)
+    exchange = make_exchange(device.grid, parameters.diffusivity, device.period)
+    margin = 2.0 * device.grid.layout.pitch
+    return ViscousControl(parameters, actuator, drive, exchange, device.period, margin)
