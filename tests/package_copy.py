@@ -14,9 +14,9 @@ ROOT = Path(__file__).parents[1]
 
 
 def copy_package(folder: Path) -> Path:
-    """Copy the package, and what makes the nomenclature, into a folder; return it."""
-    for name in ("addon/digiclay", "tools", "docs"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
+    """Copy the package into a folder; return it."""
+    name = "addon/digiclay"
+    shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     return folder
 
 

@@ -17,7 +17,6 @@ PYTHON = [sys.executable, "-m"]
 MENDERS = (
     [*PYTHON, "ruff", "check", "--quiet", "--fix", "."],
     [*PYTHON, "ruff", "format", "--quiet", "."],
-    [sys.executable, "tools/nomenclature.py"],
     [sys.executable, "tools/manual.py"],
     [sys.executable, "tools/tool_icon.py"],
 )

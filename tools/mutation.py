@@ -56,7 +56,7 @@ class Mutant:
         assert text is not None, f"no mutant: {self}"
         return text
 
-    def said(self) -> str:
+    def describe(self) -> str:
         """Return file, line, and the line before and after."""
         before = self.path.read_text(encoding="utf-8").splitlines()
         after = self.source().splitlines()

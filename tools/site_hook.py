@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,9 +15,6 @@ from mkdocs.structure.files import File
 
 #: Page that lists the packages of the code; the pages of the packages follow it in the navigation.
 PYTHON = "reference/python.md"
-#: Parameters in the nomenclature: the site has a page of them.
-TABLES = re.compile(r"^## Parameters\n.*?(?=^## )", re.MULTILINE | re.DOTALL)
-PARAMETERS = "## Parameters\n\nThe page [parameters](reference/parameters.md) lists all of them.\n\n"
 
 
 def _lists(nav: list[Any]) -> Iterator[list[Any]]:
@@ -66,8 +62,6 @@ def on_files(files: Any, config: Any) -> None:
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     """Return the text of a page with the links of the site."""
     place = page.file.src_uri
-    if place == "nomenclature.md":
-        markdown = TABLES.sub(PARAMETERS, markdown)
     if place.startswith("reference/"):
         return markdown
     source = site_pages.ELSEWHERE.get(place, f"docs/{place}")

@@ -18,11 +18,12 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "tools")]
 
+from digiclay.commands.describe import describe_meaning, write_range, write_value  # noqa: E402
 from digiclay.commands.parser import parser  # noqa: E402
+from digiclay.core.base.quantity import EXTENTS, Parameters, list_quantities  # noqa: E402
 from digiclay.core.control.methods import METHODS  # noqa: E402
 from digiclay.core.files.formats import encode_png  # noqa: E402
 from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
-from nomenclature import LEGEND, section  # noqa: E402
 
 from benchmarks.kinds import parser as benchmarks_parser  # noqa: E402
 
@@ -49,9 +50,13 @@ PARAMETERS = """\
 
 Made from the declarations of the parameters in the core. A key of a scene file, `pitch = "2.5 mm"` in its
 section `[layout]`, is `--set "layout.pitch=2.5 mm"` on the command line. In Blender the panels *Device*,
-*Finger* and *Control* have the same parameters. The references are those of the
-[nomenclature](../nomenclature.md#references).
+*Finger* and *Control* have the same parameters. The source is P (the paper), D (derived), C (chosen), or a
+[reference](../nomenclature.md#references). A default in brackets is a sequence of values. A range is in the
+unit of the parameter. It does not contain rules that join several parameters. A range without an end has the
+limits of its unit:
 
+| Unit | Least above 0 | Most |
+|---|---|---|
 """
 PYTHON = """\
 # Python
@@ -125,14 +130,29 @@ def make_commands_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def _section(name: str, method: str) -> list[str]:
+    """Return the heading and the table of one section of a scene file."""
+    kind: type[Parameters] = import_parameters(name, method)
+    title = f"## [{name}]" + (f' with method = "{method}"' if name == "control" else "")
+    lines = ["", title, "", write_cell((kind.__doc__ or "").split("\n\n")[0]), ""]
+    lines += [
+        "| Symbol | Name | Unit | Meaning | Range | Default | Source |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for field, known in list_quantities(kind).items():
+        default, meaning = write_value(getattr(kind(), field)), describe_meaning(known)
+        cells = (f"`{name}.{field}`", known.unit, meaning, write_range(known), default, known.source)
+        lines.append("| " + " | ".join((known.symbol, *cells)) + " |")
+    return lines
+
+
 def make_parameters_page() -> str:
     """Return the page of all parameters of a scene, from their declarations."""
-    lines = [AHEAD + PARAMETERS + LEGEND.strip().partition("\n")[2].strip()]
+    lines = [AHEAD + PARAMETERS.rstrip()]
+    lines += [f"| {unit or 1} | {least:g} | {most:g} |" for unit, (least, most) in EXTENTS.items()]
     for name in SECTIONS:
         for method in METHODS if name == "control" else ("virtual_master",):
-            said = import_parameters(name, method).__doc__ or ""
-            _, heading, *table = section(name, method)
-            lines += ["", heading.removeprefix("#"), "", write_cell(said.split("\n\n")[0]), *table]
+            lines += _section(name, method)
     return "\n".join(lines) + "\n"
 
 

@@ -113,5 +113,7 @@ def test_a_new_behavior_is_one_file_and_one_line(copy: Path) -> None:
     assert found.pop("apart") > 1e-5
     # All runs of a batch in one call, not one after the other.
     assert found == {"joined": "SpongeControl", "in file": True, "panel": True}
-    run_python(copy, str(copy / "tools" / "nomenclature.py"))
-    assert "`control.swelling_time`" in (copy / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    described = run_python(
+        copy, "-m", "digiclay", "describe", "tap", "--parameters", "--set", "control.method=sponge"
+    )
+    assert "control.swelling_time = " in described

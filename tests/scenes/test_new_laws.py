@@ -165,10 +165,8 @@ def test_a_new_law_is_one_file_and_one_line(
     assert found.pop("apart") > 1e-5
     assert found.pop("default") > 1e-5
     assert found == {"told": True, "stepper": "bernoulli", "law in file": True, "panel": [True, True]}
-    run_python(copy, str(copy / "tools" / "nomenclature.py"))
-    page = (copy / "docs" / "nomenclature.md").read_text(encoding="utf-8")
-    assert f"`{section}.{asked[1]}`" in page
-    assert f"`{section}.law`" in page
+    words = ("describe", "tap", "--parameters", "--set", f"{section}.law={asked[0]}")
+    assert f"{section}.{asked[1]} = " in run_python(copy, "-m", "digiclay", *words)
 
 
 #: What runs in the copy: a scene without a word of laws.
@@ -186,7 +184,6 @@ def test_laws_that_no_scene_selects_change_no_file_and_no_other_test(copy: Path)
         add_law(copy, *law)
     shutil.copytree(ROOT / "tests", copy / "tests")
     shutil.copy(ROOT / "pyproject.toml", copy)
-    run_python(copy, str(copy / "tools" / "nomenclature.py"))
     assert run_python(copy, "-c", PLAIN) == "False 2\n"
     tests = ("regression/test_old_formats.py", "unit/test_schema.py")
     files = [str(copy / "tests" / name) for name in (*tests, "unit/test_toml_table.py")]

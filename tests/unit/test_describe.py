@@ -7,7 +7,10 @@ import re
 import numpy as np
 import pytest
 from digiclay.cli import main
+from digiclay.core.base.quantity import list_quantities
+from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.model.actuator import Actuator, Supply
+from digiclay.core.model.layout import Layout
 
 from tests.assemble import AWAY, one_cell, record, scripted
 
@@ -66,3 +69,12 @@ def test_a_reservoir_that_cannot_lower_a_pin_never_empties_the_bed(
     said = described(capsys, "supply.low=0")
     assert ", 0 mm/s down" in said["free speed"]
     assert "floor: never" in said["refill"]
+
+
+def test_every_parameter_is_listed_with_its_value_and_meaning(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["describe", "tap", "--parameters", "--set", "layout.pitch=3.5 mm"]) == 0
+    text = capsys.readouterr().out
+    parts = {"layout": Layout, "actuator": Actuator, "control": VirtualMaster}
+    names = [f"{section}.{name} = " for section, part in parts.items() for name in list_quantities(part)]
+    assert [name for name in names if name not in text] == []
+    assert "layout.pitch = 0.0035 m\n    distance of neighboring cells in a row; above 0; P\n" in text

@@ -8,11 +8,11 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from ..core.base.quantity import Parameters, list_quantities
+from ..core.base.quantity import Parameters, Quantity, list_quantities
 from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
-from ..core.scene.schema import Scene
+from ..core.scene.schema import SECTIONS, Scene
 from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
 from ..core.shapes.source_file import fit_shape
 from .arguments import add_command, add_scene, scene_of
@@ -21,6 +21,7 @@ EXAMPLES = """\
 examples:
   digiclay describe ridge_mound_valley
   digiclay describe my.toml --set relaxation=absent
+  digiclay describe my.toml --parameters
 """
 #: The places on the line from finger to pins, and the sections of the scene that fill them.
 PLACES = (
@@ -37,14 +38,46 @@ def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "describe", "list the parts of a scene and their parameters", EXAMPLES)
     add_scene(parser)
+    parser.add_argument(
+        "--parameters", action="store_true", help="each key with its value, range, meaning and source instead"
+    )
     parser.set_defaults(carry_out=carry_out)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Describe."""
     scene, _ = scene_of(arguments)
-    print("\n".join(description(scene, assemble(scene))))
+    lines = list_parameters(scene) if arguments.parameters else description(scene, assemble(scene))
+    print("\n".join(lines))
     return 0
+
+
+def list_parameters(scene: Scene) -> Iterator[str]:
+    """Give two lines for each parameter of the parts of a scene: key and value; meaning, range, source."""
+    yield "Sources: P the paper, D derived, C chosen, or a reference of docs/nomenclature.md."
+    for section in SECTIONS:
+        part = scene.section(section)
+        for name, known in list_quantities(part).items() if part else ():
+            yield f"{section}.{name} = {write_value(getattr(part, name))} {known.unit}".rstrip()
+            said = "; ".join(filter(None, (describe_meaning(known), write_range(known), known.source)))
+            yield textwrap.fill(said, 110, initial_indent="    ", subsequent_indent="    ")
+
+
+def describe_meaning(known: Quantity) -> str:
+    """Write the meaning of a parameter, with its choices."""
+    return known.doc + (f" ({', '.join(known.choices)})" if known.choices else "")
+
+
+def write_value(value: object) -> str:
+    """Write a value with the fewest digits that restore it."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(write_value(item) for item in value) + "]"
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def write_range(known: Quantity) -> str:
+    """Write the range of a parameter, in its unit."""
+    return ", ".join(f"{word.replace('_', ' ')} {write_value(end)}" for word, end in known.list_bounds())
 
 
 def description(scene: Scene, system: System) -> Iterator[str]:

@@ -132,15 +132,9 @@ def _tooltip(known: Quantity, default: object, unit: str, power: int) -> str:
         plain = isinstance(default, int)
         return f"{number if plain else to_shown(float(number), power):.6g} {unit}".rstrip()
 
-    bounds = (
-        ("above", known.above),
-        ("at least", known.at_least),
-        ("below", known.below),
-        ("at most", known.at_most),
-    )
     parts = [known.doc[0].upper() + known.doc[1:]]
     parts += [f"symbol {known.symbol}"] if known.symbol else []
-    parts += [f"{word} {value(number)}" for word, number in bounds if number is not None]
+    parts += [f"{word.replace('_', ' ')} {value(number)}" for word, number in known.list_bounds()]
     if isinstance(default, tuple):
         parts.append(f"separated by commas, by default {format_list(default, power)} {unit}".rstrip())
     elif isinstance(default, (int, float)):

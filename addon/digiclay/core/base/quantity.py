@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import operator
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -34,6 +35,8 @@ EXTENTS: dict[str, tuple[float, float]] = {
     "1/m": (1e-6, 1e9), "1/N": (1e-6, 1e9), "m/s": (1e-12, 1e6), "m/s2": (1e-9, 1e9), "kg/m3": (1e-3, 1e6),
     "m2/s": (1e-12, 1e3), "N s/m": (1e-9, 1e9), "": (1e-9, 1e9),
 }  # fmt: skip
+#: Bounds of a parameter: what a value within one fulfils.
+BOUNDS = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
 #: A number, and what stands behind it.
 WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*(.*)")
 
@@ -70,6 +73,10 @@ class Quantity:
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
         return f"{text} {self.unit}".rstrip()
 
+    def list_bounds(self) -> list[tuple[str, float]]:
+        """Return the declared bounds, each behind its name in `BOUNDS`."""
+        return [(word, getattr(self, word)) for word in BOUNDS if getattr(self, word) is not None]
+
     def broken_rule(self, value: Any) -> str:
         """Return the first bound `value` breaks, worded as a rule, or ``""``."""
         if self.choices and value not in self.choices:
@@ -78,14 +85,9 @@ class Quantity:
             return ""
         if not _finite(value):
             return "must be a finite number"
-        if self.above is not None and not value > self.above:
-            return f"must be above {self.show(self.above)}"
-        if self.at_least is not None and not value >= self.at_least:
-            return f"must be at least {self.show(self.at_least)}"
-        if self.below is not None and not value < self.below:
-            return f"must be below {self.show(self.below)}"
-        if self.at_most is not None and not value <= self.at_most:
-            return f"must be at most {self.show(self.at_most)}"
+        for word, bound in self.list_bounds():
+            if not BOUNDS[word](value, bound):
+                return f"must be {word.replace('_', ' ')} {self.show(bound)}"
         return self._out_of_extent(value)
 
     def _out_of_extent(self, value: float) -> str:
