@@ -15,9 +15,8 @@ import trimesh
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.surface.body import Body, compute_volume
 from digiclay.core.surface.features import Finding
-from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.formed import Body, Formed, compute_volume
 
 BED = Layout(rows=7, columns=5, arrangement="hexagonal")
 #: mm: files hold float32 or 6 decimals; half a unit in the last place at 50 mm is 2e-6 mm.

@@ -10,9 +10,8 @@ from digiclay.core.mesh_io import mesh_reader
 from digiclay.core.mesh_io.export_model import KINDS, Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.surface.body import NO_PIN, Body, compute_volume
 from digiclay.core.surface.features import Finding
-from digiclay.core.surface.formed import Formed, make_formed
+from digiclay.core.surface.formed import NO_PIN, Body, Formed, compute_volume, make_formed
 
 from tests.prisms import prism_volume
 

@@ -16,8 +16,7 @@ from digiclay.core.files import run_folder
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.surface.body import Body
-from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.formed import Body, Formed
 
 from tests.timeouts import TIMEOUT
 

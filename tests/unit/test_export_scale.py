@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from digiclay.core.mesh_io.export_model import Model, make_bodies
-from digiclay.core.surface.body import PIECE
+from digiclay.core.surface.formed import PIECE
 
 from benchmarks.__main__ import main
 from benchmarks.mesh_export import Export, formed, measured

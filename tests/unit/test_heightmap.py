@@ -10,7 +10,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes import heightmap
 from digiclay.core.shapes.heightmap import average_blocks, make_height_map, read_pixels
-from digiclay.core.shapes.relief import Placement
+from digiclay.core.shapes.request import Placement
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image

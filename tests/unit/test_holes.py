@@ -10,8 +10,7 @@ import trimesh
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes.mesh_relief import SMALL, ShapeMesh, fill_holes, make_shape_mesh
-from digiclay.core.shapes.relief import Placement
-from digiclay.core.shapes.request import Shape
+from digiclay.core.shapes.request import Placement, Shape
 from digiclay.core.shapes.source_file import fit_shape
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")

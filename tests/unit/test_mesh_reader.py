@@ -13,7 +13,7 @@ import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io import mesh_limits, mesh_writer
 from digiclay.core.mesh_io.mesh_reader import read
-from digiclay.core.surface.body import Body
+from digiclay.core.surface.formed import Body
 
 KINDS = ("gltf", "stl", "stl_ascii", "obj", "ply", "ply_ascii", "off", "glb", "3mf")
 HEAD = bytes(80) + struct.pack("<I", 4_000_000_000)

@@ -10,7 +10,7 @@ import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
-from digiclay.core.shapes.relief import Placement, Tops
+from digiclay.core.shapes.request import Placement, Tops
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import LinearNDInterpolator

@@ -13,8 +13,7 @@ from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Grid, Layout, make_grid
 from digiclay.core.shapes.fitting import Fitted, fit_relief
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
-from digiclay.core.shapes.relief import Placement
-from digiclay.core.shapes.request import Shape
+from digiclay.core.shapes.request import Placement, Shape
 from digiclay.core.shapes.source_file import read
 from digiclay.core.surface.formed import Formed
 

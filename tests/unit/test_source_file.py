@@ -18,7 +18,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.shapes.mesh_relief import ShapeMesh
 from digiclay.core.shapes.request import Shape
 from digiclay.core.shapes.source_file import SAMPLES, find_shape, fit_shape, list_shapes, read
-from digiclay.core.surface.body import Body
+from digiclay.core.surface.formed import Body
 
 ROOT = Path(__file__).parents[2]
 BED = make_grid(Layout(13, 13, 3e-3))

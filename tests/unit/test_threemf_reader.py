@@ -15,7 +15,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io import mesh_limits, mesh_writer, threemf_reader
 from digiclay.core.mesh_io.mesh_reader import read
 from digiclay.core.mesh_io.mesh_writer import CORE, HEAD, RELATIONS, TYPES
-from digiclay.core.surface.body import Body
+from digiclay.core.surface.formed import Body
 
 #: A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
 PLACES = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_files
 from ..core.mesh_io.export_model import KINDS, Model, make_bodies
-from ..core.mesh_io.mesh_axes import AXES, UP, make_axes
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix, write
+from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import Run, find_row, read_run
-from ..core.surface.body import Body
 from ..core.surface.features import Finding
-from ..core.surface.formed import make_formed
+from ..core.surface.formed import Body, make_formed
 from ..core.surface.skins import SKINS
 from .arguments import add_run, millimeters, seconds, told_as_options
 from .stop import require_surface

@@ -5,8 +5,8 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.mesh_io.export_model import make_bodies
-from ..core.mesh_io.mesh_axes import AXES, find_forward
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
+from ..core.mesh_io.obj_reader import AXES, find_forward
 from ..device.view import bed_of
 from ..exchange import formed_bed
 from ..ui_text import localize

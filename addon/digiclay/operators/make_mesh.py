@@ -13,7 +13,7 @@ from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
 from ..core.surface.features import Finding, summarize
 from ..core.surface.skins import SKINS
 from ..device.view import bed_of
-from ..exchange import body_mesh, formed_bed
+from ..exchange import formed_bed
 from ..panels.shape_exchange import LISTED
 from ..ui_text import localize
 from .action import Action
@@ -222,7 +222,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         things = []
         for body in made:
             name = f"{bed.name} {body.name if self.kind == 'features' else self.kind}"
-            new = body_mesh.make_object(body, name, smooth=smooth)
+            new = formed_bed.make_object(body, name, smooth=smooth)
             new[MADE] = True
             context.collection.objects.link(new)
             new.matrix_world = where

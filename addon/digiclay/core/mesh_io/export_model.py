@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
 from ..base.quantity import Parameters, quantity
-from ..surface.body import NO_PIN, Body, Indices
 from ..surface.features import Feature, Finding, find
-from ..surface.formed import Formed
+from ..surface.formed import NO_PIN, Body, Formed, Indices
 from ..surface.pins_solid import make_pins_solid
 from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
 from ..surface.skins import SKINS, SurfaceGrid, fit_skin

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from . import gltf_reader, obj_reader, threemf_reader
-from .mesh_axes import find_axes, make_axes
 from .mesh_limits import check_off, check_ply, check_stl, refuse_size, stl_is_text
+from .obj_reader import find_axes, make_axes
 
 Indices = NDArray[np.int64]
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
 from ..files.run_folder import open_whole
-from ..surface.body import NO_PIN, Body, Indices, split_pieces
-from .mesh_axes import UP, find_forward, make_axes
+from ..surface.formed import NO_PIN, Body, Indices, split_pieces
+from .obj_reader import UP, find_forward, make_axes
 
 #: One triangle of a binary file.
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])

@@ -14,8 +14,7 @@ from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.actuator import Actuator
 from ..model.layout import Grid
-from .relief import Placement, Relief, Tops
-from .request import Shape
+from .request import Placement, Relief, Shape, Tops
 
 HINT = "Take the shape in again."
 

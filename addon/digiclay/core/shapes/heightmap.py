@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.layout import RELATIVE_TOLERANCE, Grid
-from .relief import Placement, Tops
+from .request import Placement, Tops
 
 #: Bytes of a file in which its size is looked for; a JPEG's may stand behind a small picture of it.
 HEAD = 1 << 20

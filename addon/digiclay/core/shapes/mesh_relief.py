@@ -13,8 +13,7 @@ from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from ..surface.regions import label_components
-from .relief import Placement, Tops
-from .request import UPWARDS
+from .request import UPWARDS, Placement, Tops
 
 #: A hole is small if no more than this share of the covered pins stands under it.
 SMALL = 0.05

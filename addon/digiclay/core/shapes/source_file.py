@@ -16,8 +16,7 @@ from ..model.layout import Grid
 from .fitting import Fitted, fit_given, fit_relief
 from .heightmap import PICTURES, HeightMap, make_height_map, read_pixels
 from .mesh_relief import ShapeMesh, make_shape_mesh
-from .relief import Relief
-from .request import AUTO, LENGTHS, Shape
+from .request import AUTO, LENGTHS, Relief, Shape
 
 __all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fit_shape", "import_reader", "list_shapes", "read"]
 

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.spline import interpolate_monotone
-from .body import NO_PIN
-from .formed import Formed
+from .formed import NO_PIN, Formed
 from .skin_mesh import make_skin
 
 #: The skin is as wanted when no point would move further than this under its own pull, m.
