@@ -70,20 +70,20 @@ def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) ->
     """Return the bodies of a model, in m."""
     skin = make_skin_grid(formed, model)
     if model.kind == "features":
-        found = find(skin, finding)
-        if not found:
-            known = finding or Finding()
-            wanted = f"at least {known.smallest} pins more than {known.threshold * 1e3:g} mm"
+        features = find(skin, finding)
+        if not features:
+            criteria = finding or Finding()
+            wanted = f"at least {criteria.smallest} pins more than {criteria.threshold * 1e3:g} mm"
             raise OutputError(
                 f"There is no feature of {wanted} off the former surface: lower the threshold or the "
                 "smallest number of pins."
             )
-        return [_feature(formed, one) for one in found]
-    found = find(skin, finding) if finding else []
-    names = tuple(one.name for one in found)
+        return [_feature(formed, feature) for feature in features]
+    features = find(skin, finding) if finding else []
+    names = tuple(feature.name for feature in features)
     label = np.zeros(len(formed.height), np.int32)
-    for number, one in enumerate(found, 1):
-        label[one.pins] = number
+    for number, feature in enumerate(features, 1):
+        label[feature.pins] = number
     if model.kind == "pins":
         return [_pins(formed, model, names, label)]
     return [_skin(skin, model, names, label)]
@@ -129,7 +129,7 @@ def _feature(formed: Formed, feature: Feature) -> Body:
 
 
 def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict[str, Floats]:
-    """Return the values of vertices that belong to a pin each, or to none."""
+    """Return height, force and mode at vertices that belong to a pin each, or to none."""
     pinned = owner >= 0
     return {
         "height": vertices[:, 2].copy(),
@@ -139,17 +139,13 @@ def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict
 
 
 def make_feature_solid(feature: Feature) -> Body:
-    """Return the body between the surface as it is and as it was before, closed; it touches no other.
-
-    A boss stands on the former surface; a crease is the body that fills it up to there. Where the
-    feature ends, and at the edge of the bed, an upright wall closes it: as high as the threshold, because
-    an edge that thins out to nothing makes booleans of other programs fail.
-    """
+    """Return the closed body between the surface now and before: a boss, or what fills a crease."""
     region = feature.apart
     count = len(region.position)
     now = region.former + (region.off if feature.kind == "boss" else -region.off)
     over, under = np.maximum(now, region.former), np.minimum(now, region.former)
     vertices = np.concatenate([np.column_stack([region.position, one]) for one in (over, under)])
+    # Walls are as high as the threshold: an edge that thins out makes booleans of other programs fail.
     start, end = region.outline().T
     walls = [[start, start + count, end + count], [start, end + count, end]]
     sides = [np.stack(corners, axis=1) for corners in walls]

@@ -1,7 +1,7 @@
-"""Reading of glTF files, GLB and JSON: the triangles of all nodes of the scene, in meters, y up.
+"""Reader of glTF files, GLB and JSON: the triangles of all nodes of the scene, in meters, y up.
 
-Materials and pictures are not opened. Vertices in a file of their own are read if it lies in the
-folder of the glTF, or below it; a link that leads out of there is not followed.
+Materials and pictures are not opened; a file of vertices must lie in the glTF's folder, or below it.
+trimesh drops fans, takes normalized integers as they are, and allocates memory before it checks sizes.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ from .mesh_limits import (
 
 Indices = NDArray[np.int64]
 
-UNREADABLE = "must be a glTF 2.0 file that can be read"
 INSIDE = "must have its vertices in the file, or in a file in its own folder"
 #: Kinds of numbers, and how many of them an item has.
 NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -41,33 +40,27 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
 def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
-    """Return vertices (v, 3), m, and triangles (f, 3) of a file's bytes; `path` is where they lie.
-
-    `path`: files that it refers to are looked for beside it. Raises OSError when a file of vertices cannot be
-    read. Raises ParameterError when it is no glTF, is damaged, refers to what is not beside it, or is too
-    large.
-    """
+    """Return vertices (v, 3), m, and triangles (f, 3) of a file's bytes; `path` is where they lie."""
     try:
         tree, binary = _chunks(data, path.name) if data[:4] == b"glTF" else (json.loads(data), None)
         if not str(tree["asset"]["version"]).startswith("2."):
             raise ValueError(f"its version is {str(tree['asset']['version'])[:20]}")
         file = _File(path, tree, binary)
-        placed = list(file.placed())
-        parts = [(one, placement) for mesh, placement in placed for one in file.surfaces(mesh)]
-        refuse_many_triangles(path.name, sum(file.triangles(one) for one, _ in parts))
+        parts = list(file.surfaces())
+        refuse_many_triangles(path.name, sum(file.triangles(part) for part, _ in parts))
         # Vertices that no triangle uses are copied as well.
-        vertices = sum(file.size(one["attributes"]["POSITION"]) for one, _ in parts)
+        vertices = sum(file.size(part["attributes"]["POSITION"]) for part, _ in parts)
         refuse_many_triangles(path.name, vertices // 3)
-        return join_meshes(((*file.mesh(one), placement) for one, placement in parts), path.name)
+        return join_meshes(((*file.mesh(part), placement) for part, placement in parts), path.name)
     except ParameterError:
         raise
     except RecursionError:
-        said = "nested too deeply"
+        content = "nested too deeply"
     except KeyError as error:
-        said = f"{error} is missing"
+        content = f"{error} is missing"
     except (ValueError, TypeError, IndexError, AttributeError, OverflowError, struct.error) as error:
-        said = " ".join(str(error).split())[:100]
-    raise make_refusal(UNREADABLE, path.name, said)
+        content = " ".join(str(error).split())[:100]
+    raise make_refusal("must be a glTF 2.0 file that can be read", path.name, content)
 
 
 def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
@@ -82,12 +75,11 @@ def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
         size, kind = struct.unpack_from("<I4s", data, at)
         if at + 8 + size > length:
             raise make_refusal("must be whole", name, f"a part of {size:,} bytes that are not there")
-        chunks.append((kind, at + 8, size))
+        chunks.append((kind, data[at + 8 : at + 8 + size]))
         at += 8 + size
     if not chunks or chunks[0][0] != b"JSON":
         raise ValueError("its first part is not JSON")
-    (_, first, size), binary = chunks[0], next((one for one in chunks if one[0] == b"BIN\0"), None)
-    return json.loads(data[first : first + size]), data[binary[1] : sum(binary[1:])] if binary else None
+    return json.loads(chunks[0][1]), next((part for kind, part in chunks if kind == b"BIN\0"), None)
 
 
 def _count(value: Any) -> int:
@@ -112,8 +104,8 @@ class _File:
             raise ValueError(f"there is no entry {index} in {table}")
         return entries[index]
 
-    def placed(self) -> Iterator[tuple[Any, Floats]]:
-        """Give the meshes of the scene's nodes, and their placements."""
+    def surfaces(self) -> Iterator[tuple[Any, Floats]]:
+        """Give the parts of the nodes' meshes that are triangles, and their placements."""
         nodes = self._tree.get("nodes", [])
         if self._tree.get("scenes"):
             roots = self._entry("scenes", self._tree.get("scene", 0)).get("nodes", [])
@@ -129,12 +121,9 @@ class _File:
             seen.add(index)
             placement = nest_placement(_placement(node), outer)
             waiting += [(child, placement) for child in reversed(node.get("children", []))]
-            if "mesh" in node:
-                yield self._entry("meshes", node["mesh"]), placement
-
-    def surfaces(self, mesh: Any) -> list[Any]:
-        """Return those parts of a mesh that are triangles."""
-        return [one for one in mesh["primitives"] if one.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN)]
+            for part in self._entry("meshes", node["mesh"])["primitives"] if "mesh" in node else ():
+                if part.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
+                    yield part, placement
 
     def size(self, accessor: Any) -> int:
         """Return how many items an accessor has."""
@@ -165,37 +154,33 @@ class _File:
 
     def _numbers(self, accessor: Any, kind: str) -> NDArray[Any]:
         """Return the items of an accessor, (count, numbers an item)."""
-        known = self._entry("accessors", accessor)
-        if "bufferView" not in known or "sparse" in known:
-            raise make_refusal(
-                "must not hold compressed or sparse vertices", self._path.name, f"accessor {accessor}"
-            )
-        if known["type"] != kind or known["componentType"] not in NUMBERS:
+        entry = self._entry("accessors", accessor)
+        if "bufferView" not in entry or "sparse" in entry:
+            rule = "must not hold compressed or sparse vertices"
+            raise make_refusal(rule, self._path.name, f"accessor {accessor}")
+        if entry["type"] != kind or entry["componentType"] not in NUMBERS:
             raise ValueError(f"accessor {accessor} is no {kind} of a known type")
-        number, width, count = np.dtype(NUMBERS[known["componentType"]]), ITEMS[kind], self.size(accessor)
-        view = self._entry("bufferViews", known["bufferView"])
+        number, width, count = np.dtype(NUMBERS[entry["componentType"]]), ITEMS[kind], self.size(accessor)
+        view = self._entry("bufferViews", entry["bufferView"])
         item = number.itemsize * width
-        offset, stride = _count(known.get("byteOffset", 0)), _count(view.get("byteStride", item))
+        offset, stride = _count(entry.get("byteOffset", 0)), _count(view.get("byteStride", item))
         start, length = _count(view.get("byteOffset", 0)), _count(view["byteLength"])
         buffer = self._buffer(view["buffer"])
         if stride < item or (count and offset + (count - 1) * stride + item > length):
             raise ValueError(f"accessor {accessor} reaches beyond its view")
         if start + length > len(buffer):
-            raise make_refusal(
-                "must be whole", self._path.name, f"{len(buffer):,} bytes of {start + length:,}"
-            )
-        items: NDArray[Any] = np.ndarray(
-            (count, width), number, buffer, start + offset, (stride, number.itemsize)
-        )
-        if number.kind != "f" and known.get("normalized", False):
+            content = f"{len(buffer):,} bytes of {start + length:,}"
+            raise make_refusal("must be whole", self._path.name, content)
+        places = (stride, number.itemsize)
+        items: NDArray[Any] = np.ndarray((count, width), number, buffer, start + offset, places)
+        if number.kind != "f" and entry.get("normalized", False):
             return np.maximum(items / float(np.iinfo(number).max), -1.0)
         return items
 
     def _buffer(self, index: Any) -> bytes:
         """Return the bytes of a buffer."""
-        known = self._entry("buffers", index)
+        uri = self._entry("buffers", index).get("uri")
         if index not in self._buffers:
-            uri = known.get("uri")
             if uri is None and index == 0 and self._binary is not None:
                 return self._binary
             if not isinstance(uri, str):
@@ -207,10 +192,9 @@ class _File:
         """Return the bytes of a file in the folder of this one."""
         # What begins with a drive or a scheme, an absolute path and a share are no names of files beside.
         name, folder = unquote(uri), self._path.parent.resolve()
-        if ":" in name or "\\" in name or "\0" in name or name.startswith("/"):
-            raise make_refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
-        file = (folder / name).resolve()
-        if not file.is_relative_to(folder):
+        outside = ":" in name or "\\" in name or "\0" in name or name.startswith("/")
+        file = folder if outside else (folder / name).resolve()
+        if outside or not file.is_relative_to(folder):
             raise make_refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
         if not file.is_file():
             raise make_refusal("must have its files beside it", self._path.name, f"no {uri[:60]!r}")
@@ -220,7 +204,7 @@ class _File:
 
 
 def _inline(uri: str) -> bytes:
-    """Return the bytes that stand in a text."""
+    """Return the bytes in an address that begins with ``data:``."""
     head, _, text = uri.partition(",")
     if not head.endswith(";base64"):
         raise ValueError("bytes as text that is not base64")
@@ -232,9 +216,8 @@ def _inline(uri: str) -> bytes:
 
 def _placement(node: Any) -> Floats:
     """Return how a node places what is in it, (4, 3)."""
-    if "matrix" in node:
-        matrix = np.array(node["matrix"], np.float64).reshape(4, 4)  # its columns one after another
-        return matrix[:, :3]
+    if "matrix" in node:  # its columns one after another
+        return np.array(node["matrix"], np.float64).reshape(4, 4)[:, :3]
     x, y, z, w = map(float, node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
     length = math.sqrt(x * x + y * y + z * z + w * w) or 1.0
     x, y, z, w = x / length, y / length, z / length, w / length

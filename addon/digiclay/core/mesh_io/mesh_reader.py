@@ -31,17 +31,7 @@ BOM = b"\xef\xbb\xbf"
 
 
 class Read(NamedTuple):
-    """Mesh in the form of its file.
-
-    Attributes
-    ----------
-    vertices : ndarray (v, 3)
-    faces : ndarray of int (f, 3)
-    length : float or None
-        Meters in the vertices' unit; None where the format does not say.
-    up : str
-        Which of its directions the format has upwards.
-    """
+    """Mesh in the form of its file: (v, 3), (f, 3), meters in its unit or None, direction that is up."""
 
     vertices: Floats
     faces: Indices
@@ -55,11 +45,7 @@ def find_library(kind: str) -> str:
 
 
 def read(path: Path) -> Read:
-    """Read a mesh; its extension, one of `MESHES`, determines the format.
-
-    Raises OSError when the file cannot be read. Raises ParameterError when it is too large, cut off, damaged,
-    or refers to what is not in its folder.
-    """
+    """Read a mesh in the format of its extension, one of `MESHES`; raises OSError or ParameterError."""
     kind = path.suffix.lower()
     refuse_size(path.name, path.stat().st_size)
     if kind == ".3mf":
@@ -78,7 +64,7 @@ def read(path: Path) -> Read:
 
 
 def _by_trimesh(data: bytes, kind: str, path: Path) -> tuple[Floats, Indices]:
-    """Read a mesh with trimesh, which is given the bytes alone and nothing to look elsewhere with."""
+    """Read a mesh with trimesh, which gets the bytes alone and cannot open another file."""
     try:
         trimesh: Any = importlib.import_module("trimesh")
     except ImportError:
@@ -86,7 +72,7 @@ def _by_trimesh(data: bytes, kind: str, path: Path) -> tuple[Floats, Indices]:
             "shape", "file", "must be an OBJ, a GLB, a 3MF, a picture or an array without trimesh", str(path),
             "Run 'pip install trimesh'.",
         ) from None  # fmt: skip
-    known = "stl_ascii" if kind == ".stl" and stl_is_text(data) else kind[1:]
-    more = {"skip_materials": True} if kind == ".ply" else {}
-    read = trimesh.load_mesh(io.BytesIO(data), file_type=known, resolver={}, process=False, **more)
-    return np.asarray(read.vertices, np.float64), np.asarray(read.faces)
+    file_type = "stl_ascii" if kind == ".stl" and stl_is_text(data) else kind[1:]
+    options = {"skip_materials": True} if kind == ".ply" else {}
+    mesh = trimesh.load_mesh(io.BytesIO(data), file_type=file_type, resolver={}, process=False, **options)
+    return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import zipfile
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -25,10 +26,7 @@ TEXT += "endloop\nendfacet\n"
 
 
 def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write all bodies as one list of triangles, lengths in 1 / `factor` m.
-
-    `factor`: units of the file in a meter.
-    """
+    """Write all bodies as one list of triangles, lengths in 1 / `factor` m."""
     # The first word must not be "solid": by it readers know the text form.
     file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
     file.write(np.uint32(sum(len(body.faces) for body in bodies)).astype("<u4").tobytes())
@@ -41,10 +39,7 @@ def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 
 def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was.
-
-    `factor`: units of the file in a meter.
-    """
+    """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was."""
     for body in bodies:
         file.write(f"solid {body.name}\n".encode())
         for some in split_pieces(len(body.faces)):
@@ -56,8 +51,7 @@ def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 def _corners(body: Body, some: slice, factor: float) -> NDArray[np.float32]:
     """Return the corners of some triangles, shape (k, 3, 3)."""
-    corners: NDArray[np.float32] = (body.vertices[body.faces[some]] * factor).astype(np.float32)
-    return corners
+    return np.asarray(body.vertices[body.faces[some]] * factor, np.float32)
 
 
 def _normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -65,36 +59,29 @@ def _normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
     exact = corners.astype(np.float64)
     normal = np.cross(exact[:, 1] - exact[:, 0], exact[:, 2] - exact[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    unit: NDArray[np.float32] = (normal / np.where(length > 0.0, length, 1.0)).astype(np.float32)
-    return unit
+    return np.asarray(normal / np.where(length > 0.0, length, 1.0), np.float32)
 
 
-#: Modes are whole numbers of the common size, because some readers know no smaller one.
-VERTEX = np.dtype(
-    [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("height", "<f4"), ("force", "<f4"), ("mode", "<i4")]
-)
+#: Numbers of a vertex in a PLY. Modes have the common size, because some readers accept no smaller one.
+NUMBERS = {"x": "<f4", "y": "<f4", "z": "<f4", "height": "<f4", "force": "<f4", "mode": "<i4"}
+VERTEX = np.dtype(list(NUMBERS.items()))
 FACE = np.dtype([("count", "u1"), ("vertices", "<i4", 3)])
 
 
 def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies one after the other, lengths in 1 / `factor` m, forces in N.
-
-    `factor`: units of the file in a meter.
-    """
-    unit = "mm" if factor > 1.0 else "m"
+    """Write the bodies one after the other, lengths in 1 / `factor` m, forces in N."""
     lines = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment digiclay, lengths and height in {unit}, z up",
+        f"comment digiclay, lengths and height in {'mm' if factor > 1.0 else 'm'}, z up",
+        f"comment force in N, pressing down is positive; mode {NO_PIN}: no pin",
+        *(f"comment {body.name}: {len(body.vertices)} vertices, {len(body.faces)} faces" for body in bodies),
+        f"element vertex {sum(len(body.vertices) for body in bodies)}",
+        *(f"property {'int' if kind == '<i4' else 'float'} {name}" for name, kind in NUMBERS.items()),
+        f"element face {sum(len(body.faces) for body in bodies)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
     ]
-    lines += [f"comment force in N, pressing down is positive; mode {NO_PIN}: no pin"]
-    lines += [
-        f"comment {body.name}: {len(body.vertices)} vertices, {len(body.faces)} faces" for body in bodies
-    ]
-    lines += [f"element vertex {sum(len(body.vertices) for body in bodies)}"]
-    lines += [f"property float {name}" for name in ("x", "y", "z", "height", "force")]
-    lines += ["property int mode", f"element face {sum(len(body.faces) for body in bodies)}"]
-    lines += ["property list uchar int vertex_indices", "end_header", ""]
     file.write("\n".join(lines).encode())
     for body in bodies:
         for some in split_pieces(len(body.vertices)):
@@ -109,7 +96,7 @@ def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 
 def _vertices(body: Body, some: slice, factor: float) -> np.ndarray[tuple[int], np.dtype[np.void]]:
-    """Return some vertices as the file holds them; one without values is of no pin and bears no force."""
+    """Return some vertices as the file has them; without values they are of no pin and bear no force."""
     place = body.vertices[some] * factor
     table = np.zeros(len(place), VERTEX)
     table["x"], table["y"], table["z"] = place.T
@@ -155,20 +142,16 @@ LARGEST = 2**32 - 1
 
 
 def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies; `factor` is not used, since the unit is given.
-
-    Raises OutputError when the file would be too large for the format.
-    """
-    told = _description(bodies)
-    size = told["buffers"][0]["byteLength"]
-    text = json.dumps(told, separators=(",", ":")).encode()
+    """Write the bodies in meters, whatever the factor; OutputError when they are too large for the format."""
+    tree = _describe(bodies)
+    size = tree["buffers"][0]["byteLength"]
+    text = json.dumps(tree, separators=(",", ":")).encode()
     text = text.ljust(-(-len(text) // 4) * 4)
     whole = 12 + 8 + len(text) + 8 + size
     if whole > LARGEST:
         raise OutputError(f"A GLB holds at most 4 GiB (got {whole / 2**30:.3g} GiB): choose ply.")
-    file.write(b"glTF" + np.array([2, whole], "<u4").tobytes())
-    file.write(np.array([len(text)], "<u4").tobytes() + b"JSON" + text)
-    file.write(np.array([size], "<u4").tobytes() + b"BIN\0")
+    file.write(struct.pack("<4sIII4s", b"glTF", 2, whole, len(text), b"JSON") + text)
+    file.write(struct.pack("<I4s", size, b"BIN\0"))
     for body in bodies:
         for some in split_pieces(len(body.vertices)):
             file.write(_upright(body.vertices[some]).astype("<f4").tobytes())
@@ -176,12 +159,13 @@ def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
             file.write(body.faces[some].astype("<u4").tobytes())
 
 
-def _description(bodies: Sequence[Body]) -> dict[str, Any]:
+def _describe(bodies: Sequence[Body]) -> dict[str, Any]:
     """Return the JSON part: where in the binary part the vertices and faces of each body are."""
     views: list[dict[str, int]] = []
     accessors: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
     start = 0
-    for body in bodies:
+    for number, body in enumerate(bodies):
         for count, target in ((len(body.vertices), VERTICES), (len(body.faces), INDICES)):
             views.append({"buffer": 0, "byteOffset": start, "byteLength": 12 * count, "target": target})
             start += 12 * count
@@ -189,23 +173,17 @@ def _description(bodies: Sequence[Body]) -> dict[str, Any]:
         low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
         low, high = _upright(np.array([[low[0], high[1], low[2]], [high[0], low[1], high[2]]]))
         bounds = {"min": low.astype("<f4").tolist(), "max": high.astype("<f4").tolist()}
-        known = {"bufferView": len(views) - 2, "componentType": FLOAT, "count": len(body.vertices)}
-        accessors.append({**known, "type": "VEC3", **bounds})
-        known = {"bufferView": len(views) - 1, "componentType": UNSIGNED, "count": 3 * len(body.faces)}
-        accessors.append({**known, "type": "SCALAR"})
-    order = range(len(bodies))
+        place = {"bufferView": 2 * number, "componentType": FLOAT, "count": len(body.vertices)}
+        corner = {"bufferView": 2 * number + 1, "componentType": UNSIGNED, "count": 3 * len(body.faces)}
+        accessors += [{**place, "type": "VEC3", **bounds}, {**corner, "type": "SCALAR"}]
+        part = {"attributes": {"POSITION": 2 * number}, "indices": 2 * number + 1, "material": 0}
+        meshes.append({"name": body.name, "primitives": [part]})
     return {
         "asset": {"version": "2.0", "generator": "digiclay"},
         "scene": 0,
-        "scenes": [{"nodes": list(order)}],
-        "nodes": [{"mesh": i, "name": bodies[i].name} for i in order],
-        "meshes": [
-            {
-                "name": bodies[i].name,
-                "primitives": [{"attributes": {"POSITION": 2 * i}, "indices": 2 * i + 1, "material": 0}],
-            }
-            for i in order
-        ],
+        "scenes": [{"nodes": list(range(len(bodies)))}],
+        "nodes": [{"mesh": number, "name": body.name} for number, body in enumerate(bodies)],
+        "meshes": meshes,
         "materials": [{"name": "clay", "pbrMetallicRoughness": {"metallicFactor": 0.0}}],
         "accessors": accessors,
         "bufferViews": views,
@@ -237,7 +215,7 @@ MOMENT = (1980, 1, 1, 0, 0, 0)
 
 
 def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies, lengths in 1 / `factor` m. `factor`: units of the file in a meter."""
+    """Write the bodies as objects, lengths in 1 / `factor` m."""
     unit = "millimeter" if factor > 1.0 else "meter"
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):
@@ -252,10 +230,8 @@ def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
                 part.write(f'<object id="{number}" type="{kind}" name="{body.name}"><mesh>\n'.encode())
                 _mesh(part, body, factor)
                 part.write(b"</mesh></object>\n")
-            part.write(b"</resources>\n<build>\n")
-            for number in range(1, len(bodies) + 1):
-                part.write(f'<item objectid="{number}"/>\n'.encode())
-            part.write(b"</build>\n</model>\n")
+            items = "".join(f'<item objectid="{number}"/>\n' for number in range(1, len(bodies) + 1))
+            part.write(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
 
 
 def _mesh(part: IO[bytes], body: Body, factor: float) -> None:
@@ -297,10 +273,7 @@ UNITS: dict[str, float] = {"mm": 1e3, "m": 1.0}
 
 
 def find_format(name: str) -> str:
-    """Return the format called `name` (``"stl"``, ``".STL"``) as a key of `FORMATS`.
-
-    Raises OutputError when there is no such format.
-    """
+    """Return the format called `name` (``"stl"``, ``".STL"``) as a key of `FORMATS`, or raise OutputError."""
     key = name.lower().removeprefix(".")
     if key not in FORMATS:
         raise OutputError(f"Unknown mesh format {key!r}: known are {', '.join(FORMATS)}.")
@@ -320,18 +293,13 @@ def write(
     up: str = UP,
     forward: str = "",
 ) -> Path:
-    """Write bodies into one file, a few MB at a time.
+    """Write bodies into one file in a unit of `UNITS`; return it. An older one stays until it is complete.
 
-    `bodies`: one at least; they are left as they are; `path`: the file; an older one is replaced once the new
-    one is complete; `unit`: length unit of all formats but GLB, which is always in meters and y up, because
-    its standard says so; `kind`: a key of `FORMATS`; by default the extension of `path`; `up`, `forward`:
-    axes of an OBJ, of `axes.AXES`; by default those of Blender. Returns the file written. Raises OutputError:
-    on an unknown format, nothing to write, or when the file cannot be written. Raises ParameterError: on an
-    unknown unit or axis.
+    `kind`: a key of `FORMATS`, by default the extension of `path`; `up`, `forward`: axes of an OBJ.
     """
     target = Path(path)
-    named = find_format(target.suffix if kind is None else kind)
-    writer = partial(write_obj, up=up, forward=forward) if named == "obj" else WRITERS[named]
+    format_name = find_format(target.suffix if kind is None else kind)
+    writer = partial(write_obj, up=up, forward=forward) if format_name == "obj" else WRITERS[format_name]
     make_axes(up, forward)  # an error before the file is opened
     if unit not in UNITS:
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))

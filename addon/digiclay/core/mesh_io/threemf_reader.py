@@ -1,7 +1,7 @@
-"""Reading of 3MF files: a zip of XML parts; the build's items, each an object or components of others.
+"""Reader of 3MF files: a zip of XML parts; the build's items, each an object or components of others.
 
-Read as a stream and with what Python brings along. A document type, which is where XML names what
-is to be put in elsewhere, is refused: 3MF forbids it.
+Read as a stream by the standard library: trimesh would need lxml and networkx. A document type, where XML
+defines its replacements, is refused: 3MF forbids it.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from __future__ import annotations
 import posixpath
 import zipfile
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 from xml.parsers import expat
 
 import numpy as np
@@ -30,9 +30,12 @@ from .mesh_limits import (
 )
 
 Indices = NDArray[np.int64]
+#: Part and number of an object.
 Key = tuple[str, str]
-#: An object's part and number, and its placement (4, 3).
+#: An object, and its placement (4, 3).
 Placed = tuple[Key, Floats]
+#: Takes name and attributes of an element that begins.
+Start = Callable[[str, dict[str, str]], None]
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02 "
 PATH = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06 path"
@@ -72,8 +75,7 @@ class _Model:
     unpacked: int = 0
 
 
-@dataclass(frozen=True)
-class _Extent:
+class _Extent(NamedTuple):
     """Size of an object with its components: triangles, meshes, and depth of nesting."""
 
     triangles: int
@@ -82,38 +84,34 @@ class _Extent:
 
 
 def read(path: Path) -> tuple[Floats, Indices, float]:
-    """Return vertices (v, 3), triangles (f, 3), and the meters in the vertices' unit.
-
-    Raises OSError when the file cannot be read. Raises ParameterError when it is no 3MF, is damaged, refers
-    to what it does not hold, or is too large.
-    """
+    """Return vertices (v, 3), triangles (f, 3), and the meters in the vertices' unit."""
     name, model = path.name, _Model()
     try:
         with zipfile.ZipFile(path) as archive:
-            root = _model_part(archive, name, model)
-            waiting, known = [root], {root}
+            root = _find_root(archive, name, model)
+            waiting, seen = [root], {root}
             while waiting:
-                named = _take_in(archive, waiting.pop(), name, model, root) - known
-                waiting += sorted(named)
-                known |= named
+                parts = _add_part(archive, waiting.pop(), name, model, root) - seen
+                waiting += sorted(parts)
+                seen |= parts
     except (*BROKEN_ZIP, EOFError, KeyError) as error:
-        said = " ".join(str(error).strip("'\"").split())[:100] or type(error).__name__
-        raise make_refusal(UNREADABLE, name, said) from None
+        content = " ".join(str(error).strip("'\"").split())[:100] or type(error).__name__
+        raise make_refusal(UNREADABLE, name, content) from None
     return *_placed(model, name), model.unit
 
 
-def _model_part(archive: zipfile.ZipFile, name: str, model: _Model) -> str:
+def _find_root(archive: zipfile.ZipFile, name: str, model: _Model) -> str:
     """Return the part that holds the model, as the package's relations name it."""
-    found: list[str] = []
+    targets: list[str] = []
 
     def start(tag: str, given: dict[str, str]) -> None:
         if tag == RELATION and given.get("Type") == MODEL and given.get("TargetMode") != "External":
-            found.append(_inside("", given.get("Target", "")))
+            targets.append(_inside("", given.get("Target", "")))
 
     _parse(archive, "_rels/.rels", name, model, start)
-    if not found:
+    if not targets:
         raise make_refusal(UNREADABLE, name, "its relations name no model")
-    return found[0]
+    return targets[0]
 
 
 def _inside(part: str, target: str) -> str:
@@ -121,7 +119,7 @@ def _inside(part: str, target: str) -> str:
     return posixpath.normpath(posixpath.join("/", posixpath.dirname(part), target)).lstrip("/")
 
 
-def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start: Any) -> None:
+def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start: Start) -> None:
     """Read a part of the zip; call `start` with name and attributes of each element."""
     entry = archive.getinfo(part)
     model.unpacked += entry.file_size  # no more than that is unpacked, whatever there is
@@ -149,12 +147,12 @@ def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start:
         raise make_refusal(UNREADABLE, name, f"{part}: {error}") from None
 
 
-def _take_in(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root: str) -> set[str]:
+def _add_part(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root: str) -> set[str]:
     """Add a part's objects to the model, and the root part's items and unit; return the parts it names."""
     objects: list[_Object] = []
-    named: set[str] = set()
+    parts: set[str] = set()
 
-    def taken(kind: str, given: dict[str, str]) -> None:
+    def add(kind: str, given: dict[str, str]) -> None:
         if kind == "vertex":
             objects[-1].vertices.extend((float(given["x"]), float(given["y"]), float(given["z"])))
         elif kind == "triangle":
@@ -164,7 +162,7 @@ def _take_in(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root
             model.objects[part, given["id"]] = objects[-1]
         elif kind == "component" or (kind == "item" and part == root):
             placed = _reference(part, given)
-            named.add(placed[0][0])
+            parts.add(placed[0][0])
             (objects[-1].components if kind == "component" else model.items).append(placed)
         elif kind == "model" and part == root:
             unit = given.get("unit", "millimeter")
@@ -179,22 +177,18 @@ def _take_in(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root
         if kind in ("object", "component", "item"):
             model.counted += 1
             if model.counted > MOST_PARTS:
-                raise make_refusal(
-                    f"must have at most {MOST_PARTS:,} objects, components and items", name, "more"
-                )
+                rule = f"must have at most {MOST_PARTS:,} objects, components and items"
+                raise make_refusal(rule, name, "more")
         try:
-            taken(kind, given)
+            add(kind, given)
         except KeyError as error:
-            said = f"a {kind} without {error}"
+            raise make_refusal(UNREADABLE, name, f"{part}, a {kind} without {error}") from None
         except (ValueError, OverflowError, IndexError) as error:
-            said = f"{kind}: {error}"[:100]
-        else:
-            return
-        raise make_refusal(UNREADABLE, name, f"{part}, {said}")
+            raise make_refusal(UNREADABLE, name, f"{part}, {f'{kind}: {error}'[:100]}") from None
 
     _parse(archive, part, name, model, start)
-    refuse_many_triangles(name, sum(len(one.triangles) // 3 for one in model.objects.values()))
-    return named
+    refuse_many_triangles(name, sum(len(shape.triangles) // 3 for shape in model.objects.values()))
+    return parts
 
 
 def _reference(part: str, given: dict[str, str]) -> Placed:
@@ -211,43 +205,42 @@ def _reference(part: str, given: dict[str, str]) -> Placed:
 
 def _placed(model: _Model, name: str) -> tuple[Floats, Indices]:
     """Return all items' vertices and triangles, where the build puts them."""
-    known: dict[Key, _Extent] = {}
-    extents = [_extent(model, key, name, known, 0) for key, _ in model.items]
-    refuse_many_triangles(name, sum(extent.triangles for extent in extents))
-    meshes = sum(extent.meshes for extent in extents)
+    extents: dict[Key, _Extent] = {}
+    items = [_measure(model, key, name, extents, 0) for key, _ in model.items]
+    refuse_many_triangles(name, sum(extent.triangles for extent in items))
+    meshes = sum(extent.meshes for extent in items)
     if meshes > MOST_PARTS:
         raise make_refusal(f"must place at most {MOST_PARTS:,} meshes", name, f"{meshes:,}")
-    return join_meshes(_meshes(model, known), name)
+    return join_meshes(_meshes(model, extents), name)
 
 
-def _meshes(model: _Model, known: dict[Key, _Extent]) -> Iterator[tuple[Floats, Indices, Floats]]:
+def _meshes(model: _Model, extents: dict[Key, _Extent]) -> Iterator[tuple[Floats, Indices, Floats]]:
     """Give the mesh of each placed object that has one, and its placement."""
     waiting = list(reversed(model.items))
     while waiting:
         key, placement = waiting.pop()
-        if known[key].meshes:
-            one = model.objects[key]
-            waiting += [(inner, nest_placement(own, placement)) for inner, own in reversed(one.components)]
-            if one.triangles:
-                corners = np.array(one.triangles, np.int64).reshape(-1, 3)
-                yield np.array(one.vertices).reshape(-1, 3), corners, placement
+        if extents[key].meshes:
+            shape = model.objects[key]
+            waiting += [(inner, nest_placement(own, placement)) for inner, own in reversed(shape.components)]
+            if shape.triangles:
+                corners = np.array(shape.triangles, np.int64).reshape(-1, 3)
+                yield np.array(shape.vertices).reshape(-1, 3), corners, placement
 
 
-def _extent(model: _Model, key: Key, name: str, known: dict[Key, _Extent], depth: int) -> _Extent:
-    """Return what an object comes to; a support comes to nothing."""
-    if key not in known:
-        one = model.objects.get(key)
-        if one is None:
+def _measure(model: _Model, key: Key, name: str, extents: dict[Key, _Extent], depth: int) -> _Extent:
+    """Return the extent of an object with its components; that of a support is nothing."""
+    if key not in extents:
+        shape = model.objects.get(key)
+        if shape is None:
             raise make_refusal("must hold the objects it refers to", name, f"no object {key[1]} in {key[0]}")
-        below = DEEPEST + 1
-        if depth <= DEEPEST:
-            inside = [_extent(model, inner, name, known, depth + 1) for inner, _ in one.components]
-            below = 1 + max((extent.depth for extent in inside), default=-1)
-        if below > DEEPEST:
+        components = shape.components if depth <= DEEPEST else []
+        inside = [_measure(model, inner, name, extents, depth + 1) for inner, _ in components]
+        below = 1 + max((extent.depth for extent in inside), default=-1)
+        if max(depth, below) > DEEPEST:
             rule = f"must have components at most {DEEPEST} deep, and none in itself"
             raise make_refusal(rule, name, f"object {key[1]}")
-        own = len(one.triangles) // 3
+        own = len(shape.triangles) // 3
         triangles = own + sum(extent.triangles for extent in inside)
         meshes = (own > 0) + sum(extent.meshes for extent in inside)
-        known[key] = _Extent(0, 0, below) if one.support else _Extent(triangles, meshes, below)
-    return known[key]
+        extents[key] = _Extent(0, 0, below) if shape.support else _Extent(triangles, meshes, below)
+    return extents[key]

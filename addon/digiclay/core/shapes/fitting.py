@@ -25,11 +25,7 @@ def pack(heights: Floats) -> str:
 
 
 def unpack(text: str, grid: Grid) -> Floats:
-    """Return the heights of the cells of a bed, shape (n,), m.
-
-    `text`: from `pack`. Raises ParameterError when the text is not what `pack` made, or was made for another
-    bed.
-    """
+    """Return the heights of the cells of a bed, shape (n,), m, from a text that `pack` made for this bed."""
     wanted = 4 * grid.count
     try:
         opened = zlib.decompressobj()
@@ -38,7 +34,8 @@ def unpack(text: str, grid: Grid) -> Floats:
     except (binascii.Error, ValueError, zlib.error):
         whole, data = False, b""
     if not whole or (len(data) % 4 and len(data) <= wanted):
-        raise ParameterError("shape", "heights", "must be heights packed as text", _cut(text), HINT)
+        shown = repr(text if len(text) <= 20 else f"{text[:17]}...")
+        raise ParameterError("shape", "heights", "must be heights packed as text", shown, HINT)
     if len(data) != wanted:
         plan = grid.layout
         rule = f"must hold the heights of the bed's {plan.rows} x {plan.columns} cells"
@@ -49,11 +46,6 @@ def unpack(text: str, grid: Grid) -> Floats:
         cell = int(np.flatnonzero(~np.isfinite(heights))[0])
         raise ParameterError("shape", "heights", "must be finite numbers", f"{heights[cell]} at cell {cell}")
     return heights
-
-
-def _cut(text: str) -> str:
-    """Show the beginning of a long text."""
-    return repr(text if len(text) <= 20 else f"{text[:17]}...")
 
 
 #: A plan narrower than this share of its length is a line or a point: there is nothing to fit.
@@ -94,12 +86,9 @@ class Fitted:
         parts = [f"{self.name}: heights from {low:.1f} to {high:.1f} mm, covers {covers}"]
         clipped = self.too_low + self.too_high
         if clipped:
-            ends = [
-                f"{number} {where}"
-                for number, where in ((self.too_low, "at the floor"), (self.too_high, "at the stroke's end"))
-                if number
-            ]
-            parts.append(f"{_cells(clipped)} clipped ({', '.join(ends)})")
+            ends = ((self.too_low, "at the floor"), (self.too_high, "at the stroke's end"))
+            shown = ", ".join(f"{number} {where}" for number, where in ends if number)
+            parts.append(f"{_cells(clipped)} clipped ({shown})")
         else:
             parts.append("no cell clipped")
         if self.overhanging:
@@ -115,19 +104,14 @@ def _cells(count: int) -> str:
 
 
 def fit_given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
-    """Return the shape whose heights stand in the scene itself.
-
-    `actuator`: its stroke limits the heights. Raises ParameterError when they are not those of this bed.
-    """
-    return _clipped(shape.file or "heights", unpack(shape.heights, grid), _all_covered(grid), actuator)
+    """Return the shape whose heights are in the scene itself, clipped to the actuator's stroke."""
+    none = np.zeros(grid.count)
+    tops = Tops(none, none == 0.0, none != 0.0)
+    return _clipped(shape.file or "heights", unpack(shape.heights, grid), tops, actuator)
 
 
 def fit_relief(shape: Shape, relief: Relief, grid: Grid, actuator: Actuator) -> Fitted:
-    """Lay a shape onto a bed.
-
-    `shape`: how; `relief`: what; `actuator`: gives rest height and stroke. Raises ParameterError when it
-    covers no cell, or cannot be fitted the way it is asked for.
-    """
+    """Place a relief on a bed as `shape` requests, or raise ParameterError."""
     at = _placement(shape, relief, grid)
     tops = relief.tops(grid, at)
     if not tops.covered.any():
@@ -172,10 +156,10 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
         assert relief.value_length is not None  # what has a length in plan has one upwards
         return np.where(tops.covered, tops.value * relief.value_length, foot)
     seen = tops.value[tops.covered]
+    low, high = float(seen.min()), float(seen.max())
     # A bed covered all over shows the top surface alone; a shape that stands on the bed shows its sides.
-    bare = relief.underside is not None and not tops.covered.all()
-    low = relief.underside if bare and relief.underside is not None else float(seen.min())
-    high = float(seen.max())
+    if relief.underside is not None and not tops.covered.all():
+        low = relief.underside
     if shape.relief == "true":
         if relief.value_length is None:
             rule = "must be rise or stroke for a picture: its values are no lengths"
@@ -190,15 +174,8 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
 
 
 def _clipped(name: str, heights: Floats, tops: Tops, actuator: Actuator) -> Fitted:
-    """Keep heights within the stroke, and count what had to be clipped."""
+    """Keep heights within the stroke, and count the clipped cells."""
     # Less than a nanometer beyond an end is rounding.
     low, high = heights < -1e-9, heights > actuator.stroke + 1e-9
-    within = np.clip(heights, 0.0, actuator.stroke)
     counts = [int(np.count_nonzero(flags)) for flags in (tops.covered, tops.overhang, low, high)]
-    counts.append(tops.filled)
-    return Fitted(name, within, *counts)
-
-
-def _all_covered(grid: Grid) -> Tops:
-    """Return the cover of a shape that gives a height for every cell."""
-    return Tops(np.zeros(grid.count), np.ones(grid.count, np.bool_), np.zeros(grid.count, np.bool_))
+    return Fitted(name, np.clip(heights, 0.0, actuator.stroke), *counts, filled=tops.filled)

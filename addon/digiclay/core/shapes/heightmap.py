@@ -7,6 +7,7 @@ import re
 import struct
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,12 +27,7 @@ FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 def read_size(path: Path) -> tuple[int, int] | None:
-    """Return width and height of a picture in pixels, None if they are not in its header.
-
-    PNG, JPEG, BMP, TIFF, EXR and HDR are known, by what they begin with.
-
-    Raises OSError when the file cannot be read.
-    """
+    """Return width and height of a picture in pixels by its header, None where it has none that is known."""
     with path.open("rb") as file:
         head = file.read(HEAD)
         try:
@@ -40,15 +36,14 @@ def read_size(path: Path) -> tuple[int, int] | None:
                 file.seek(struct.unpack_from(f"{order}I", head, 4)[0])
                 return _tiff(file.read(HEAD), order)
             return _size(head)
-        except (struct.error, IndexError, ValueError):
+        except (struct.error, IndexError, KeyError, ValueError):
             return None
 
 
 def _size(head: bytes) -> tuple[int, int] | None:
-    """Return the size that stands in a head."""
+    """Return the size in the head of a PNG, BMP, JPEG, EXR or HDR."""
     if head[:8] == b"\x89PNG\r\n\x1a\n":
-        width, height = struct.unpack_from(">II", head, 16)
-        return width, height
+        return struct.unpack_from(">II", head, 16)
     if head[:2] == b"BM":
         width, height = struct.unpack_from("<ii", head, 18)
         return abs(width), abs(height)
@@ -59,10 +54,10 @@ def _size(head: bytes) -> tuple[int, int] | None:
         left, low, right, high = struct.unpack_from("<4i", head, at)
         return max(0, right - left + 1), max(0, high - low + 1)
     if head[:2] == b"#?":
-        found = re.search(rb"\n[+-]([XY]) (\d{1,18}) [+-][XY] (\d{1,18})\n", head)
-        if found:
-            first, second = int(found[2]), int(found[3])
-            return (second, first) if found[1] == b"Y" else (first, second)
+        line = re.search(rb"\n[+-]([XY]) (\d{1,18}) [+-][XY] (\d{1,18})\n", head)
+        if line:
+            first, second = int(line[2]), int(line[3])
+            return (second, first) if line[1] == b"Y" else (first, second)
     return None
 
 
@@ -86,8 +81,6 @@ def _tiff(entries: bytes, order: str) -> tuple[int, int]:
     for index in range(count):
         tag, kind = struct.unpack_from(f"{order}HH", entries, 2 + 12 * index)
         (size[tag],) = struct.unpack_from(order + ("H" if kind == 3 else "I"), entries, 10 + 12 * index)
-    if 256 not in size or 257 not in size:
-        raise ValueError("no size")
     return size[256], size[257]
 
 
@@ -108,11 +101,10 @@ READERS: list[Callable[[Path], Pixels]] = []
 
 
 def read_pixels(path: Path) -> Pixels:
-    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first.
-
-    Raises ParameterError when it cannot be read, or is too large.
-    """
-    _refuse_by_head(path)
+    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first."""
+    with suppress(OSError):  # which the reader itself reports
+        if size := read_size(path):
+            refuse_too_many(path, *size)
     if READERS:
         return READERS[-1](path)
     if path.suffix.lower() in BLENDER_ONLY:
@@ -121,10 +113,11 @@ def read_pixels(path: Path) -> Pixels:
     try:
         image: Any = importlib.import_module("PIL.Image")
     except ImportError:
-        raise ParameterError(
-            "shape", "file", "must be a mesh or an array where Pillow is not installed", str(path),
+        rule, hint = (
+            "must be a mesh or an array where Pillow is not installed",
             "Run 'pip install digiclay[images]'.",
-        ) from None  # fmt: skip
+        )
+        raise ParameterError("shape", "file", rule, str(path), hint) from None
     image.init()  # formats that are named are not looked for
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", image.DecompressionBombWarning)
@@ -134,32 +127,22 @@ def read_pixels(path: Path) -> Pixels:
                 gray = opened if opened.mode in GRAY else opened.convert("L")
                 return np.flipud(np.asarray(gray))
         except image.DecompressionBombError:
-            raise make_size_error(path, "too many pixels to open") from None
+            raise _make_size_error(path, "too many pixels to open") from None
         except OSError as error:
-            said = error.strerror or "not a picture, or cut off"
+            reason = error.strerror or "not a picture, or cut off"
         except (ValueError, SyntaxError, EOFError) as error:
-            said = " ".join(str(error).split())[:100]
-    raise ParameterError("shape", "file", "must be a picture that can be read", f"{path}: {said}")
-
-
-def _refuse_by_head(path: Path) -> None:
-    """Refuse a picture whose header states too large a size, for all readers."""
-    try:
-        size = read_size(path)
-    except OSError:
-        return  # said by who reads it
-    if size:
-        refuse_too_many(path, *size)
+            reason = " ".join(str(error).split())[:100]
+    raise ParameterError("shape", "file", "must be a picture that can be read", f"{path}: {reason}")
 
 
 def refuse_too_many(path: Path, width: int, height: int) -> None:
-    """Refuse a picture too large to be read. `width`, `height`: pixels."""
+    """Refuse a picture of too many pixels."""
     if width * height > MOST:
-        raise make_size_error(path, f"{width} x {height}")
+        raise _make_size_error(path, f"{width} x {height}")
 
 
-def make_size_error(path: Path, size: str) -> ParameterError:
-    """Return the error of a picture too large to be read. `size`: what it has."""
+def _make_size_error(path: Path, size: str) -> ParameterError:
+    """Return the error of a picture too large to be read."""
     rule = f"must have at most {MOST // 1_000_000} million pixels"
     return ParameterError("shape", "file", rule, f"{path}: {size}", "Make it smaller first.")
 
@@ -212,16 +195,10 @@ class HeightMap:
 
 
 def make_height_map(name: str, values: NDArray[np.generic], value_length: float | None = None) -> HeightMap:
-    """Make a map of an array of numbers, the first row at the lowest y.
-
-    `name`: what messages call it; `values` (r, c); `value_length`: meters in the unit of the values; by
-    default they are no lengths. Raises ParameterError when it is no map: not two-dimensional, smaller than 2
-    x 2, or with numbers that are not finite.
-    """
+    """Make a map of numbers (r, c), the first row at the lowest y; `value_length`: meters in their unit."""
     shown = " x ".join(map(str, values.shape)) or "a single number"
     if values.ndim != 2 or min(values.shape) < 2:
-        rule = "must hold at least 2 x 2 heights"
-        raise ParameterError("shape", "file", rule, f"{name}: {shown}")
+        raise ParameterError("shape", "file", "must hold at least 2 x 2 heights", f"{name}: {shown}")
     if values.size > MOST:
         rule = f"must hold at most {MOST // 1_000_000} million heights"
         raise ParameterError("shape", "file", rule, f"{name}: {shown}")
@@ -233,16 +210,13 @@ def make_height_map(name: str, values: NDArray[np.generic], value_length: float 
     bad = np.argwhere(~np.isfinite(kept))
     if bad.size:
         row, column = (bad[0] * block).tolist()
-        rule = "must hold finite numbers only"
-        raise ParameterError("shape", "file", rule, f"{name}: {kept[tuple(bad[0])]} at {row}, {column}")
+        content = f"{name}: {kept[tuple(bad[0])]} at {row}, {column}"
+        raise ParameterError("shape", "file", "must hold finite numbers only", content)
     return HeightMap(name, kept, (values.shape[0], values.shape[1]), block, value_length)
 
 
 def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
-    """Return the means over squares of `block` x `block` values; those at the end may be smaller.
-
-    `values` (r, c).
-    """
+    """Return the means over squares of `block` x `block` values (r, c); those at the end may be smaller."""
     if block == 1:
         return np.asarray(values, np.float64)
     rows, columns = values.shape
@@ -262,8 +236,7 @@ def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
 def _within(places: Floats, pixels: int) -> NDArray[np.bool_]:
     """Return the positions that lie on the pixels, those on the edge included."""
     slack = RELATIVE_TOLERANCE * pixels
-    inside: NDArray[np.bool_] = (places >= -slack) & (places <= pixels + slack)
-    return inside
+    return np.asarray((places >= -slack) & (places <= pixels + slack))
 
 
 def _places(places: Floats, pixels: int, block: int, count: int) -> Floats:
@@ -281,5 +254,4 @@ def _bilinear(values: Floats, rows: Floats, columns: Floats) -> Floats:
     up, over = rows - row, columns - column
     first = values[row, column] * (1.0 - over) + values[row, right] * over
     second = values[below, column] * (1.0 - over) + values[below, right] * over
-    between: Floats = first * (1.0 - up) + second * up
-    return between
+    return np.asarray(first * (1.0 - up) + second * up)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Flags, Floats
-from ..base.errors import ParameterError
+from ..mesh_io.mesh_limits import CORNERS, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from ..surface.regions import label_components
 from .request import UPWARDS, Placement, Tops
@@ -22,14 +22,9 @@ ROUNDS = 300
 
 
 def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags]:
-    """Return the values with those over small holes taken from around, and which pins these are.
-
-    A hole is a group of neighboring pins that the surface misses, with pins under the surface all
-    around: a group that reaches the rim of the bed is what lies beside the shape. The values over it
-    are the flattest that join those around it: each becomes the mean of its neighbors.
-
-    `value` (n,); `missing` bool (n,), pins whose value is not that of the surface.
-    """
+    """Return the values (n,) with those over small holes taken from around, and which pins these are."""
+    # A hole is a group of neighboring pins that the surface misses, with pins under the surface all around: a
+    # group that reaches the rim of the bed is what lies beside the shape.
     beside = grid.layout.find_neighbors(corners=False)
     number = np.flatnonzero(missing)
     position = np.full(grid.count + 1, -1)  # the last one, at -1, stands for what is beyond the rim
@@ -49,18 +44,18 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
 
 def _evened(value: Floats, hole: Flags, beside: Cells) -> Floats:
     """Return the values with those in holes between those around: first ring by ring, then evened out."""
-    found, waiting = value.copy(), hole.copy()
+    filled, waiting = value.copy(), hole.copy()
     while waiting.any():
         cells = np.flatnonzero(waiting)
-        known = ~waiting[beside[cells]]  # a hole has no neighbor beyond the rim
-        ring = known.any(axis=1)
-        sums = np.where(known, found[beside[cells]], 0.0).sum(axis=1)
-        found[cells[ring]] = sums[ring] / known.sum(axis=1)[ring]
+        valid = ~waiting[beside[cells]]  # a hole has no neighbor beyond the rim
+        ring = valid.any(axis=1)
+        sums = np.where(valid, filled[beside[cells]], 0.0).sum(axis=1)
+        filled[cells[ring]] = sums[ring] / valid.sum(axis=1)[ring]
         waiting[cells[ring]] = False
     cells = np.flatnonzero(hole)
     for _ in range(ROUNDS if cells.size else 0):
-        found[cells] = found[beside[cells]].mean(axis=1)
-    return found
+        filled[cells] = filled[beside[cells]].mean(axis=1)
+    return filled
 
 
 Indices = NDArray[np.int64]
@@ -69,7 +64,7 @@ CHUNK = 2_000_000
 #: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to
 #: float32 or to six digits, which moves the rim by up to a micrometer, and no pin is placed as exactly.
 EDGE = 1e-3
-#: Faces of a mesh are known to be turned outwards if more than this share of the pins sees an upper side.
+#: Faces of a mesh are turned outwards if more than this share of the pins sees an upper side.
 UPPER = 0.8
 #: Two hits of a ray are one when they are closer than this share of the mesh's height.
 SAME = 1e-5
@@ -101,8 +96,7 @@ class ShapeMesh:
     @cached_property
     def used(self) -> Floats:
         """The corners of the triangles, shape (3 f, 3)."""
-        used: Floats = self.vertices[self.faces.ravel()]
-        return used
+        return np.asarray(self.vertices[self.faces.ravel()])
 
     @property
     def box(self) -> tuple[float, float, float, float]:
@@ -126,17 +120,13 @@ class ShapeMesh:
         return bool(np.all(count == 2))
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
-        """Return the highest hit of each pin's ray, and where the ray passes through more than one layer.
-
-        A closed mesh is passed through once, from its top to its underside; an open one is hit once.
-        Small holes of an open one are filled from around.
-        """
+        """Return the highest hit of each pin's ray, and where it passes through more than one layer."""
         none = np.empty(0, np.bool_)
         hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), none, none)]
-        cell, z, over, up = (np.concatenate([hit[part] for hit in hits]) for part in range(4))
-        known = np.zeros(grid.count, np.bool_)
-        known[cell[over]] = True
-        used = over | ~known[cell]
+        cell, z, over, up = (np.concatenate(parts) for parts in zip(*hits, strict=True))
+        hit = np.zeros(grid.count, np.bool_)
+        hit[cell[over]] = True
+        used = over | ~hit[cell]  # what a ray closely passes counts where it hits nothing
         cell, z, up = cell[used], z[used], up[used]
         order = np.lexsort((up, z, cell))
         cell, z, up = cell[order], z[order], up[order]
@@ -146,6 +136,7 @@ class ShapeMesh:
         same = SAME * float(np.ptp(self.used[:, 2]))
         new = np.append(True, (cell[1:] != cell[:-1]) | (np.diff(z) > same))[: cell.size]
         layers = np.bincount(cell[new], minlength=grid.count)
+        # A closed mesh is passed through once, from its top to its underside; an open one is hit once.
         overhang = layers > (2 if self.closed else 1)
         if self.closed:
             return Tops(value, covered, overhang)
@@ -157,16 +148,15 @@ class ShapeMesh:
         return Tops(value, covered | hole, overhang & ~hole, int(np.count_nonzero(hole)))
 
     def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
-        """Give cells whose rays hit or closely pass a triangle: where, if they hit it, and if from above."""
+        """Give cells whose rays hit or closely pass a triangle: height, whether it is hit, and from above."""
         plan = self.vertices[:, :2] * (at.factor_x, at.factor_y) + (at.x, at.y)
         corners, z = plan[self.faces], self.vertices[self.faces, 2]
         sides = corners[:, 1:] - corners[:, :1]
         area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
         size = np.abs(sides).max(axis=(1, 2))
         slack = EDGE * min(grid.layout.pitch, grid.layout.row_spacing)
-        first_row, last_row, first, last = _window(
-            grid, corners.min(axis=1) - slack, corners.max(axis=1) + slack
-        )
+        low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
+        first_row, last_row, first, last = _window(grid, low, high)
         rows, columns = np.maximum(last_row - first_row + 1, 0), np.maximum(last - first + 1, 0)
         # A triangle on edge covers no pin; its neighbors have the same edges.
         candidates = np.where(np.abs(area) > 1e-12 * size * size, rows * columns, 0)
@@ -181,19 +171,15 @@ class ShapeMesh:
             dx, dy = grid.x[cell] - corners[face, 0, 0], grid.y[cell] - corners[face, 0, 1]
             (ax, ay), (bx, by) = sides[face, 0].T, sides[face, 1].T
             one, two = (dx * by - dy * bx) / area[face], (ax * dy - ay * dx) / area[face]
-            over = (
-                (one >= -RELATIVE_TOLERANCE)
-                & (two >= -RELATIVE_TOLERANCE)
-                & (one + two <= 1.0 + RELATIVE_TOLERANCE)
-            )
+            over = (np.minimum(one, two) >= -RELATIVE_TOLERANCE) & (one + two <= 1.0 + RELATIVE_TOLERANCE)
             # Beside an edge the triangle is as high as on it, however steep it is.
             one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)
             whole = np.maximum(one + two, 1.0)
             one, two = one / whole, two / whole
             near = np.hypot(dx - one * ax - two * bx, dy - one * ay - two * by) <= slack
-            cell, over, face, one, two = cell[near], over[near], face[near], one[near], two[near]
-            low = z[face, 0]
-            height = low + one * (z[face, 1] - low) + two * (z[face, 2] - low)
+            cell, over, face, one, two = (part[near] for part in (cell, over, face, one, two))
+            z0, z1, z2 = z[face].T
+            height = z0 + one * (z1 - z0) + two * (z2 - z0)
             yield cell, height, over, area[face] > 0.0
 
 
@@ -210,39 +196,24 @@ def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, In
     """Return the first and last rows and columns of the pins that lie in boxes (f, 2), m."""
     plan, (left, bottom) = grid.layout, grid.corner
 
-    def index(places: Floats, most: int) -> Indices:
-        bounded: Indices = np.clip(places, -1.0, most).astype(np.int64)
-        return bounded
-
-    first_row = np.ceil((low[:, 1] - bottom) / plan.row_spacing)
-    last_row = np.floor((high[:, 1] - bottom) / plan.row_spacing)
-    first = np.ceil((low[:, 0] - left - plan.shift) / plan.pitch)
-    last = np.floor((high[:, 0] - left) / plan.pitch)
-    return (
-        np.maximum(index(first_row, plan.rows), 0),
-        np.minimum(index(last_row, plan.rows), plan.rows - 1),
-        np.maximum(index(first, plan.columns), 0),
-        np.minimum(index(last, plan.columns), plan.columns - 1),
-    )
+    first_row = np.ceil((low[:, 1] - bottom) / plan.row_spacing).clip(0, plan.rows)
+    last_row = np.floor((high[:, 1] - bottom) / plan.row_spacing).clip(-1, plan.rows - 1)
+    first = np.ceil((low[:, 0] - left - plan.shift) / plan.pitch).clip(0, plan.columns)
+    last = np.floor((high[:, 0] - left) / plan.pitch).clip(-1, plan.columns - 1)
+    first_row, last_row, first, last = np.stack([first_row, last_row, first, last]).astype(np.int64)
+    return first_row, last_row, first, last
 
 
 def make_shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: float) -> ShapeMesh:
-    """Make a shape of triangles.
-
-    `name`: what messages call it; `vertices` (v, 3); `faces` int (f, 3); `up`: a key of `request.UPWARDS`;
-    `length`: meters in the vertices' unit. Raises ParameterError when there is no surface, or a vertex is not
-    finite.
-    """
+    """Make a shape of vertices (v, 3), `length` meters a unit, and faces (f, 3); `up`: a key of UPWARDS."""
     place, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
     if place.ndim != 2 or place.shape[1:] != (3,) or corners.ndim != 2 or not corners.size:
-        raise ParameterError("shape", "file", "must hold a surface made of faces", f"{name}: no face")
+        raise make_refusal("must hold a surface made of faces", name, "no face")
     if corners.min() < 0 or corners.max() >= len(place):
-        rule = "must have faces whose corners are among its vertices"
-        raise ParameterError("shape", "file", rule, f"{name}: corner {corners.max()} of {len(place)}")
+        raise make_refusal(CORNERS, name, f"corner {corners.max()} of {len(place)}")
     bad = np.flatnonzero(~np.isfinite(place).all(axis=1))
     if bad.size:
         shown = ", ".join(f"{value:g}" for value in place[bad[0]])
-        rule = "must have vertices that are finite numbers"
-        raise ParameterError("shape", "file", rule, f"{name}: vertex {bad[0]} at {shown}")
+        raise make_refusal("must have vertices that are finite numbers", name, f"vertex {bad[0]} at {shown}")
     axes, signs = UPWARDS[up]
     return ShapeMesh(name, place[:, axes] * signs, corners, length)

@@ -37,21 +37,13 @@ class Shape(Parameters):
     )
     scale: float = quantity(1.0, "scale of the plan", above=0.0, at_most=1e6)
     x: float = quantity(
-        0.0,
-        "shift of the middle from that of the bed",
-        unit="m",
-        symbol="x_s",
-        at_least=-100.0,
-        at_most=100.0,
-    )
+        0.0, "shift of the middle from that of the bed", unit="m", symbol="x_s",
+        at_least=-100.0, at_most=100.0,
+    )  # fmt: skip
     y: float = quantity(
-        0.0,
-        "shift of the middle from that of the bed",
-        unit="m",
-        symbol="y_s",
-        at_least=-100.0,
-        at_most=100.0,
-    )
+        0.0, "shift of the middle from that of the bed", unit="m", symbol="y_s",
+        at_least=-100.0, at_most=100.0,
+    )  # fmt: skip
     relief: str = quantity(
         "rise",
         "height: `rise`, up to the end of the stroke, or in proportion to the plan",
@@ -120,28 +112,22 @@ class Relief(Protocol):
     @property
     def name(self) -> str:
         """Name in messages."""
-        ...
 
     @property
     def box(self) -> tuple[float, float, float, float]:
         """Least x, least y, largest x, largest y of its plan."""
-        ...
 
     @property
     def length(self) -> float | None:
         """Meters in the unit of its plan; None where that has no length, as a picture's pixels."""
-        ...
 
     @property
     def value_length(self) -> float | None:
         """Meters in the unit of its heights; None where they are no lengths, as a picture's."""
-        ...
 
     @property
     def underside(self) -> float | None:
         """Its lowest point; None where there is nothing below the top surface."""
-        ...
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
         """Return its top surface at the pins."""
-        ...

@@ -18,8 +18,6 @@ from .heightmap import PICTURES, HeightMap, make_height_map, read_pixels
 from .mesh_relief import ShapeMesh, make_shape_mesh
 from .request import AUTO, LENGTHS, Relief, Shape
 
-__all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fit_shape", "import_reader", "list_shapes", "read"]
-
 #: Where the sample shapes are.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "shapes"
 ARRAY = ".npy"
@@ -33,28 +31,19 @@ def list_shapes() -> list[str]:
 
 
 def find_shape(word: str) -> Path:
-    """Return the file of a shape: a sample's name, or a file.
-
-    Raises SceneError when there is no such file, or sample.
-    """
+    """Return the file of a shape, given by a sample's name or its path, or raise SceneError."""
     return find_file(word, list_files(SAMPLES, *KINDS), "sample shape")
 
 
 def fit_shape(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
-    """Return the shape of a scene, laid onto its bed; errors as `read` and `fitting.fit_relief`.
-
-    `actuator`: its stroke limits the heights.
-    """
+    """Return the shape of a scene, placed on its bed; errors as `read` and `fitting.fit_relief`."""
     if shape.heights:
         return fit_given(shape, grid, actuator)
     return fit_relief(shape, read(shape), grid, actuator)
 
 
 def read(shape: Shape) -> Relief:
-    """Read the shape a scene names.
-
-    Raises SceneError when there is no such file. Raises ParameterError when it holds no shape.
-    """
+    """Read the shape a scene names; SceneError without such a file, ParameterError when it holds no shape."""
     try:
         path = find_shape(shape.file)
     except SceneError as error:
@@ -68,10 +57,7 @@ def read(shape: Shape) -> Relief:
 
 
 def import_reader(path: Path) -> None:
-    """Import the library that reads a file, where there is one: a stop within an import does harm.
-
-    One that is missing is told of when the file is read.
-    """
+    """Import the library that reads a file before it can be interrupted; a missing one is refused later."""
     kind = path.suffix.lower()
     reader = "PIL.Image" if kind in PICTURES else mesh_reader.find_library(kind)
     if reader:
@@ -84,11 +70,15 @@ def _array(path: Path) -> HeightMap:
     try:
         values = map_array(path)
     except OSError as error:
-        said = error.strerror or "not an array"
-        raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
+        raise _make_error("a file", path, error.strerror or "not an array") from None
     except ValueError:
         raise ParameterError("shape", "file", "must hold one array of numbers", str(path)) from None
     return make_height_map(path.name, values, value_length=1.0)
+
+
+def _make_error(kind: str, path: Path, reason: str) -> ParameterError:
+    """Return the error of a file that cannot be read."""
+    return ParameterError("shape", "file", f"must be {kind} that can be read", f"{path}: {reason}")
 
 
 def _mesh(path: Path, shape: Shape) -> ShapeMesh:
@@ -101,12 +91,11 @@ def _mesh(path: Path, shape: Shape) -> ShapeMesh:
     except (ParameterError, MemoryError):
         raise
     except OSError as error:
-        said = error.strerror or error
-        raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
-    # Readers raise whatever a broken file makes them trip over.
-    except Exception as error:
-        said = " ".join(str(error).split())[:120] or type(error).__name__
-        raise ParameterError("shape", "file", "must be a mesh that can be read", f"{path}: {said}") from None
+        raise _make_error("a file", path, error.strerror or str(error)) from None
+    except Exception as error:  # trimesh raises all sorts of errors on a broken file
+        raise _make_error(
+            "a mesh", path, " ".join(str(error).split())[:120] or type(error).__name__
+        ) from None
     up = shape.up if shape.up != AUTO else mesh.up
     length = LENGTHS[shape.unit] if shape.unit != AUTO else mesh.length or LENGTHS["mm"]
     return make_shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)
