@@ -178,4 +178,5 @@ def _clipped(name: str, heights: Floats, tops: Tops, actuator: Actuator) -> Fitt
     # Less than a nanometer beyond an end is rounding.
     low, high = heights < -1e-9, heights > actuator.stroke + 1e-9
     counts = [int(np.count_nonzero(flags)) for flags in (tops.covered, tops.overhang, low, high)]
-    return Fitted(name, np.clip(heights, 0.0, actuator.stroke), *counts, filled=tops.filled)
+    counts += [tops.filled]
+    return Fitted(name, np.clip(heights, 0.0, actuator.stroke), *counts)
