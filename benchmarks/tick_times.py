@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from digiclay.compat import bpy, scratch
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import accuracy, live_periods, snapshot
+from digiclay.core.session import accuracy, live_session, snapshot
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.live.stroke import draw
@@ -159,8 +159,8 @@ def _time_parts() -> Iterator[_Clock]:
         setattr(module, name, _timed(clock, part, getattr(module, name)))
     # Every control period that is due is simulated, however little of the machine others leave: a tick that
     # leaves some out takes less time than it is to be measured with.
-    former.append((live_periods, "SHARE", live_periods.SHARE))
-    live_periods.SHARE = EVERY_PERIOD
+    former.append((live_session, "SHARE", live_session.SHARE))
+    live_session.SHARE = EVERY_PERIOD
     watch = _watch_garbage(clock)
     gc.callbacks.append(watch)
     try:

@@ -6,7 +6,6 @@ import math
 import operator
 import queue
 import threading
-from collections import deque
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass, replace
@@ -16,16 +15,23 @@ import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputError
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.files.run_folder import Content, claim_folder, write_whole
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session import snapshot
-from digiclay.core.session.live_periods import clamp_pose, interpolate_path, simulate_path
+from digiclay.core.session.live_session import (
+    LiveSession,
+    Moment,
+    clamp_pose,
+    follow_path,
+    go_back,
+    interpolate_path,
+    start_recording,
+)
 from digiclay.core.session.recent_trace import exceeds_law
-from digiclay.core.session.take import Recording, Take, from_bytes, to_bytes
+from digiclay.core.session.take import Take, from_bytes, to_bytes
 
 from .protocol import LIMITS, Flag, Frame, Limits
 
@@ -35,42 +41,26 @@ KEEP = 0.5
 ARM = 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class Kept:
-    """State to go back to: period, snapshot, and pose of the fingertip (7,)."""
-
-    period: int
-    snapshot: bytes
-    pose: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Session:
-    """Session at one instant.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Session(LiveSession):
+    """Session of a server at one instant.
 
     Attributes
     ----------
-    state : State
-        Used up by the next step.
-    pose : ndarray (7,)
-        The fingertip's.
+    kept : Moment
+        To which it goes back when it diverges.
     number : int
         Of the last pose taken up.
     diverged : int
-        How often it went back to `kept`.
+        How often it went back.
     refused : ndarray (7,) or None
         Pose on the way to which it diverged: it is not gone to again.
     behind : bool
         Whether the pose asked for is farther away than the largest speed allows.
     """
 
-    scene: Scene
-    system: System
-    state: State
-    pose: Floats
-    kept: Kept
+    kept: Moment
     number: int = 0
-    recording: Recording | None = None
     diverged: int = 0
     refused: Floats | None = None
     limits: Limits = LIMITS
@@ -90,7 +80,8 @@ def _begin_at_rest(scene: Scene, system: System, limits: Limits) -> Session:
     state = begin(system)
     first = sample_poses(scene.trajectories(), np.zeros(1))[0, 0]
     pose = clamp_pose(first, system.cell.actuator.stroke)
-    return Session(scene, system, state, pose, Kept(0, snapshot.dump(system, state), pose), limits=limits)
+    kept = Moment(0, snapshot.dump(system, state), pose)
+    return Session(scene=scene, system=system, state=state, pose=pose, kept=kept, limits=limits)
 
 
 def follow(session: Session, target: Floats, number: int, count: int) -> Session:
@@ -109,18 +100,18 @@ def follow(session: Session, target: Floats, number: int, count: int) -> Session
     start, stop = session.pose[None], end[None]
     path = np.array([start, stop]) if count == 1 else interpolate_path(start, stop, count)
     try:
-        # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
-        with np.errstate(over="ignore", invalid="ignore"):
-            (state,) = deque(simulate_path(system, session.state, path), maxlen=1)
+        after = follow_path(session, path[:, 0])
     except DivergenceError:
-        return replace(_go_back(session), refused=target)
-    recording = session.recording and session.recording.extend(path[1:], 0)
-    after = replace(
-        session, state=state, pose=end, number=number, recording=recording, behind=end is not goal
-    )
-    if state.period - session.kept.period >= KEEP / system.period:
-        after = replace(after, kept=Kept(state.period, snapshot.dump(system, state), end))
-    return after
+        return replace(go_back(session, session.kept), diverged=session.diverged + 1, refused=target)
+    after = replace(after, pose=end, number=number, behind=end is not goal)
+    if after.state.period - session.kept.period < KEEP / system.period:
+        return after
+    return replace(after, kept=_keep(after))
+
+
+def _keep(session: Session) -> Moment:
+    """Return the present moment of a session."""
+    return Moment(session.state.period, snapshot.dump(session.system, session.state), session.pose)
 
 
 def _limit_way(start: Floats, goal: Floats, most: float) -> Floats:
@@ -134,17 +125,6 @@ def _limit_way(start: Floats, goal: Floats, most: float) -> Floats:
     return reached
 
 
-def _go_back(session: Session) -> Session:
-    """Return the session at its kept state."""
-    kept, recording = session.kept, session.recording
-    # What was recorded since is cut off: the recording began at the kept state, or before it.
-    recording = recording and recording.cut_at_period(kept.period)
-    return replace(
-        session, state=snapshot.load(session.system, kept.snapshot), pose=kept.pose,
-        recording=recording, diverged=session.diverged + 1,
-    )  # fmt: skip
-
-
 def reset(session: Session) -> Session:
     """Return the session with its bed at rest and its fingertip where it began; a recording ends."""
     fresh = _begin_at_rest(session.scene, session.system, session.limits)
@@ -153,10 +133,8 @@ def reset(session: Session) -> Session:
 
 def record(session: Session, room: int) -> Session:
     """Begin to record. `room`: control periods for which there is room at once."""
-    now = snapshot.dump(session.system, session.state)
-    period = session.state.period
-    started = Recording.begin(now, period, session.pose[None], 0, room + 1)
-    return replace(session, recording=started, kept=Kept(period, now, session.pose))
+    now = _keep(session)
+    return replace(start_recording(session, now.snapshot, room=room), kept=now)
 
 
 def make_frame(session: Session) -> Frame:

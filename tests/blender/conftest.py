@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.session import live_periods
+from digiclay.core.session import live_session
 from digiclay.device import unit
 from digiclay.device.instant import Instant
 
@@ -35,7 +35,7 @@ def factory_file() -> None:
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.take import Take
 from digiclay.device import view
 from digiclay.device.instant import Instant

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from digiclay.core.session import live_periods
+from digiclay.core.session import live_session
 from digiclay.live import bed_state, running, sculpting
 
 from benchmarks import ticks
@@ -45,9 +45,9 @@ def test_the_finger_presses_while_ticks_are_timed(monkeypatch: pytest.MonkeyPatc
         return session
 
     monkeypatch.setattr(sculpting, "advance", watched)
-    monkeypatch.setattr(live_periods, "SHARE", 0.0)  # a machine too slow for more than one period a tick
+    monkeypatch.setattr(live_session, "SHARE", 0.0)  # a machine too slow for more than one period a tick
     measure(11, 11, 3e-3, 2e-3, ticks=6)
-    assert live_periods.SHARE == 0.0
+    assert live_session.SHARE == 0.0
     assert min(lowest[-6:]) < 40e-3 - DEPTH / 2
     assert periods[-1] - periods[-7] == 6 / RATE / 5e-3
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_periods
+from digiclay.core.session import live_session
 from digiclay.core.session.take import replay
 from digiclay.live import sculpting
 from digiclay.live.running import Running
@@ -31,7 +31,7 @@ BESIDE = {"paper": 1.0, "design": 0.5}
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def turned(bed: str, degrees: float, beside: float = 0.0) -> Places:

@@ -14,7 +14,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, recent_trace, snapshot
 from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
-from digiclay.core.session.live_periods import interpolate_path, simulate_path
+from digiclay.core.session.live_session import interpolate_path, simulate_path
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

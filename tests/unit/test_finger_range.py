@@ -13,7 +13,7 @@ from digiclay.core.model.touch import MOST_FORCE, MOST_INDENTATION, describe_exc
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.run_scene import Result, run
 from digiclay.overlay.sections import force_message

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_periods, snapshot
+from digiclay.core.session import live_session, snapshot
 from digiclay.live import sculpting
 from digiclay.live.running import Running
 from digiclay.live.stroke import draw
@@ -23,7 +23,7 @@ PRESSED, TICKS = 37.0, 20
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period, whoever else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def pressed() -> tuple[Running, Hand]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.session import live_periods
+from digiclay.core.session import live_session
 from digiclay.live import sculpting
 from digiclay.live.running import Running
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ BOUND = 1.0
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def move(session: Running, goal: tuple[float, float, float], duration: float) -> Running:

@@ -14,7 +14,7 @@ from digiclay.core.model.trajectory import interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import recent_trace, snapshot
-from digiclay.core.session.live_periods import (
+from digiclay.core.session.live_session import (
     Clock,
     clamp_pose,
     interpolate_path,

@@ -15,7 +15,7 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import live_periods
+from digiclay.core.session import live_session
 from digiclay.core.session.run_scene import run
 from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
@@ -36,7 +36,7 @@ ALONG: Places = [(-HALF, 0.0), (HALF, 0.0)]
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def begin(**tables: object) -> Running:
@@ -62,7 +62,7 @@ def trace(way: Places) -> Floats:
 def ridge() -> Running:
     """A ridge raised with the defaults in one stroke along a line."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(live_periods, "SHARE", 1e9)
+        patch.setattr(live_session, "SHARE", 1e9)
         return form(begin(), ALONG, Brush.RAISE)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_periods, snapshot
-from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session import live_session, snapshot
+from digiclay.core.session.live_session import simulate_path
 from digiclay.live import gestures, sculpting
 
 from tests.hand import Hand, started
@@ -14,7 +14,7 @@ from tests.hand import Hand, started
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:

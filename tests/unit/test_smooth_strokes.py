@@ -9,8 +9,8 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout
-from digiclay.core.session import live_periods, snapshot
-from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session import live_session, snapshot
+from digiclay.core.session.live_session import simulate_path
 from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
 from digiclay.live.stroke import SYMMETRIES, Brush, draw, lay_line, lay_path, lay_ring
@@ -30,7 +30,7 @@ SPIKE = 8e-3
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def spiked(*places: tuple[float, float]) -> Running:

@@ -12,7 +12,7 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.take import Take, from_bytes, replay, to_bytes, to_scene
 from digiclay.recorded.bake import simulate_frames
 

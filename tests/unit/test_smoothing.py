@@ -19,7 +19,7 @@ from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.live_session import simulate_path
 from numpy.typing import NDArray
 
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away

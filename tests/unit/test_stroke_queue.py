@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_periods
+from digiclay.core.session import live_session
 from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
 from digiclay.live.stroke import SYMMETRIES, draw
@@ -22,7 +22,7 @@ FORMED = 2e-3
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def tap(session: Running, x: float, y: float) -> Running:

@@ -17,7 +17,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session import snapshot
-from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.take import Take, from_bytes, refine, replay, to_bytes, to_scene
 from numpy.typing import NDArray
 

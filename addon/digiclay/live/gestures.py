@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..device.instant import CLEARANCE
-from .running import Gesture, Running
+from .running import Moment, Running
 from .sculpting import REST, restore
 from .stroke_queue import drop_strokes
 
@@ -29,7 +29,7 @@ def withdraw_stroke(running: Running) -> Running:
     return drop_strokes(restore_gesture(running, running.stroke_start))
 
 
-def restore_gesture(running: Running, gesture: Gesture) -> Running:
+def restore_gesture(running: Running, gesture: Moment) -> Running:
     """Bring state and finger back to where a gesture began; a recording that began before goes back too.
 
     A finger that touched there already has to move on before it makes another gesture: else it counted at
@@ -49,7 +49,7 @@ def restore_gesture(running: Running, gesture: Gesture) -> Running:
 def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the finger off it; this can be rewound like a gesture."""
     # Before period 0, at which the first gesture after the reset may begin.
-    before = Gesture(-1, running.snapshot, running.pose)
+    before = Moment(-1, running.snapshot, running.pose)
     pose = running.pose.copy()
     pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
     back = restore(replace(drop_strokes(running), gestures=()), None, pose, tick=-1)

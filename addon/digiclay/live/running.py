@@ -6,32 +6,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..core.base.arrays import Floats
-from ..core.engine.state import State
-from ..core.engine.system import System
-from ..core.scene.schema import Scene
 from ..core.session.accuracy import ErrorMonitor, Errors
-from ..core.session.live_periods import Clock
+from ..core.session.live_session import Clock, LiveSession, Moment, Recording
 from ..core.session.recent_trace import RecentTrace
-from ..core.session.take import Recording
 from .stroke import Stroke
 
 __all__ = [
-    "Gesture", "Recording", "Running", "drop", "find", "last_message", "list_sessions", "put",
+    "Moment", "Recording", "Running", "drop", "find", "last_message", "list_sessions", "put",
     "set_message",
 ]  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Gesture:
-    """Start of a gesture: period, snapshot (`core.session.snapshot`), and pose of the fingertip (7,)."""
-
-    period: int
-    snapshot: bytes
-    pose: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Running:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Running(LiveSession):
     """Live session at one instant; replaced by another value at each tick.
 
     Attributes
@@ -40,12 +27,8 @@ class Running:
         `session_uid` of the bed.
     name : str
         Of the bed, for messages.
-    state : State
-        Used up by the next tick: read what you need, keep nothing of it.
     snapshot : bytes
         The state by `core.session.snapshot`; also in the bed's property.
-    pose : ndarray (7,)
-        The fingertip's, up to which the session has followed it.
     tick : int
         Counts ticks and never goes back, not even by undo.
     paused : bool
@@ -60,16 +43,16 @@ class Running:
         Total force, set point and heights of picked pins in the last seconds.
     errors : Errors or None
         Latest estimate.
-    gestures : tuple of Gesture
+    gestures : tuple of Moment
         The last ones, oldest first.
-    next_gesture : Gesture or None
+    next_gesture : Moment or None
         The gesture that begins if the finger touches.
     rest_time : float
         How long the finger has not moved, s of simulated time.
     strokes : tuple of Stroke
         What the Press tool has drawn and the finger has not finished, oldest first: the finger goes along
         these, wherever the fingertip is.
-    stroke_start : Gesture or None
+    stroke_start : Moment or None
         Where the first of them began.
     finished_strokes : int
         How many strokes the finger has finished.
@@ -81,11 +64,7 @@ class Running:
 
     uid: int
     name: str
-    scene: Scene
-    system: System
-    state: State
     snapshot: bytes
-    pose: Floats
     tick: int
     clock: Clock
     trace: RecentTrace
@@ -95,12 +74,11 @@ class Running:
     blocking_reason: str = ""
     stale: int = 0
     steps: int = 0
-    gestures: tuple[Gesture, ...] = ()
-    next_gesture: Gesture | None = None
+    gestures: tuple[Moment, ...] = ()
+    next_gesture: Moment | None = None
     rest_time: float = 0.0
-    recording: Recording | None = None
     strokes: tuple[Stroke, ...] = ()
-    stroke_start: Gesture | None = None
+    stroke_start: Moment | None = None
     finished_strokes: int = 0
     last_place: tuple[float, float] | None = None
     settings: tuple[Any, ...] | None = None

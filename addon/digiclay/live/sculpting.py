@@ -17,16 +17,18 @@ from ..core.model.fingertip import wrap_one
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, recent_trace, snapshot
-from ..core.session.live_periods import (
+from ..core.session.live_session import (
     Clock,
+    Moment,
     clamp_pose,
+    follow_path,
     interpolate_path,
     periods_due,
-    simulate_path,
+    start_recording,
     update_cost,
 )
 from ..ui_text import localize
-from .running import Gesture, Recording, Running
+from .running import Running
 from .stroke_queue import take_path
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
@@ -55,9 +57,9 @@ def begin_session(
     pose = clamp_pose(pose, system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
-        uid, name, scene, system, state, now, pose, tick + 1, Clock(),
-        recent_trace.start(system.period), accuracy.start(scene),
-        next_gesture=Gesture(state.period, now, pose),
+        scene=scene, system=system, state=state, pose=pose, uid=uid, name=name, snapshot=now, tick=tick + 1,
+        clock=Clock(), trace=recent_trace.start(system.period), monitor=accuracy.start(scene),
+        next_gesture=Moment(state.period, now, pose),
     )  # fmt: skip
     return running, said
 
@@ -105,31 +107,31 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
 
     `pose` (7,), where the finger is; `count`: most control periods.
     """
-    system, state, monitor, smoothing = running.system, running.state, running.monitor, None
+    system, monitor, smoothing = running.system, running.monitor, None
     if running.strokes:
         running, path, smoothing = take_path(running, count)
     else:
         pose = clamp_pose(pose, system.cell.actuator.stroke)
         running = _mark_gesture_start(running, pose, count)
         path = interpolate_path(running.pose[None], pose[None], count)[:, 0]
-    rows, errors, paths = [], running.errors, wrap_one(path)
+    rows, first, trace, paths = [], running.state.period + 1, running.trace, wrap_one(path)
     started = time.perf_counter()
-    # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
-    with np.errstate(over="ignore", invalid="ignore"):
-        monitor = monitor and accuracy.begin_stretch(monitor, state)
-        for index, state in enumerate(simulate_path(system, running.state, paths, smoothing)):
-            monitor = monitor and accuracy.note(monitor, state, paths[index : index + 2])
-            if state.period % running.trace.every == 0:
-                rows.append(recent_trace.sample(system, state, running.scene.set_point, running.trace.pins))
-        if monitor:
-            monitor, found = accuracy.catch_up(monitor, state, len(path) - 1)
-            errors = found or errors
+    monitor = monitor and accuracy.begin_stretch(monitor, running.state)
+
+    def watch(state: State) -> None:
+        nonlocal monitor
+        index = state.period - first
+        monitor = monitor and accuracy.note(monitor, state, paths[index : index + 2])
+        if state.period % trace.every == 0:
+            rows.append(recent_trace.sample(system, state, running.scene.set_point, trace.pins))
+
+    gone, errors = follow_path(running, path, smoothing, running.tick, watch), None
+    if monitor:
+        monitor, errors = accuracy.catch_up(monitor, gone.state, len(path) - 1)
     clock = update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
-        running, state=state, snapshot=snapshot.dump(system, state), pose=path[-1],
-        clock=clock, monitor=monitor,
-        errors=errors, trace=recent_trace.extend(running.trace, rows),
-        recording=running.recording and running.recording.extend(paths[1:], running.tick, smoothing),
+        gone, clock=clock, snapshot=snapshot.dump(system, gone.state), monitor=monitor,
+        errors=errors or running.errors, trace=recent_trace.extend(trace, rows),
     )  # fmt: skip
     return _count_gesture(gone, smoothed=smoothing is not None and bool(smoothing.any()))
 
@@ -141,7 +143,7 @@ def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
     next_gesture = running.next_gesture
     free = next_gesture is None and recent_trace.measure_total_force(running.system, running.state) == 0.0
     if free or (moved and running.rest_time >= REST):
-        next_gesture = Gesture(running.state.period, running.snapshot, running.pose)
+        next_gesture = Moment(running.state.period, running.snapshot, running.pose)
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
@@ -171,7 +173,7 @@ def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None
         running, state=state, snapshot=now, pose=clamp_pose(pose, running.system.cell.actuator.stroke),
         clock=running.clock.stopped(), monitor=running.monitor and accuracy.reset(running.monitor), stale=0,
         recording=keep, gestures=gestures, tick=running.tick + 1, rest_time=0.0,
-        next_gesture=Gesture(state.period, now, pose) if free else None,
+        next_gesture=Moment(state.period, now, pose) if free else None,
     )  # fmt: skip
 
 
@@ -203,5 +205,4 @@ def set_recording(running: Running, on: bool) -> Running:
     """Begin to record the finger's path, or stop recording it."""
     if not on:
         return replace(running, recording=None)
-    begin_at = Recording.begin(running.snapshot, running.state.period, running.pose, running.tick)
-    return replace(running, recording=begin_at)
+    return start_recording(running, running.snapshot, running.tick)

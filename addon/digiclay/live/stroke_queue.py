@@ -10,7 +10,7 @@ import numpy as np
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..device.instant import find_ellipsoid
-from .running import Gesture, Running
+from .running import Moment, Running
 from .stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
 from .stroke_motion import follow
 from .sweep import begin_settling, find_radius, settle, sweep
@@ -71,7 +71,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | N
     """
     first = running.strokes[0]
     if first.height is None:
-        begun = Gesture(running.state.period, running.snapshot, running.pose)
+        begun = Moment(running.state.period, running.snapshot, running.pose)
         running = replace(running, next_gesture=begun, stroke_start=begun)
     stroke, path, smoothing = _advance(running, first, count)
     left = (stroke, *running.strokes[1:])

@@ -13,7 +13,7 @@ from ..core.engine.state import State
 from ..core.model.fingertip import LEVEL
 from ..core.scene.assembly import assemble
 from ..core.session import snapshot
-from ..core.session.live_periods import Clock, periods_due, simulate_path
+from ..core.session.live_session import Clock, periods_due, simulate_path
 from ..core.session.take import MOST_PARTS, Take, refine
 from ..device import view
 from ..device.instant import find_ellipsoid, pick_pose

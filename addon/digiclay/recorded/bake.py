@@ -17,7 +17,7 @@ from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip, wrap_one
 from ..core.scene.assembly import assemble
 from ..core.session import snapshot
-from ..core.session.live_periods import simulate_path
+from ..core.session.live_session import simulate_path
 from ..core.session.take import Take
 from ..device import view
 from ..device.instant import pick_pose

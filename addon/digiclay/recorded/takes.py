@@ -13,7 +13,7 @@ from ..core.model.trajectory import sample_poses
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
-from ..core.session.live_periods import simulate_path
+from ..core.session.live_session import simulate_path
 from ..core.session.take import Take, from_bytes, make_take, to_bytes
 from ..live.running import Running
 from ..ui_text import localize

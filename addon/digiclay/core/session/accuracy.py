@@ -177,7 +177,7 @@ def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
 
     `monitor`: given the state before by `begin_stretch`, or by the period before; `after`: the session's, at
     the end of the period; `path` (2, f, 7), the finger at both ends of the period; see
-    `live_periods.simulate_path`.
+    `live_session.simulate_path`.
     """
     monitor = replace(monitor, age=monitor.age + 1)
     if monitor.state is None:
@@ -198,7 +198,8 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
     state, force = monitor.state, monitor.system.rows.force
     while state is not None and due > 0:
         due -= 1
-        state, waiting = _integrate(monitor.system, state, monitor.waiting)
+        with np.errstate(over="ignore", invalid="ignore"):
+            state, waiting = _integrate(monitor.system, state, monitor.waiting)
         if not np.isfinite(state.active.block).all():
             return begin_stretch(reset(monitor), after), None
         if not waiting and monitor.reached is not None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
-from ..control.smoothing import FARTHEST, ORDER, find_fault
+from ..control.smoothing import FARTHEST, find_fault
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -28,7 +28,7 @@ from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..scene.toml_table import format_scene, resolve
 from . import snapshot
-from .live_periods import simulate_path
+from .live_session import Recording, simulate_path
 
 #: Waypoints that lie this near to the straight way between their neighbors are left out, m and 1.
 STRAIGHT = 1e-12
@@ -197,92 +197,6 @@ def from_bytes(data: bytes) -> Take:
         return Take(resolved, start.tobytes(), poses, end.tobytes(), parts.get(SMOOTHING))
     except (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """Fingertip path, and what was smoothed, since the start of the recording.
-
-    Attributes
-    ----------
-    start : bytes
-        The state recording began with, kept by `core.session.snapshot`.
-    first : int
-        Its period.
-    rows : ndarray (capacity, 7 f + 4 + 1)
-        Poses of the fingers at the end of each period, what was smoothed in it, see `core.control.smoothing`,
-        and the moment it was simulated in; row 0: the start.
-    count : int
-        How many of the rows are in use. Those behind belong to nobody.
-    saved : int
-        How many of those the file has, as a take.
-    """
-
-    start: bytes
-    first: int
-    rows: Floats
-    count: int
-    saved: int = 0
-
-    @classmethod
-    def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
-        """Return a recording that has nothing but its start.
-
-        `snapshot`: the state at the start; `period`: its period; `pose` (f, 7), of the fingertips then;
-        `room`: rows to have at once; more are added as they are needed.
-        """
-        rows = np.empty((room, pose.size + ORDER + 1))
-        rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
-        return cls(snapshot, period, rows, 1)
-
-    @property
-    def path(self) -> Floats:
-        """Poses, shape (t + 1, f, 7): `simulate_path` simulates them again bit for bit."""
-        return self.rows[: self.count, : -ORDER - 1].reshape(self.count, -1, 7)
-
-    @property
-    def smoothing(self) -> Floats | None:
-        """What was smoothed in each period, shape (t, 4); None: nothing in any."""
-        orders = self.rows[1 : self.count, -ORDER - 1 : -1]
-        return orders if orders.any() else None
-
-    @property
-    def unsaved(self) -> bool:
-        """Whether something was recorded that the file does not have."""
-        return self.count > max(self.saved, 1)
-
-    def extend(self, path: Floats, tick: int, smoothing: Floats | None = None) -> Recording:
-        """Return the recording with the poses of some more periods, shape (k, f, 7).
-
-        `path` (k, f, 7), poses at the ends of the periods; `smoothing` (k, 4), what was smoothed in them;
-        nothing when left out.
-        """
-        end = self.count + len(path)
-        rows = self.rows
-        if end > len(rows):
-            rows = np.empty((2 * end, self.rows.shape[1]))
-            rows[: self.count] = self.rows[: self.count]
-        rows[self.count : end, : -ORDER - 1] = path.reshape(len(path), -1)
-        rows[self.count : end, -ORDER - 1 : -1] = 0.0 if smoothing is None else smoothing
-        rows[self.count : end, -1] = tick
-        return replace(self, rows=rows, count=end)
-
-    def cut_at_tick(self, tick: int, period: int) -> Recording | None:
-        """Return the recording as it was at a moment undo came back to; None when it did not lead there.
-
-        `period`: of the state at that tick.
-        """
-        count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
-        return self._first(count) if count and count - 1 == period - self.first else None
-
-    def cut_at_period(self, period: int) -> Recording | None:
-        """Return the recording up to a period of its own; None when that is before its start."""
-        count = period - self.first + 1
-        return self._first(count) if 0 < count <= self.count else None
-
-    def _first(self, count: int) -> Recording:
-        """Return the recording with its first rows alone."""
-        return replace(self, count=count, saved=min(self.saved, count))
 
 
 def make_take(scene: Scene, recording: Recording, end: bytes) -> Take | None:

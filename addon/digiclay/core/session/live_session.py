@@ -1,0 +1,306 @@
+"""Live session: state and fingertip, clock that says how many control periods are due, recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import repeat
+from typing import TypeVar
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..control.smoothing import ORDER
+from ..engine.simulation import advance, trace_fingers
+from ..engine.state import State
+from ..engine.system import System
+from ..model.trajectory import interpolate_poses
+from ..scene.schema import Scene
+from . import snapshot
+
+#: Over how much of the wall's time the real-time factor is taken, s.
+WINDOW = 1.0
+#: Longest time the periods of one tick may take, as a share of the time between two ticks: the rest
+#: is for drawing, and for whoever works in the window.
+SHARE = 0.7
+#: Shortest time between two ticks that is counted with, s: ticks may come in a burst.
+SHORTEST = 1e-2
+#: Rounding errors of times count as whole periods when they are below this share of one.
+SLACK = 1e-6
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Wall clock of a live session.
+
+    Attributes
+    ----------
+    seen : float or None
+        When the clock was last looked at, s; None: it starts with the next look.
+    left : float
+        Time gone by that is not simulated yet, less than a control period, s.
+    cost : float
+        Wall time one control period takes, s, as measured of late; 0: not known.
+    ticks : tuple of (float, float)
+        When the clock was looked at within the last second, and what was simulated then, s.
+    """
+
+    seen: float | None = None
+    left: float = 0.0
+    cost: float = 0.0
+    ticks: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def factor(self) -> float:
+        """Simulated time over the wall's, in the last second; 1 keeps up, 0 before anything is known."""
+        gone = sum(time for time, _ in self.ticks)
+        return sum(done for _, done in self.ticks) / gone if gone > 0.0 else 0.0
+
+    def stopped(self) -> Clock:
+        """Return the clock of a session that pauses: the time until it goes on will not count."""
+        return replace(self, seen=None, left=0.0, ticks=())
+
+
+def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int, Clock]:
+    """Return how many control periods to simulate now, and the clock after them.
+
+    What is more than `most`, or more than this machine can do between two ticks, is dropped and
+    not made up for later.
+
+    `now`: a clock that never goes back, s; `period`: control period, s; `most`: most periods at a time.
+    """
+    if clock.seen is None:
+        return 0, replace(clock, seen=now)
+    gone = max(0.0, now - clock.seen)
+    whole = math.floor((clock.left + gone) / period + SLACK)
+    count = max(0, min(whole, most, _count_affordable(clock, gone)))
+    left = max(0.0, clock.left + gone - whole * period)
+    ticks = (*clock.ticks, (gone, count * period))
+    while len(ticks) > 1 and sum(time for time, _ in ticks[1:]) >= WINDOW:
+        ticks = ticks[1:]
+    return count, replace(clock, seen=now, left=left, ticks=ticks)
+
+
+def _count_affordable(clock: Clock, gone: float) -> int:
+    """Return how many periods this machine can do in the time between two ticks, at least 1."""
+    if clock.cost <= 0.0:
+        return 2**31
+    return max(1, int(SHARE * max(gone, SHORTEST) / clock.cost))
+
+
+def update_cost(clock: Clock, count: int, took: float) -> Clock:
+    """Return the clock after some periods of a measured duration.
+
+    `count`: control periods; `took`: of the wall's time, all together, s.
+    """
+    if count < 1 or took <= 0.0:
+        return clock
+    each = took / count
+    return replace(clock, cost=each if clock.cost <= 0.0 else 0.8 * clock.cost + 0.2 * each)
+
+
+def interpolate_path(start: Floats, end: Floats, count: int) -> Floats:
+    """Return where the fingers are between periods, shape (count + 1, f, 7), on their ways from pose to pose.
+
+    `start`, `end` (f, 7), poses when last read, and now; `count`: control periods in between, at least 1.
+    """
+    path: Floats = interpolate_poses(np.array([start, end]), np.arange(count + 1) / count)[0]
+    path[0] = start
+    return path
+
+
+def clamp_pose(pose: Floats, stroke: float) -> Floats:
+    """Return the pose, raised to where a finger can be: its lowest point no deeper than the bed's floor.
+
+    Pins bottom out there. A finger an artist drags below it would press with more newtons than
+    floating-point numbers have.
+
+    `pose` (7,); `stroke`: highest pin top, m; sideways and upwards a thousand strokes are as good as
+    infinitely far.
+    """
+    far = 1e3 * stroke
+    inside = pose.copy()
+    inside[:2] = np.clip(pose[:2], -far, far)
+    inside[2] = min(max(float(pose[2]), 0.0), far)
+    return inside
+
+
+def simulate_path(
+    system: System, state: State, path: Floats, smoothing: Floats | None = None
+) -> Iterator[State]:
+    """Simulate the periods of the fingers' paths; the arrays of `state` are used up.
+
+    A recorded path gives the same states bit for bit, however many periods are done at a time.
+
+    `path` (t + 1, f, 7), where the fingers are between the periods, from `interpolate_path`; `smoothing` (t,
+    4), what is smoothed in each period, see `control.smoothing`. Yields after each period; valid until the
+    next one is asked for.
+    """
+    fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
+    systems = repeat(system, len(fingers)) if smoothing is None else _order_smoothing(system, smoothing)
+    for own, finger in zip(systems, fingers, strict=True):
+        state = advance(own, state, finger)
+        yield state
+
+
+def _order_smoothing(system: System, smoothing: Floats) -> Iterator[System]:
+    """Yield the system of each control period of a bed that is smoothed."""
+    from ..control.smoothing import order_periods
+
+    method = system.controller
+    for controller in order_periods(method, system.grid, system.cell, system.period, smoothing):
+        yield system if controller is method else replace(system, controller=controller)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Fingertip path, and what was smoothed, since the start of the recording.
+
+    Attributes
+    ----------
+    start : bytes
+        The state recording began with, kept by `snapshot.dump`.
+    first : int
+        Its period.
+    rows : ndarray (capacity, 7 f + 4 + 1)
+        Poses of the fingers at the end of each period, what was smoothed in it, see `core.control.smoothing`,
+        and the moment it was simulated in; row 0: the start.
+    count : int
+        How many of the rows are in use. Those behind belong to nobody.
+    saved : int
+        How many of those the file has, as a take.
+    """
+
+    start: bytes
+    first: int
+    rows: Floats
+    count: int
+    saved: int = 0
+
+    @classmethod
+    def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
+        """Return a recording that has nothing but its start.
+
+        `snapshot`: the state at the start; `period`: its period; `pose` (f, 7), of the fingertips then;
+        `room`: rows to have at once; more are added as they are needed.
+        """
+        rows = np.empty((room, pose.size + ORDER + 1))
+        rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
+        return cls(snapshot, period, rows, 1)
+
+    @property
+    def path(self) -> Floats:
+        """Poses, shape (t + 1, f, 7): `simulate_path` simulates them again bit for bit."""
+        return self.rows[: self.count, : -ORDER - 1].reshape(self.count, -1, 7)
+
+    @property
+    def smoothing(self) -> Floats | None:
+        """What was smoothed in each period, shape (t, 4); None: nothing in any."""
+        orders = self.rows[1 : self.count, -ORDER - 1 : -1]
+        return orders if orders.any() else None
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether something was recorded that the file does not have."""
+        return self.count > max(self.saved, 1)
+
+    def extend(self, path: Floats, tick: int, smoothing: Floats | None = None) -> Recording:
+        """Return the recording with the poses of some more periods, shape (k, f, 7).
+
+        `path` (k, f, 7), poses at the ends of the periods; `smoothing` (k, 4), what was smoothed in them;
+        nothing when left out.
+        """
+        end = self.count + len(path)
+        rows = self.rows
+        if end > len(rows):
+            rows = np.empty((2 * end, self.rows.shape[1]))
+            rows[: self.count] = self.rows[: self.count]
+        rows[self.count : end, : -ORDER - 1] = path.reshape(len(path), -1)
+        rows[self.count : end, -ORDER - 1 : -1] = 0.0 if smoothing is None else smoothing
+        rows[self.count : end, -1] = tick
+        return replace(self, rows=rows, count=end)
+
+    def cut_at_tick(self, tick: int, period: int) -> Recording | None:
+        """Return the recording as it was at a moment undo came back to; None when it did not lead there.
+
+        `period`: of the state at that tick.
+        """
+        count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
+        return self._first(count) if count and count - 1 == period - self.first else None
+
+    def cut_at_period(self, period: int) -> Recording | None:
+        """Return the recording up to a period of its own; None when that is before its start."""
+        count = period - self.first + 1
+        return self._first(count) if 0 < count <= self.count else None
+
+    def _first(self, count: int) -> Recording:
+        """Return the recording with its first rows alone."""
+        return replace(self, count=count, saved=min(self.saved, count))
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """Moment a session can go back to: period, snapshot, and pose of the fingertip (7,)."""
+
+    period: int
+    snapshot: bytes
+    pose: Floats
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LiveSession:
+    """Live session at one instant, at the core of those in Blender and of servers.
+
+    Attributes
+    ----------
+    state : State
+        Used up by the next control period: nothing of it may be stored.
+    pose : ndarray (7,)
+        The fingertip's, up to which the session has followed it.
+    recording : Recording or None
+        Of the fingertip path.
+    """
+
+    scene: Scene
+    system: System
+    state: State
+    pose: Floats
+    recording: Recording | None = None
+
+
+Session = TypeVar("Session", bound=LiveSession)
+
+
+def follow_path(
+    session: Session,
+    path: Floats,
+    smoothing: Floats | None = None,
+    tick: int = 0,
+    watch: Callable[[State], None] | None = None,
+) -> Session:
+    """Simulate and record the control periods of a fingertip path (t + 1, 7); DivergenceError uses it up.
+
+    `smoothing`: see `simulate_path`; `tick`: see `Recording`; `watch`: given the state after each period.
+    """
+    system, state, fingers = session.system, session.state, path[:, None]
+    # The force of a pressed pin grows exponentially; the session itself reports what exceeds all floats.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for state in simulate_path(system, session.state, fingers, smoothing):
+            if watch:
+                watch(state)
+    recording = session.recording and session.recording.extend(fingers[1:], tick, smoothing)
+    return replace(session, state=state, pose=path[-1], recording=recording)
+
+
+def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:
+    """Begin to record; `now` is the snapshot of the state, `room` the periods with memory from the start."""
+    begun = Recording.begin(now, session.state.period, session.pose[None], tick, room + 1)
+    return replace(session, recording=begun)
+
+
+def go_back(session: Session, moment: Moment) -> Session:
+    """Return the session at an earlier moment; what was recorded since is cut off."""
+    recording = session.recording and session.recording.cut_at_period(moment.period)
+    state = snapshot.load(session.system, moment.snapshot)
+    return replace(session, state=state, pose=moment.pose, recording=recording)
