@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from digiclay.core.model.fingertip import JOIN, Fingertip, compute_reach, compute_reaches
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.model.touch import find_reached_disc, trace_finger
+from digiclay.core.model.touch import trace_finger
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -36,7 +36,8 @@ def test_beyond_its_reach_the_underside_is_above_the_peak(
     farther: float,
 ) -> None:
     outline = finger.outline(pose(spot, turn)[None])
-    radius = max(compute_reach(*compute_reaches(outline)[0].tolist(), peak), 0.0) * farther + 1e-9
+    disc = compute_reach((0.0, 0.0, 0.0, *compute_reaches(outline)[0].tolist()), peak)
+    radius = (disc[2] if disc else 0.0) * farther + 1e-9
     x, y = outline[0, 0] + radius * np.cos(angle), outline[0, 1] + radius * np.sin(angle)
     # Rounding of heights, which grow with the square of the distance.
     assert under(outline, np.array([x]), np.array([y]))[0, 0] >= peak - 1e-9
@@ -63,7 +64,7 @@ def test_the_window_has_every_cell_the_finger_could_touch_on_its_way(
     direction = np.array(toward) / max(np.linalg.norm(toward), 1e-3)
     poses = np.array([pose(tuple(np.array(spot) + part * way * direction), turn) for part in (0.0, 0.5, 1.0)])
     outline, peak = finger.outline(poses), 40e-3
-    disc = find_reached_disc(trace_finger(finger, poses[None])[0].window, peak)
+    disc = compute_reach(trace_finger(finger, poses[None]).at(0).window, peak)
     cells = BED.disc(*disc) if disc else np.empty(0, int)
     touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
     assert np.isin(touchable, cells).all()
@@ -75,7 +76,7 @@ def test_a_dip_within_the_period_is_seen_as_well(
 ) -> None:
     poses = np.array([pose(at, turn) for at in (spot, dip, spot)])
     outline, peak = finger.outline(poses), 40e-3
-    disc = find_reached_disc(trace_finger(finger, poses[None])[0].window, peak)
+    disc = compute_reach(trace_finger(finger, poses[None]).at(0).window, peak)
     cells = BED.disc(*disc) if disc else np.empty(0, int)
     touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
     assert np.isin(touchable, cells).all()

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.batch.finger_paths import make_fingers
-from digiclay.core.batch.packing import advance, begin, classify, make_batch, merge_parts
-from digiclay.core.batch.padding import compute_reach
+from digiclay.core.batch.packing import begin, classify, extend_path, make_batch, merge_parts
+from digiclay.core.engine.simulation import simulate_period
 from digiclay.core.model.actuator import Supply
 from digiclay.core.model.contact import Contact
+from digiclay.core.model.fingertip import Fingertip, compute_reach
 from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -68,16 +68,14 @@ def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
 
 
 def test_the_reach_of_many_fingers_is_that_of_each() -> None:
-    from digiclay.core.model.fingertip import Fingertip
-    from digiclay.core.model.fingertip import compute_reach as alone
-
     poses = np.zeros((3, 2, 7))
     poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
-    windows = [one.window for one in trace_finger(Fingertip(), poses)]
-    _, _, found = compute_reach(np.array(windows).T, np.full(3, 0.04))
-    expected = [alone(base, tilt, bend, 0.04) + spread for _, _, spread, base, tilt, bend in windows]
-    np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-12)
-    assert found[2] < 0.0  # the last one is far above the bed
+    windows = trace_finger(Fingertip(), poses).windows
+    alone = [compute_reach(window, 0.04) for window in windows]
+    together = np.array(compute_reach(np.array(windows).T, np.full(3, 0.04))).T
+    np.testing.assert_allclose(together[:2], alone[:2], rtol=1e-12)
+    assert alone[2] is None  # the last one is far above the bed
+    assert together[2, 2] < 0.0
 
 
 def calls(count: int) -> list[int]:
@@ -91,12 +89,13 @@ def calls(count: int) -> list[int]:
     def count_one(frame: Any, event: str, argument: Any) -> None:
         made[0] += event == "c_call"
 
-    coming = make_fingers(systems, ways, 0, 100)
-    for _ in range(100):
+    fingers = extend_path(None, systems, ways, 0)
+    assert fingers
+    for period in range(100):
         made[0] = 0
         sys.setprofile(count_one)
         try:
-            state = advance(stack, state, coming)
+            state = simulate_period(stack, state, fingers.at(period))
         finally:
             sys.setprofile(None)
         counted.append(made[0])

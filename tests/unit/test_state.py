@@ -101,4 +101,4 @@ def test_an_active_set_serves_while_the_controlled_disc_is_within_a_pitch_around
     select, (x, y) = system.selection, system.grid.positions.T
     first = select.update(begin(system), None, (3e-3, -6e-3, 5e-3)).active
     assert first.cells.tolist() == np.flatnonzero(np.hypot(x - 3e-3, y + 6e-3) < 8e-3).tolist()
-    assert select.holds(first, 0, None, tuple(1e-3 * one for one in disc)) == held
+    assert select.serves(first, 0, None, tuple(1e-3 * one for one in disc)) == held

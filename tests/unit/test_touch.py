@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from digiclay.core.engine.simulation import begin, step
 from digiclay.core.model.contact import Contact
-from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_reach
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.null_parts import Unrelaxed
 from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.touch import MOST, Touch, compute_force, find_reached_disc, trace_finger
+from digiclay.core.model.touch import MOST, Touch, compute_force, trace_finger
 
 from tests.assemble import AWAY, make_system, path, record
 
@@ -40,7 +40,7 @@ def near(*poses: tuple[float, float, float]) -> np.ndarray:
         make_grid(Layout()),
         np.array([[[x * 1e-3, y * 1e-3, z * 1e-3, *LEVEL] for x, y, z in poses]]),
     )
-    disc = find_reached_disc(trace_finger(Fingertip(), table)[0].window, 40e-3)
+    disc = compute_reach(trace_finger(Fingertip(), table).at(0).window, 40e-3)
     return bed.disc(*disc) if disc else np.empty(0, int)
 
 
@@ -77,23 +77,24 @@ def dragged(periods: int) -> np.ndarray:
 
 def test_undersides_worked_out_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
     poses, places = dragged(70), make_grid(Layout()).compute_basis(np.arange(100, 400))
-    together = [one.under(places) for one in trace_finger(Fingertip(), poses)]
-    alone = [trace_finger(Fingertip(), poses[i : i + 1])[0].under(places) for i in range(len(poses))]
+    whole = trace_finger(Fingertip(), poses)
+    together = [whole.under(i, places) for i in range(len(poses))]
+    alone = [trace_finger(Fingertip(), poses[i : i + 1]).under(0, places) for i in range(len(poses))]
     assert np.array_equal(np.array(together), np.array(alone))
 
 
 def test_other_places_in_mid_way_have_their_own_undersides() -> None:
     bed, coming = make_grid(Layout()), trace_finger(Fingertip(), dragged(8))
     first, second = bed.compute_basis(np.arange(50)), bed.compute_basis(np.arange(300, 350))
-    coming[0].under(first)
-    fresh = trace_finger(Fingertip(), dragged(8))[1].under(second)
-    assert np.array_equal(coming[1].under(second), fresh)
+    coming.under(0, first)
+    fresh = trace_finger(Fingertip(), dragged(8)).under(1, second)
+    assert np.array_equal(coming.under(1, second), fresh)
 
 
 def test_a_finger_over_a_large_bed_is_worked_out_for_few_periods_at_a_time() -> None:
     coming = trace_finger(Fingertip(), dragged(8))
     many = np.zeros((6, MOST // 6))  # three instants a period: twice as many cells would be all of `MOST`
-    assert coming[0].under(many).base.size <= 2 * 2 * MOST  # R and the tangent of two periods
+    assert coming.under(0, many).base.size <= 2 * 2 * MOST  # R and the tangent of two periods
 
 
 def pressed(x: float, y: float, depth: float) -> np.ndarray:

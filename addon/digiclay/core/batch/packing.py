@@ -14,18 +14,19 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import DivergenceError
 from ..control.servo import BatchControl
-from ..engine.simulation import find_divergence, simulate_period
+from ..engine.active_set import OwnSelection, PaddedSelection
+from ..engine.simulation import CHUNK, find_divergence
 from ..engine.state import State, make_initial_state
 from ..engine.system import System
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.interfaces import Movement, Stepper
 from ..model.layout import Grid, make_grid
 from ..model.null_parts import Uncontrolled
+from ..model.touch import FingerPath, join_paths, trace_finger
+from ..model.trajectory import Trajectory
 from ..scene.assembly import Motion, count_rows, make_motion
 from ..scene.schema import Scene
 from ..steppers.bernoulli import BernoulliPlan
-from .finger_paths import Fingers
-from .padding import OwnSelection, PaddedSelection
 
 Part = TypeVar("Part")
 
@@ -238,12 +239,30 @@ def begin(batch: Batch) -> State:
     return make_initial_state(batch.rows, batch.grid.count, heights, memory)
 
 
-def advance(batch: Batch, state: State, coming: Fingers | None) -> State:
-    """Simulate one control period of all runs in the arrays of `state`, which is used up.
+def extend_path(
+    path: FingerPath | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
+) -> FingerPath | None:
+    """Return the fingertip path of a batch in a period and some more; None where nothing touches."""
+    if systems[0].cell.touch is None or (path and period < path.first + len(path.forms)):
+        return path
+    runs = {_list_causes(*run): run for run in zip(systems, ways, strict=True)}
+    alone = runs.values() if len(runs) == 1 else zip(systems, ways, strict=True)
+    return join_paths([_trace_run(system, way, period) for system, way in alone])
 
-    `coming`: how the fingers come in some periods, this one among them.
-    """
-    return simulate_period(batch, state, coming and coming.at(state.period))
+
+def _list_causes(system: System, way: Trajectory) -> tuple[Any, ...]:
+    """Return what a run's fingertip path depends on."""
+    arrays = (system.instants, way.times, way.positions, way.orientations)
+    touch = system.cell.touch
+    return touch and touch.fingertip, way.interpolation, system.period, *(one.tobytes() for one in arrays)
+
+
+def _trace_run(system: System, way: Trajectory, first: int) -> FingerPath:
+    """Compute the fingertip path of one run in some periods."""
+    assert system.cell.touch is not None
+    starts = (first + np.arange(CHUNK)) * system.period
+    poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(CHUNK, -1, 7)
+    return trace_finger(system.cell.touch.fingertip, poses, first)
 
 
 def find_diverged(state: State) -> NDArray[np.bool_]:

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import DigiclayError
 from ..base.modes import Mode
-from ..engine.simulation import repeat_period
+from ..engine.simulation import repeat_period, simulate_period
 from ..engine.state import ActiveSet, State
 from ..engine.system import System
 from ..metrics.finger_path import CellSums
 from ..metrics.summary import compute_metrics_from_sums
 from ..model.fingertip import require_one
+from ..model.layout import Grid
+from ..model.touch import FingerPath, FingerPeriod
 from ..model.trajectory import Trajectory
 from ..scene.assembly import assemble
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
@@ -26,8 +28,7 @@ from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_scene import Ended, Result, count_losses, evaluate, report
-from .finger_paths import Fingers, SampledPath, extend_fingers, make_path
-from .packing import Batch, advance, begin, find_diverged, make_batch, make_divergence_error, select_runs
+from .packing import Batch, begin, extend_path, find_diverged, make_batch, make_divergence_error, select_runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +41,8 @@ class Play:
         By the numbers of their runs.
     runs : tuple of int
         Whose the last axis is.
-    coming : Fingers or None
-        How the fingers come, as far as that is worked out.
+    path : FingerPath or None
+        Of the fingertips, in the coming periods as far as it is computed.
     """
 
     systems: Mapping[int, System]
@@ -49,7 +50,12 @@ class Play:
     runs: tuple[int, ...]
     batch: Batch
     state: State
-    coming: Fingers | None = None
+    path: FingerPath | None = None
+
+    @property
+    def finger(self) -> FingerPeriod | None:
+        """Fingertip path in the coming control period."""
+        return self.path.at(self.state.period) if self.path else None
 
 
 def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Play:
@@ -62,14 +68,14 @@ def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Pl
 def locate_fingers(play: Play) -> Play:
     """Return the sessions with the way of their fingers through the coming control period."""
     ways = [play.ways[run] for run in play.runs]
-    return replace(play, coming=extend_fingers(play.coming, play.batch.systems, ways, play.state.period))
+    return replace(play, path=extend_path(play.path, play.batch.systems, ways, play.state.period))
 
 
 def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
     """Return some of the sessions. `runs`: those that go on."""
     state = select_runs(play.state, [play.runs.index(run) for run in runs])
     batch = make_batch([play.systems[run] for run in runs])
-    return replace(play, runs=runs, batch=batch, state=state, coming=None)
+    return replace(play, runs=runs, batch=batch, state=state, path=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +111,7 @@ def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | 
     while play.runs:
         started = time.perf_counter()
         play = locate_fingers(play)
-        play = replace(play, state=advance(play.batch, play.state, play.coming))
+        play = replace(play, state=simulate_period(play.batch, play.state, play.finger))
         failed = find_diverged(play.state)
         share += (time.perf_counter() - started) / len(play.runs)
         if stopped and stopped():
@@ -179,6 +185,33 @@ class Histories:
         for stretch in self._stretches.pop(run):
             self._history.write(stretch)
         return self._history.finish(period, recording.every)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledPath:
+    """Fingertip path over a bed, at some times.
+
+    Attributes
+    ----------
+    time : ndarray (t,)
+        s.
+    fingertip : ndarray (t, 7)
+        Lowest point, m, and quaternion.
+    cells : ndarray of int (m,)
+        Those that are the nearest to it at some time, ascending.
+    """
+
+    time: Floats
+    fingertip: Floats
+    cells: NDArray[np.intp]
+
+
+def make_path(grid: Grid, trajectory: Trajectory, time: Floats) -> SampledPath:
+    """Compute a fingertip path at times (t,), s. `time` (t,), s."""
+    tip = trajectory.poses(time)
+    places = np.unique(tip[:, :2], axis=0)
+    nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
+    return SampledPath(time, tip, np.unique(nearest))
 
 
 class Sums:
@@ -299,8 +332,7 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
         largest = largest[:, [play.runs.index(run) for run in leader.runs]]
         play = keep_runs(play, leader.runs)
     play = locate_fingers(play)
-    finger = play.coming and play.coming.at(play.state.period)
-    play = replace(play, state=repeat_period(play.batch, play.state, finger, leader.state))
+    play = replace(play, state=repeat_period(play.batch, play.state, play.finger, leader.state))
     own, other, force = play.state.active, leader.state.active, play.batch.rows.force
     near = slice(own.near)
     found = compare(own.block[0], own.block[force, near], other.block[0], other.block[force, near])

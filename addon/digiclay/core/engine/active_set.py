@@ -1,4 +1,4 @@
-"""Active set of cells: its selection, and the transfer of its rows out of the bed and back.
+"""Active set of cells, of a run or a batch: selection, and transfer of rows out of the bed and back.
 
 A cell is active if the fingertip may touch it, the controller commands it, or it still moves:
 its valve is not shut, a command is on its way, or a force acts on it. Other cells cannot
@@ -8,18 +8,18 @@ The set is kept for some periods, with a margin around it.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Cells
+from ..base.arrays import Cells, Flags
 from ..base.modes import Mode
-from ..model.layout import RELATIVE_TOLERANCE, Disc, Grid
+from ..model.fingertip import Window, compute_reach
+from ..model.layout import Disc, Discs, Grid, encloses, join_discs, widen_disc
 from ..model.physics import Cell
-from ..model.touch import FingerPeriod, Window, find_reached_disc
+from ..model.touch import FingerPeriod
 from .state import ActiveSet, Rows, State
 
 #: Control periods after which the set is made anew, without the cells that have come to rest.
@@ -28,7 +28,7 @@ KEPT = 32
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Selection of the active cells of a session; `batch.padding` has that of many.
+    """Selection of the active cells of a session.
 
     Attributes
     ----------
@@ -44,119 +44,172 @@ class Selection:
     period: Any
     fastest: Any
 
+    #: How much farther than it must the set goes, in pitches, so that it serves for some periods.
+    margin = 1.0
+    #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
+    larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
+    smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
+
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
-        """Return a state whose active cells are all that can change in the coming period.
+        """Return a state, in the same arrays, whose active cells are all that can change in a period.
 
-        `state`: its arrays are used up; `finger`: the finger's way through the period; `control` (float,
-        float, float), disc x, y, radius that the controller will command, m.
+        `control`: the disc that the controller will command; of a batch a list of them.
         """
-        held, window = state.active, finger.window if finger else None
-        if self.holds(held, state.period, window, control):
+        active, window, disc = state.active, finger and finger.window, self.join(control)
+        if self.serves(active, state.period, window, disc):
             return state
-        moving, top = held.cells[self.release(state)], state.peak
-        if held.cells.size:
-            top = max(top, float(held.block[0].max()))
-        chosen = self.choose(held, state.period, window, control, moving, top)
-        chosen = replace(chosen, quadratic_basis=self.grid.compute_basis(chosen.cells))
-        return state._replace(peak=top, active=self.take(state, chosen))
+        moving = self.release(state)
+        peak = self.larger(state.peak, active.block[0].max(axis=0, initial=-np.inf))
+        chosen = self.choose(active, state.period, window, disc, moving, peak)
+        return state._replace(peak=peak, active=self.take(state, chosen))
 
-    def holds(self, held: ActiveSet, period: int, window: Window | None, control: Disc | None) -> bool:
-        """Return whether a set still has all cells that can change.
+    def join(self, control: Disc | None) -> Discs | None:
+        """Return the controlled disc."""
+        return control
 
-        `period`: number of control periods done; `window`: where the finger may touch in the coming period;
-        `control` (float, float, float), see `update`.
-        """
+    def serves(self, active: ActiveSet, period: int, window: Window | None, control: Discs | None) -> bool:
+        """Return whether a set has all cells that can change in a period."""
         return (
-            period < held.until
-            and _holds(held.control, control)
-            and _holds(held.reach, _reach(window, held.peak))
+            period < active.until
+            and encloses(active.control, control)
+            and encloses(active.reach, _reach(window, active.peak))
         )
 
     def choose(
         self,
-        held: ActiveSet,
+        active: ActiveSet,
         period: int,
         window: Window | None,
-        control: Disc | None,
-        moving: Cells,
-        top: float,
+        control: Discs | None,
+        moving: Flags,
+        top: Any,
     ) -> ActiveSet:
-        """Return the set that comes after another one: its cells, and for how long it serves.
-
-        `held`: the set before; its block, modes and basis stay; `period`, `window`, `control`: see `holds`;
-        `moving` int (m,), cells that still move; `top`: no pin top is higher than this, m.
-        """
-        grid = self.grid
-        peak = min(top + KEPT * self.period * self.fastest, self.cell.actuator.stroke)
-        margin = grid.layout.pitch
-        wide_control, wide_reach = _wider(control, margin), _wider(_reach(window, peak), margin)
-        near = _inside(grid, wide_reach)
+        """Return the set that follows another one, without its rows; no pin top is higher than `top`, m."""
+        peak = self.smaller(top + KEPT * self.period * self.fastest, self.cell.actuator.stroke)
+        margin = self.margin * self.grid.layout.pitch
+        reach, control = widen_disc(_reach(window, peak), margin), widen_disc(control, margin)
+        cells, near = self.pick(active, moving, reach, control)
         return replace(
-            held,
-            cells=_together(near, moving, _inside(grid, wide_control)),
-            near=near.size,
-            reach=wide_reach,
-            control=wide_control,
-            peak=peak,
-            until=period + KEPT,
+            active, cells=cells, near=near, reach=reach, control=control, peak=peak, until=period + KEPT
         )
 
-    def release(self, state: State) -> NDArray[np.bool_]:
+    def pick(
+        self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
+    ) -> tuple[Cells, int]:
+        """Return the near cells, then the moving and the controlled ones, and the number of near ones."""
+        none = np.empty(0, np.intp)
+        near = self.grid.disc(*reach) if reach else none
+        controlled = self.grid.disc(*control) if control else none
+        others = np.unique(np.concatenate([active.cells[moving], controlled]))
+        if near.size:
+            at = np.minimum(near.searchsorted(others), near.size - 1)
+            others = others[near.take(at) != others]
+        return np.concatenate([near, others]), near.size
+
+    def release(self, state: State) -> Flags:
         """Put the active cells back into the bed, in place; return which of them still move."""
-        held, rows, cell = state.active, self.rows, self.cell
-        cell.lag.settle(held.block[cell.lag_rows])
-        state.rows.reshape(rows.count, -1)[:, held.flat] = held.block
-        state.modes.reshape(-1)[held.flat] = held.mode
-        state.aged.reshape(-1)[held.flat[: held.near]] = state.period * self.period
-        busy: NDArray[np.bool_] = held.block[cell.lag_rows.start : rows.target].any(axis=0)
-        busy |= held.block[rows.force] > 0.0
-        busy |= held.mode > Mode.HOLD
-        return busy
+        active, rows, cell = state.active, self.rows, self.cell
+        cell.lag.settle(active.block[cell.lag_rows])
+        state.rows.reshape(rows.count, -1)[:, active.flat] = active.block
+        state.modes.reshape(-1)[active.flat] = active.mode
+        state.aged.reshape(-1)[active.flat[: active.near]] = state.period * self.period
+        moving: Flags = active.block[cell.lag_rows.start : rows.target].any(axis=0)
+        moving |= active.block[rows.force] > 0.0
+        moving |= active.mode > Mode.HOLD
+        return moving
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
-        """Take cells out of the bed, the pulp over them aged.
-
-        `state`: whose active cells have been released; `chosen`: the cells; its block and modes are not
-        looked at.
-        """
+        """Take chosen cells out of the bed of a state whose set is released, the pulp over them aged."""
         near, flat, touch = chosen.near, chosen.flat, self.cell.touch
         block = state.rows.reshape(self.rows.count, -1).take(flat, axis=1)
         block[self.rows.force, near:] = 0.0
         if near and touch:
             waited = state.period * self.period - state.aged.take(flat[:near])
             touch.pulp.age(block[self.cell.pulp_rows, :near], waited)
-        return replace(chosen, block=block, mode=state.modes.take(flat))
+        basis = self.grid.compute_basis(chosen.cells)
+        return replace(chosen, block=block, mode=state.modes.take(flat), quadratic_basis=basis)
 
 
-def _reach(window: Window | None, peak: float) -> Disc | None:
-    """Return the disc the finger may touch while no pin is above `peak`, m; None without a finger."""
-    return find_reached_disc(window, peak) if window else None
+class PaddedSelection(Selection):
+    """Selection of the active cells of many sessions, for all of them anew as soon as one needs it.
+
+    Where fewer are active than in another run, others make up the number. They could as well be
+    left out, so it does no harm that they are not.
+    """
+
+    margin = 0.5
+    larger, smaller = np.maximum, np.minimum
+
+    def join(self, control: Any) -> Discs | None:
+        """Return the controlled discs as arrays."""
+        return join_discs(control)
+
+    def pick(
+        self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
+    ) -> tuple[Cells, int]:
+        """Return the active cells (w, b), near ones first, and the number of near ones; see `Selection`."""
+        wanted = np.zeros((self.grid.count, moving.shape[1]), np.bool_)
+        near = np.broadcast_to(self.grid.covered(reach), wanted.shape)
+        wanted.reshape(-1)[active.flat] = moving
+        wanted |= self.grid.covered(control)
+        rank = 2 - near.astype(np.int8)
+        rank -= near | wanted
+        order = np.argsort(rank.T, axis=1, kind="stable").T
+        count, width = (int(np.count_nonzero(some, axis=0).max()) for some in (near, rank < 2))
+        return np.ascontiguousarray(order[:width]), count
 
 
-def _wider(disc: Disc | None, margin: float) -> Disc | None:
-    """Return a disc with a margin around it, m."""
-    return disc and (disc[0], disc[1], disc[2] + margin)
+@dataclass(frozen=True, eq=False)
+class OwnSelection(Selection):
+    """Selection of the cells that are active in each session alone, for sessions that depend on them.
+
+    Where fewer are active than in another run, others make up the number; of these nothing is measured
+    and nothing is commanded.
+
+    Attributes
+    ----------
+    runs : tuple of Selection
+        The sessions' own.
+    """
+
+    runs: tuple[Selection, ...]
+
+    def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
+        """Return a state whose active cells are those of each session; see `Selection.update`."""
+        active, period, count = state.active, state.period, len(self.runs)
+        # Before the first period there are no sets; those are as good as outlived.
+        own = list(active.own or [replace(active, cells=np.empty(0, np.intp))] * count)
+        windows = np.broadcast_to(finger.window, (6, count)).T.tolist() if finger else [None] * count
+        discs = control or [None] * count
+        due = [
+            run
+            for run, selection in enumerate(self.runs)
+            if not selection.serves(own[run], period, windows[run], discs[run])
+        ]
+        if period < active.until and not due:
+            return state
+        moving, peak = self.release(state), state.peak.copy()
+        for run in due:
+            size = own[run].cells.size
+            top = float(active.block[0, :size, run].max(initial=peak[run]))
+            peak[run], still = top, moving[:size, run]
+            own[run] = self.runs[run].choose(own[run], period, windows[run], discs[run], still, top)
+        near, until = max(one.near for one in own), min(one.until for one in own)
+        chosen = replace(active, cells=_pad(own, self.grid.count), near=near, until=until, own=tuple(own))
+        return state._replace(peak=peak, active=self.take(state, chosen))
 
 
-def _holds(outer: Disc | None, inner: Disc | None) -> bool:
-    """Return whether all of `inner` is in `outer`."""
-    if inner is None:
-        return True
-    if outer is None:
-        return False
-    # One that touches the limit from inside is in: a last bit, other in a batch than alone, decides nothing.
-    return math.dist(inner[:2], outer[:2]) + inner[2] <= outer[2] * (1.0 + RELATIVE_TOLERANCE)
+def _reach(window: Window | None, peak: Any) -> Discs | None:
+    """Return the discs that the fingertips may touch while no pin is above `peak`, m."""
+    return None if window is None else compute_reach(window, peak)
 
 
-def _inside(grid: Grid, disc: Disc | None) -> Cells:
-    """Return the cells of a disc, ascending."""
-    return grid.disc(*disc) if disc else np.empty(0, np.intp)
-
-
-def _together(near: Cells, moving: Cells, controlled: Cells) -> Cells:
-    """Return the near cells first, then the moving and controlled ones that are not among them, ascending."""
-    others: Cells = np.unique(np.concatenate([moving, controlled]))
-    if not near.size:
-        return others
-    at = np.minimum(near.searchsorted(others), near.size - 1)
-    return np.concatenate([near, others[near.take(at) != others]])
+def _pad(own: Sequence[ActiveSet], count: int) -> Cells:
+    """Return the cells (w, b) of all sets, with as many others of the `count` behind them as it takes."""
+    width = max(one.cells.size for one in own)
+    others = np.ones((len(own), count), np.bool_)
+    columns = []
+    for one, free in zip(own, others, strict=True):
+        free[one.cells] = False
+        columns.append(np.concatenate([one.cells, np.flatnonzero(free)[: width - one.cells.size]]))
+    return np.stack(columns, axis=-1)

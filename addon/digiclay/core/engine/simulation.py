@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +34,8 @@ def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:
     """
     if system.cell.touch is None:
         return [None] * len(poses)
-    return list(trace_finger(system.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3)))))
+    path = trace_finger(system.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3))))
+    return [path.at(period) for period in range(len(poses))]
 
 
 def step(system: System, state: State, poses: Floats) -> State:
@@ -63,7 +63,7 @@ def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
     return after
 
 
-def simulate_period(system: System, state: State, finger: Any) -> State:
+def simulate_period(system: System, state: State, finger: FingerPeriod | None) -> State:
     """Simulate one control period of a run, or of a batch, in the arrays of `state`."""
     sensors, controller, period = system.sensors, system.controller, state.period
     memory, disc = controller.locate(state.memory, sensors.read(state.active.touched, period))
@@ -77,7 +77,7 @@ def simulate_period(system: System, state: State, finger: Any) -> State:
     return state.end_period(memory)
 
 
-def repeat_period(system: System, state: State, finger: Any, leader: State) -> State:
+def repeat_period(system: System, state: State, finger: FingerPeriod | None, leader: State) -> State:
     """Simulate the control period that a run, or a batch, has just done, under its commands.
 
     `system`: of the same bed and rows; its controller and sensors are left aside; `state`: before the period;

@@ -13,6 +13,7 @@ from ..model.control_interface import Controller
 from ..model.interfaces import Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
+from ..model.touch import FingerPeriod
 from .active_set import Selection
 from .state import ActiveSet, Rows
 
@@ -51,7 +52,7 @@ class System:
     rows: Rows
     by_set: bool
 
-    def move(self, active: ActiveSet, finger: Any) -> None:
+    def move(self, active: ActiveSet, finger: FingerPeriod | None) -> None:
         """Move active cells through a control period under their queued commands, in place."""
         movement = active.movements.get(self.plan)
         if movement is None:
@@ -59,12 +60,11 @@ class System:
             active.movements[self.plan] = movement
         active.touched.force[:] = movement(self._trace_underside(active, finger))
 
-    def _trace_underside(self, active: ActiveSet, finger: Any) -> Floats:
+    def _trace_underside(self, active: ActiveSet, finger: FingerPeriod | None) -> Floats:
         """Return the fingertip's underside over the near cells at `instants`, (p, k[, b]), m."""
         if finger is None or not active.near:
             return np.empty((self.instants.size, 0, *active.cells.shape[1:]))
-        under: Floats = finger.under(active.touched.quadratic_basis)
-        return under
+        return finger.under(active.touched.quadratic_basis)
 
 
 def make_segments(

@@ -18,8 +18,12 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
+from .layout import Discs
 
 Item = TypeVar("Item")
+#: Where a fingertip goes in a period: center x, y of its path and half its length, m; base, m, tilt and bend,
+#: 1/m, of the paraboloid below it. Of b runs the rows of an array (6, b), or (6, 1) of one for all.
+Window = tuple[float, float, float, float, float, float] | Floats
 
 #: Squared reduced radius at which the paraboloid takes over.
 JOIN = 0.96
@@ -94,7 +98,7 @@ class Fingertip(Parameters):
 
 
 def compute_reaches(outline: Floats) -> Floats:
-    """Return what `compute_reach` needs of each outline (..., 10), (..., 3): base, m; tilt; bend, 1/m."""
+    """Return the end of a `Window` for each outline (..., 10), (..., 3): base, m; tilt; bend, 1/m."""
     half = outline[..., 8]
     base = outline[..., 2] - half * (_ROOT + _SLOPE * JOIN)
     return np.stack(
@@ -102,17 +106,18 @@ def compute_reaches(outline: Floats) -> Floats:
     )
 
 
-def compute_reach(base: float, tilt: float, bend: float, peak: float) -> float:
-    """Return a radius about the center beyond which the underside is above `peak`, m.
+def compute_reach(window: Window, peak: Any) -> Discs | None:
+    """Return the disc, or that of each of b runs, beyond which the underside is above `peak`, m.
 
     A paraboloid that nowhere lies above the underside gives a bound for every tilt; it
     stays one with the smallest base, the largest tilt and the smallest bend of several poses.
-
-    `base`, `tilt`, `bend`: from `compute_reaches`; `peak`: no pin top is higher than this, m. Returns
-    negative when the finger is wholly above `peak`.
     """
+    x, y, spread, base, tilt, bend = window
     square = tilt * tilt + 2.0 * bend * (peak - base)
-    return (tilt + math.sqrt(square)) / bend if square > 0.0 else -1.0
+    if isinstance(square, float):
+        return (x, y, (tilt + math.sqrt(square)) / bend + spread) if square > 0.0 else None
+    radius = (tilt + np.sqrt(np.maximum(square, 0.0))) / bend + spread
+    return x, y, np.where(square > 0.0, radius, -np.inf)
 
 
 def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
@@ -140,11 +145,7 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
 
 
 def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
-    """Return the height of the finger's underside, shape (..., p, k), m.
-
-    `forms` (..., 2 p, 6); `join` (..., 2, p, 1), from `compute_forms`; `basis` (6, k), rows 1, x, y, x², x y,
-    y² of the places asked for.
-    """
+    """Return the underside over places with rows 1, x, y, x², x y, y² (6, k), shape (..., p, k), m."""
     count = join.shape[-2]
     # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
     rows = np.matmul(forms, basis)

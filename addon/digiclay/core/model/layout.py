@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Cells, Floats
+from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
@@ -17,6 +18,8 @@ from ..base.quantity import Parameters, quantity
 Bounds = tuple[int, int, int, int]
 #: Center x, y and radius, m.
 Disc = tuple[float, float, float]
+#: The same of a run, or arrays (b,) of a batch, in which a radius of -inf stands for no disc.
+Discs = tuple[Any, Any, Any]
 
 
 class Arrangement(NamedTuple):
@@ -155,6 +158,16 @@ class Grid:
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + RELATIVE_TOLERANCE)]
 
+    def covered(self, discs: Discs | None) -> Flags:
+        """Return which cells are in the discs of b runs, shape (n, b); (n, 1) without discs."""
+        if discs is None:
+            return np.zeros((self.count, 1), np.bool_)
+        x, y, radius = discs
+        square = (self.x[:, None] - x) ** 2
+        square += (self.y[:, None] - y) ** 2
+        covered: Flags = square <= radius * np.abs(radius)
+        return covered
+
     def at(self, x: Floats, y: Floats) -> Cells:
         """Return the cells nearest to some places, m, shape (k,)."""
         plan, (left, bottom) = self.layout, self.corner
@@ -164,7 +177,7 @@ class Grid:
         return cells
 
     def compute_basis(self, cells: Cells) -> Floats:
-        """Return rows 1, x, y, x², x y, y² of some cells, shape (6, m)."""
+        """Return rows 1, x, y, x², x y, y² of cells (m,) or (m, b), shape (6, m) or (6, m, b)."""
         x, y = self.x.take(cells), self.y.take(cells)
         return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
 
@@ -211,3 +224,28 @@ def enclose_discs(one: Disc, other: Disc) -> Disc:
     whole = (apart + radius + other_radius) / 2.0
     share = (whole - radius) / apart
     return x + share * (other_x - x), y + share * (other_y - y), whole
+
+
+def widen_disc(disc: Discs | None, margin: float) -> Discs | None:
+    """Return discs with a margin around them, m."""
+    return disc and (disc[0], disc[1], disc[2] + margin)
+
+
+def encloses(outer: Discs | None, inner: Discs | None) -> bool:
+    """Return whether a disc, or each one of a batch, holds another one."""
+    if inner is None or outer is None:
+        return inner is None
+    (x, y, radius), (other_x, other_y, limit) = inner, outer
+    # One that touches the limit from inside is in: a last bit, other in a batch than alone, decides nothing.
+    limit = limit * (1.0 + RELATIVE_TOLERANCE)
+    if isinstance(limit, float):
+        return bool(math.hypot(x - other_x, y - other_y) + radius <= limit)
+    return bool((np.hypot(x - other_x, y - other_y) + radius <= limit).all())
+
+
+def join_discs(discs: Sequence[Disc | None] | None) -> Discs | None:
+    """Return the discs of b runs as arrays (b,)."""
+    if discs is None:
+        return None
+    x, y, radius = np.array([disc or (0.0, 0.0, -math.inf) for disc in discs]).T
+    return x, y, radius

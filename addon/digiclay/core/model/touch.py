@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Constants, Floats
+from ..base.arrays import Constants, Floats, apply_map
 from .contact import ExponentialLaw
-from .fingertip import Fingertip, compute_forms, compute_reach, compute_reaches, compute_underside
+from .fingertip import (
+    Fingertip,
+    Window,
+    compute_forms,
+    compute_reaches,
+    compute_underside,
+    join_surfaces,
+)
 from .interfaces import Pulp
-from .layout import Disc
 
 #: Control periods whose undersides are worked out at a time, and most numbers that they may be.
 AHEAD, MOST = 32, 200_000
@@ -33,67 +39,65 @@ class Touch:
         return Constants((0.0, self.contact.share))
 
 
-#: Which cells the finger may touch in a period: center of its way x, y and half the length
-#: of it, m; then the arguments of `fingertip.compute_reach`.
-Window = tuple[float, float, float, float, float, float]
-
-
 @dataclass(eq=False)
 class FingerPath:
-    """Fingertip path over t control periods, at p instants of each.
+    """Fingertip path over t control periods, at p instants of each, of a run or of b runs.
 
     Attributes
     ----------
-    forms : ndarray (t, 2 p, 6)
-    join : ndarray (t, 2, p, 1)
-        From `fingertip.compute_forms`.
-    windows : list of Window
+    first : int
+        The first of these periods.
+    forms : ndarray (t, 2 p, 6[, b])
+        From `fingertip.compute_forms`. The last axis is 1 where all runs have one and the same path.
+    join : ndarray (t, 2, p, 1[, b])
+    windows : list of Window, or ndarray (t, 6, b)
         One a period.
     """
 
+    first: int
     forms: Floats
     join: Floats
-    windows: list[Window]
+    windows: Any
 
     def __post_init__(self) -> None:
-        # The undersides worked out last: of which places, from which period on.
+        # The undersides computed last: over which places, from which period on.
         self._last: tuple[Floats | None, int, Floats] = (None, 0, np.empty((0, 0, 0)))
 
-    def under(self, period: int, basis: Floats) -> Floats:
-        """Return the underside in one of the periods, see `FingerPeriod.under`.
+    def at(self, period: int) -> FingerPeriod:
+        """Return the path in one of the periods."""
+        return FingerPeriod(self, period - self.first, self.windows[period - self.first])
 
-        It is asked for period by period, mostly of the same places: several are worked out at a time.
-
-        `basis` (6, k), see `fingertip.compute_underside`.
-        """
-        known, first, unders = self._last
-        if known is not basis or not first <= period < first + len(unders):
-            # Not so many that a large bed under a large finger would not fit in memory.
+    def under(self, index: int, basis: Floats) -> Floats:
+        """Return the underside in the period of an index over places (6, k[, b]), shape (p, k[, b]), m."""
+        if basis.ndim == 3:
+            forms, (least, root) = self.forms[index], self.join[index]
+            rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, basis)
+            return join_surfaces(rows[: len(least)], rows[len(least) :], least, root)
+        places, first, unders = self._last
+        if places is not basis or not first <= index < first + len(unders):
+            # Mostly the places of the period before: several periods at a time, as many as fit in memory.
             count = max(1, min(AHEAD, MOST // max(1, self.join.shape[2] * basis.shape[1])))
-            several = slice(period, period + count)
-            first, unders = period, compute_underside(self.forms[several], self.join[several], basis)
+            several = slice(index, index + count)
+            first, unders = index, compute_underside(self.forms[several], self.join[several], basis)
             self._last = (basis, first, unders)
-        under: Floats = unders[period - first]
+        under: Floats = unders[index - first]
         return under
 
 
 class FingerPeriod(NamedTuple):
-    """Fingertip path in one control period."""
+    """Fingertip path in one control period, of a run or of b runs."""
 
-    coming: FingerPath
-    period: int
+    path: FingerPath
+    number: int
     window: Window
 
     def under(self, basis: Floats) -> Floats:
-        """Return its underside at the period's p instants over some places (6, k), shape (p, k), m."""
-        return self.coming.under(self.period, basis)
+        """Return the underside at the period's p instants over places (6, k[, b]), shape (p, k[, b]), m."""
+        return self.path.under(self.number, basis)
 
 
-def trace_finger(fingertip: Fingertip, poses: Floats) -> list[FingerPeriod]:
-    """Work out how the finger comes, for some control periods.
-
-    `poses` (t, p, 7), its poses at the p instants of t periods: position of the lowest point, m, quaternion.
-    """
+def trace_finger(fingertip: Fingertip, poses: Floats, first: int = 0) -> FingerPath:
+    """Compute the path of a fingertip whose poses at the p instants of t periods are given, (t, p, 7)."""
     count, instants, _ = poses.shape
     outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
     low, high = outline[:, :, :2].min(axis=1), outline[:, :, :2].max(axis=1)
@@ -101,18 +105,13 @@ def trace_finger(fingertip: Fingertip, poses: Floats) -> list[FingerPeriod]:
     shape = compute_reaches(outline)
     farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
     windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
-    coming = FingerPath(*compute_forms(outline), [tuple(window) for window in windows])
-    return [FingerPeriod(coming, period, window) for period, window in enumerate(coming.windows)]
+    return FingerPath(first, *compute_forms(outline), windows)
 
 
-def find_reached_disc(window: Window, peak: float) -> Disc | None:
-    """Return the disc x, y, radius that holds every cell the finger may touch in a period, m; None: no cell.
-
-    `peak`: no pin top is higher than this, m.
-    """
-    x, y, spread, base, tilt, bend = window
-    radius = compute_reach(base, tilt, bend, peak)
-    return (x, y, radius + spread) if radius >= 0.0 else None
+def join_paths(paths: Sequence[FingerPath]) -> FingerPath:
+    """Return the path of a batch from those of its runs; from one alone when all have the same."""
+    parts = zip(*((path.forms, path.join, np.array(path.windows)) for path in paths), strict=True)
+    return FingerPath(paths[0].first, *(np.stack(part, axis=-1) for part in parts))
 
 
 def compute_force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
