@@ -32,10 +32,7 @@ Part = TypeVar("Part")
 
 
 def classify(value: Any) -> Any:
-    """Return all of a part but its numbers: parts of one kind can be merged.
-
-    `value`: a dataclass, and in its fields dataclasses, numbers, tuples, texts or None.
-    """
+    """Return all of a part but its numbers: parts of one kind can be merged."""
     if is_dataclass(value) and not isinstance(value, type):
         return type(value), *(classify(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, tuple):
@@ -111,10 +108,7 @@ class RunByRun:
 
 
 def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any:
-    """Return one controller for all runs: the method's own where its formulas hold for many at once.
-
-    `by_set`: see `System.by_set`.
-    """
+    """Return one controller for all runs: the method's own where its formulas hold for many at once."""
     first = controllers[0]
     if isinstance(first, BatchControl) and not by_set:
         merged = merge_parts(controllers)
@@ -185,10 +179,7 @@ class BatchMovement:
         return values.reshape(len(values), -1) if self._alike else values
 
     def __call__(self, under: Floats) -> Floats:
-        """Move the cells on by one control period, in place; return the force on the near ones, (k, b), N.
-
-        `under` are the undersides of the fingers over them, (p, k, b), m.
-        """
+        """Move the cells on by one control period, in place; return the force on the near ones, (k, b), N."""
         force = np.empty((1, *under.shape[1:]))
         own, seen = self._beds(force)[0], self._beds(under)
         for part, move in self._touched:
@@ -276,10 +267,7 @@ def find_diverged(state: State) -> NDArray[np.bool_]:
 
 
 def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceError:
-    """Return the error that a run with a number that is not finite ends in.
-
-    `state`: after the control period; `run`: its index on the last axis.
-    """
+    """Return the error of a run, by its index, with a number that is not finite after a control period."""
     held = state.active
     error = find_divergence(batch.systems[run], held.cells[:, run], held.block[..., run], state.period - 1)
     assert error is not None
@@ -324,10 +312,7 @@ class Findings:
         self._known: dict[int, dict[Any, Any]] = {KINDS: {}, MOTIONS: {}, BEDS: {}}
 
     def find(self, most: int, key: Any, make: Callable[..., Any], *given: Any) -> Any:
-        """Return what was made for an equal key, or make it; the first one goes when there are too many.
-
-        `most`: `KINDS`, `MOTIONS` or `BEDS`; `key` hashable; `given`: its arguments.
-        """
+        """Return what was made for an equal key, or make it; the first goes when there are `most`."""
         known = self._known[most]
         if key not in known:
             if len(known) >= most:

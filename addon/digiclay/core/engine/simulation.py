@@ -27,11 +27,7 @@ def begin(system: System) -> State:
 
 
 def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:
-    """Compute the fingertip paths of several control periods; None where nothing touches.
-
-    `poses` (t, p, f, 7), of the fingers at `System.instants` of t periods: lowest point, m, and unit
-    quaternion.
-    """
+    """Return the fingertip path in each of t periods, of poses (t, p, f, 7); None: no touch."""
     if system.cell.touch is None:
         return [None] * len(poses)
     path = trace_finger(system.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3))))
@@ -97,11 +93,7 @@ def repeat_period(system: System, state: State, finger: FingerPeriod | None, lea
 def find_divergence(
     system: System, cells: NDArray[np.intp], block: Floats, period: int
 ) -> DivergenceError | None:
-    """Return the error of a session with a number that is not finite; None where all are.
-
-    `system`: of this session; `cells` int (m,); `block` (r, m), their rows; `period`: the control period that
-    has been simulated.
-    """
+    """Return the error of the first number in rows (r, m) that is not finite, or None."""
     bad, rows = np.argwhere(~np.isfinite(block)), system.rows
     if not bad.size:
         return None

@@ -242,10 +242,7 @@ class State(NamedTuple):
 
 
 def make_initial_state(rows: Rows, count: int, height: Any, memory: Any) -> State:
-    """Return the state before a session, or before b sessions: every valve shut.
-
-    `count`: cells n of a bed; `height`: float or (b,), of every pin, m; `memory`: the controller's.
-    """
+    """Return the state before a session, or before b sessions, of n pins at a height, m: every valve shut."""
     runs = np.shape(height)
     values = np.zeros((rows.count, count, *runs))
     values[0] = values[rows.target] = height

@@ -69,9 +69,6 @@ class Actuator(Parameters):
         return force / self.area
 
     def rate(self, flow: Floats, height: Floats) -> Floats:
-        """Return dH/dt = q / A_a, m/s (equation 1); no flow into an end stop.
-
-        `flow` (n,), flow into the cylinder, m³/s; `height` (n,), height, m.
-        """
+        """Return dH/dt = q / A_a, m/s (equation 1), of flows q, m³/s, in; none goes into an end stop."""
         inward = ((height >= self.stroke) & (flow > 0.0)) | ((height <= 0.0) & (flow < 0.0))
         return np.where(inward, 0.0, flow / self.area)

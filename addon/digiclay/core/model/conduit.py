@@ -47,10 +47,7 @@ class OrificeAndConduit:
         return self.valve.knee
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
-        """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`.
-
-        `opening` ndarray, valve opening K, any shape; `out`: takes the result.
-        """
+        """Return g / (1 + R g), m³/(s Pa), of openings K, into `out` if given; see `Orifice`."""
         lift = self.valve.laminar_lift(opening, out)
         series = lift * self.resistance
         series += 1.0 / self.valve.laminar
@@ -58,10 +55,7 @@ class OrificeAndConduit:
         return lift
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
-        """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`.
-
-        `opening` (n,), valve opening K; `drop` (n,), pressure drop over valve and conduit, Pa.
-        """
+        """Return Q/ΔP of the series, m³/(s Pa), of openings K under drops over valve and conduit, Pa."""
         a = self.valve.turbulent * np.abs(opening)
         ra = self.resistance * a
         turbulent = 2.0 * a / (ra + np.sqrt(ra * ra + 4.0 * np.abs(drop)) + np.finfo(float).tiny)
@@ -69,10 +63,7 @@ class OrificeAndConduit:
         return np.minimum(laminar, turbulent)
 
     def flow(self, opening: Floats, drop: Floats) -> Floats:
-        """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`.
-
-        `opening` (n,), valve opening K; `drop` (n,), pressure drop over valve and conduit, Pa.
-        """
+        """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`."""
         return self.conductance(opening, drop) * drop
 
 

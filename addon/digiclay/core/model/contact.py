@@ -35,10 +35,7 @@ class ExponentialLaw:
         refuse_overrides(cls, ExponentialLaw, ("tension", "_numbers"), rule)
 
     def tension(self, depth: Floats) -> Floats:
-        """Return the elastic force T, N, before the share f_d.
-
-        `depth` (..., n), indentation x, m; negative where there is a gap.
-        """
+        """Return the elastic force T, N, before the share f_d, of indentations x, m, below 0 in a gap."""
         m, offset, none, most, unit = self._numbers[depth.shape]
         exponent: Floats = depth * m
         exponent -= offset

@@ -73,17 +73,11 @@ class Controller(Protocol):
         ...
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
-        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control.
-
-        `memory`: from `begin`, or the period before; `touched`: of the cells the finger may touch.
-        """
+        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control."""
         ...
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Return memory and orders for the cells of the disc and all that still move.
-
-        `memory`: from `locate`; `seen`: of the cells to command.
-        """
+        """Return memory and orders for the cells of the disc and all that still move."""
         ...
 
 
@@ -103,13 +97,7 @@ class SetPoint:
     per_cell: bool = False
 
     def total(self, following: ArrayLike) -> Floats:
-        """Return the set point for a number of following cells, N.
-
-        ``F_ref`` for all cells together, ``n F_ref`` for n cells that follow; NaN where none does,
-        since then no force is asked for.
-
-        `following`: numbers of cells in the mode `FORCE_FOLLOW`.
-        """
+        """Return the set point of n following cells, N: F_ref, or per cell n F_ref, NaN at n = 0."""
         count = np.asarray(following, dtype=np.float64)
         if not self.per_cell:
             return np.full(count.shape, self.force)
@@ -118,8 +106,5 @@ class SetPoint:
 
 
 def find_set_point(set_point: SetPoint | None, following: ArrayLike) -> Floats:
-    """Return the `SetPoint.total`, N; NaN throughout for a method without a set point.
-
-    `following`: numbers of cells in the mode `FORCE_FOLLOW`.
-    """
+    """Return the `SetPoint.total` of following cells, N; NaN for a method without a set point."""
     return np.full(np.shape(following), np.nan) if set_point is None else set_point.total(following)

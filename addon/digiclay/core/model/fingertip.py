@@ -35,10 +35,7 @@ _SLOPE = 0.5 / _ROOT
 
 
 def require_one(fingers: Sequence[Item]) -> Item:
-    """Return the only finger, or what there is of it; docs/architecture.md lists the callers.
-
-    `fingers`: one item a finger. Raises ParameterError when there is none, or more than one.
-    """
+    """Return the only item of a list of one a finger, or raise ParameterError; see docs/architecture.md."""
     if len(fingers) != 1:
         rule = "must be one: the physics carries exactly one finger"
         raise ParameterError("scene", "fingers", rule, str(len(fingers)))
@@ -153,10 +150,7 @@ def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
 
 
 def join_surfaces(inner: Floats, tangent: Floats, least: Any, root: Any) -> Floats:
-    """Return ``tangent + (sqrt(max(inner, least)) - root)²`` in the array of `inner`, m; see `compute_forms`.
-
-    `inner`, `tangent`: R and the tangent, m; `least`, `root` float or ndarray, c, m, and its root.
-    """
+    """Return ``tangent + (sqrt(max(inner, least)) - root)²``, m, in `inner`; see `compute_forms`."""
     np.maximum(inner, least, out=inner)
     np.sqrt(inner, inner)
     inner -= root

@@ -30,10 +30,7 @@ class Flow(Protocol):
     def knee(self) -> float: ...
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
-        """Return flow over drop in laminar flow, m3/s/Pa.
-
-        `opening` float or ndarray, valve opening K; `out`: array for the result.
-        """
+        """Return flow over drop in laminar flow, m3/s/Pa, of openings K, in the array `out` if given."""
         ...
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
@@ -60,10 +57,7 @@ class Lag(Protocol):
         ...
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
-        """Return the linear map from own rows and queued commands to the openings at some times.
-
-        `times`: times into the period, s.
-        """
+        """Return the linear map from own rows and queued commands to the openings at times of a period, s."""
         ...
 
     def settle(self, own: Floats) -> None: ...
@@ -107,10 +101,7 @@ class Sensors(Protocol):
     def rows(self) -> int: ...
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
-        """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is.
-
-        `own` (rows, m).
-        """
+        """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is."""
         ...
 
     def update(self, own: Floats, truth: Truth) -> None:
@@ -173,11 +164,7 @@ class Stepper(Protocol):
         ...
 
     def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
-        """Work out once what all periods share.
-
-        `cell` physics.Cell; `queue`: commands on their way to the valve; `segments`: physics steps of a
-        period.
-        """
+        """Compute once what all periods share, for a `physics.Cell` and the physics steps of a period."""
         ...
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:

@@ -38,12 +38,7 @@ class ValveLag(Parameters):
         return (command - own) / self.time_constant
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
-        """Return the opening at some times of a control period, as a linear map; exact.
-
-        `queue`: says when the valve goes over from one held command to the next; `times` (t,), times into the
-        period, s. Returns (t, 1 + queue.length), to be multiplied with the opening at the start and the
-        commands of the queue.
-        """
+        """Return the exact map (t, 1 + queue.length) from opening and commands to openings at times, s."""
         response = np.zeros((len(times), 1 + queue.length))
         for row, time in zip(response, times, strict=True):
             row[0] = math.exp(-time / self.time_constant)

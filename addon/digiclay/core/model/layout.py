@@ -201,10 +201,7 @@ def list_steps(shift: float) -> Cells:
 
 
 def find_neighbors(rows: int, columns: int, shift: float, *, corners: bool) -> Cells:
-    """Return each cell's neighbors, (n, 6), in a square grid (n, 4) or with corners (n, 8); -1: none.
-
-    They are counter-clockwise; `shift` is that of the odd rows, in pitches.
-    """
+    """Return each cell's neighbors (n, 6), (n, 4) or with corners (n, 8), counter-clockwise; -1: none."""
     row, column = np.divmod(np.arange(rows * columns), columns)
     steps = list_steps(shift)
     steps = (steps if corners or steps.shape[1] != len(SQUARE) else steps[:, ::2])[row % 2]

@@ -28,10 +28,7 @@ class InstantValve:
         return own
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
-        """Return the map that picks the command seen at each time, shape (t, queue.length).
-
-        `times`: times into the period, s.
-        """
+        """Return the map that picks the command seen at each time, s, shape (t, queue.length)."""
         response = np.zeros((len(times), queue.length))
         response[np.arange(len(times)), [queue.seen(time) for time in times]] = 1.0
         return response

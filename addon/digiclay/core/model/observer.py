@@ -59,11 +59,7 @@ class ValveObserver(Sensors):
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs.
-
-        The estimate; the periods known (0: none) and the true height then, to read it again;
-        the opening; the commands on their way.
-        """
+        """State rows: estimate, periods known (0: none), the height then, opening, commands on their way."""
         return 3 + self.cell.lag.rows + self.length
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
@@ -114,10 +110,7 @@ class ValveObserver(Sensors):
 def make_valve_observer(
     inner: Sensors, cell: Cell, line: Queue, period: float, doubt: float = 0.0
 ) -> ValveObserver:
-    """Make an observer for cells whose commands go through `line`; `doubt` as in `ValveObserver`, m.
-
-    `period`: control period, s; `doubt`, m.
-    """
+    """Make an observer for cells whose commands go through `line`; `period`, s; `doubt`, m."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)  # type: ignore[no-untyped-call]
     edges = (0.0, line.cut, period) if line.cut else (0.0, period)
     times: list[float] = []

@@ -85,21 +85,14 @@ def find_speeds(cell: Cell) -> Speeds:
 
 
 def find_contact_force(cell: Cell, y: Floats, under: Floats) -> Floats:
-    """Return the force on the first k cells of a block, shape (k,), N.
-
-    `y` (r, n), state rows, see `Cell`; `under` (k,), underside of the finger over the first k cells, m.
-    """
+    """Return the force of undersides (k,), m, on the first k cells with rows y (r, n), shape (k,), N."""
     if cell.touch is None:
         return np.empty(0)
     return compute_force(cell.touch, y[0, : under.size], under, y[cell.pulp_rows, : under.size])
 
 
 def compute_rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
-    """Return dy/dt of a block of cells.
-
-    `y` (r, n), state rows, see `Cell`; `under` (k,), underside of the finger over the first k cells, m;
-    `command` (n,), held valve commands, in [-1, 1].
-    """
+    """Return dy/dt of rows y (r, n) under undersides (k,), m, and held valve commands (n,)."""
     height, lag, pulp = y[0], y[cell.lag_rows], y[cell.pulp_rows, : under.size]
     pressure = np.zeros_like(height)
     change = np.zeros_like(y)

@@ -66,21 +66,11 @@ class Relaxation(Parameters):
         return relaxed
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
-        """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13).
-
-        `own` (k, n), the filters, N; `tension` (n,), N.
-        """
+        """Return dz/dt = ν (T - z), N/s (equation 13), of filters z (k, n) under tensions T (n,), N."""
         return self.rates * (tension - own)
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]:
-        """Return the force lost over a step, on average, as a map of (z, T at the start), and a share of T.
-
-        ``S = map . (z, T_0) + share T``, T the tension that there is: exact for a mean over the
-        step if the tension is linear in time, and the whole loss where the filters are quicker
-        than the step.
-
-        Returns `map` (k + 1,); `share`: in [0, 1).
-        """
+        """Return map and share of a step's mean loss of force ``map . (z, T_0) + share T``; exact for linear T."""
         turns = self.rates[:, 0] * step
         kept = -np.expm1(-turns) / turns
         # Of a small number of turns the difference is rounding only; its series takes over there.
@@ -89,20 +79,12 @@ class Relaxation(Parameters):
         return np.append(self.shares * kept, self.shares @ (1.0 - kept) - share), share
 
     def propagator(self, step: float) -> Floats:
-        """Return the map from (z; T at the start, on average, at the end of a step) to the new z.
-
-        Exact for a tension linear in time.
-
-        Returns (k, k + 3).
-        """
+        """Return the map (k, k + 3) from (z; T at start, mean, at end) to new z; exact for linear T."""
         turns = self.rates * step
         fresh = -np.expm1(-turns)
         bend = 1.0 - fresh * (1.0 / turns + 0.5)
         return np.hstack([np.diag(1.0 - fresh[:, 0]), -bend, fresh, bend])
 
     def age(self, own: Floats, time: Floats) -> None:
-        """Let filters decay without contact for `time` seconds, shape (n[, b]), in place; exact.
-
-        `own` (k, n[, b]), the filters, N; `time` (n[, b]), s.
-        """
+        """Let filters (k, n[, b]) decay without contact for so long, (n[, b]), s, in place; exact."""
         own *= np.exp(-per_row(self.rates, own.ndim) * time)

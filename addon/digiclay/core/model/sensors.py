@@ -63,10 +63,7 @@ class Sensing(Parameters):
 
     @property
     def force_floor(self) -> float:
-        """Force from which on the reading of a cell is no noise, N; 0 without noise.
-
-        Rounding takes a reading up by half a step at most.
-        """
+        """Force from which on a reading is no noise, N: rounding adds half a step; 0 without noise."""
         return SURE * self.force_noise + 0.5 * self.force_step if self.force_noise else 0.0
 
     @property
@@ -242,11 +239,7 @@ class Delayed(Sensors):
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs.
-
-        The periods known (one more than the last one read; 0: none), the true force and
-        height then, and a force and a height for each of the readings on their way.
-        """
+        """State rows: periods read (0: none), force and height then, the readings on their way, the inner."""
         return 3 + 2 * (self.periods + 1) + self.inner.rows
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:

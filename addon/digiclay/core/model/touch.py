@@ -115,13 +115,7 @@ def join_paths(paths: Sequence[FingerPath]) -> FingerPath:
 
 
 def compute_force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
-    """Return the force on each cell, N, pressing down is positive.
-
-    ``F = f_d max(T(x) - Σ ĉ_i z_i, 0)``: the pulp pushes but does not stick.
-
-    `height` (k,), pin tops H, m; `under` (k,), underside of the finger over them, m; x = H - underside;
-    `filters` (r, k), the relaxation's state rows z_i, N.
-    """
+    """Return ``f_d max(T - Σ ĉ_i z_i, 0)``, N, of pin tops (k,), m, undersides (k,), m, and filters z_i."""
     none, share = touch.constants[height.shape]
     tension = touch.contact.tension(height - under)
     tension -= touch.pulp.relaxed(filters)
@@ -146,10 +140,7 @@ def is_beyond(force: Any, indentation: Any) -> Any:
 
 
 def find_indentations(fingertip: Fingertip, history: Mapping[str, Floats]) -> Floats:
-    """Return the largest indentation of a pin in contact in each row of a history, (t,), m.
-
-    Rows that are neither the deepest nor deeper than `MOST_INDENTATION` may have 0 instead of theirs.
-    """
+    """Return the largest indentation in each row of a history, (t,), m; rows that are shallow may have 0."""
     felt, height = history["force"] > 0.0, history["height"]
     # No pin stands deeper than it is above the lowest point: few rows are left to look at.
     most = np.max(height, axis=1, where=felt, initial=-np.inf) - history["fingertip"][:, 2]

@@ -146,29 +146,17 @@ class Path:
 
 
 def make_level(times: Floats, positions: Floats, interpolation: str = "smooth") -> Trajectory:
-    """Return the trajectory of a level finger.
-
-    `times` (w,), s; `positions` (w, 3), m; `interpolation`: see `Trajectory`.
-    """
+    """Return the trajectory of a level finger through positions (w, 3), m, at times (w,), s."""
     return Trajectory(times, positions, np.tile(LEVEL, (times.size, 1)), interpolation)
 
 
 def sample_poses(trajectories: Sequence[Trajectory], times: Floats) -> Floats:
-    """Return the poses of all fingers, shape (k, f, 7).
-
-    `trajectories`: those of the f fingers; `times` (k,), s.
-    """
+    """Return the poses of all f fingers at times (k,), s, shape (k, f, 7)."""
     return np.stack([trajectory.poses(times) for trajectory in trajectories], axis=1)
 
 
 def interpolate_poses(path: Floats, parts: Floats) -> Floats:
-    """Return poses (t, p, f, 7) on the straight lines from each row of a path to the next.
-
-    Whether they are computed row by row or together makes no difference to any bit.
-
-    `path` (t + 1, f, 7), poses of the fingers: position, m, and unit quaternion; `parts` (p,), where on each
-    line, 0 to 1.
-    """
+    """Return poses (t, p, f, 7) at parts (p,) of the lines between rows of a path (t + 1, f, 7)."""
     count, fingers = len(path) - 1, path.shape[1]
     start, end = (np.repeat(rows, parts.size, axis=0).reshape(-1, 7) for rows in (path[:-1], path[1:]))
     part = np.tile(np.repeat(parts, fingers), count)[:, None]

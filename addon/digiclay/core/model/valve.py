@@ -91,42 +91,25 @@ class Orifice:
         return (self.turbulent / self.laminar) ** 2
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
-        """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K; in `out` if that is given.
-
-        `opening` ndarray, valve opening K, any shape; `out`: takes the result.
-        """
+        """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K, in the array `out` if given."""
         conductance = self.laminar_lift(opening, out)
         conductance *= self.laminar
         return conductance
 
     def laminar_lift(self, opening: Any, out: Floats | None) -> Any:
-        """Return the opening's size to the power of the laminar branch.
-
-        `opening` ndarray, valve opening K, any shape; `out`: takes the result.
-        """
+        """Return the size of openings to the power of the laminar branch, in the array `out` if given."""
         if out is None:
             return opening * opening if self.power == 2 else abs(opening)
         return np.multiply(opening, opening, out) if self.power == 2 else np.abs(opening, out)
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
-        """Return the secant conductance Q/ΔP, m³/(s Pa).
-
-        Parameters
-        ----------
-        opening : ndarray (n,)
-            Valve opening K; only its size h* = \\|K\\| matters here.
-        drop : ndarray (n,)
-            Pressure drop over valve and line, either sign, Pa.
-        """
+        """Return the secant conductance Q/ΔP, m³/(s Pa), of openings K, either sign, under drops, Pa."""
         root = np.sqrt(np.abs(drop)) + np.finfo(float).tiny
         laminar: Floats = self.laminar_conductance(opening)
         return np.minimum(laminar, self.turbulent * np.abs(opening) / root)
 
     def flow(self, opening: Floats, drop: Floats) -> Floats:
-        """Return the flow Q with the sign of `drop`, m³/s (equations 3 to 7); arguments as `conductance`.
-
-        `opening` (n,), valve opening K; `drop` (n,), pressure drop, Pa.
-        """
+        """Return the flow Q with the sign of `drop`, m³/s (equations 3 to 7); arguments as `conductance`."""
         return self.conductance(opening, drop) * drop
 
 

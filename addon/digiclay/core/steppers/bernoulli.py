@@ -104,10 +104,7 @@ class BernoulliPlan:
 
 
 def make_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
-    """Work out once what all periods share.
-
-    `queue`: commands on their way to the valve; `segments`: physics steps of a period.
-    """
+    """Compute once what all periods share."""
     times, weights, nodes = _gauss_points(queue, segments)
     end = segments[-1].start + segments[-1].length
     pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
@@ -146,11 +143,7 @@ def make_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> Bernou
 
 
 def _hard(cell: Cell, to_load: float, steepest: float) -> float:
-    """Return the exponent from which on some flow may turn turbulent or an exponential overflow.
-
-    `to_load`: pressure that a unit of tension makes, Pa; `steepest`: no step's decay is larger where every
-    flow is laminar.
-    """
+    """Return the exponent from which on a flow may be turbulent or an exponential overflow."""
     # How far the load may drive up the drop before some flow could turn turbulent.
     spare = cell.flow.knee - cell.supply.largest
     if spare <= 0.0:

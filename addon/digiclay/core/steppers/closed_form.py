@@ -223,10 +223,7 @@ def find_loaded_path(
 def _mid_load(
     valve: _Valve, m: Floats | float, to_load: Floats | float, start: StepStart
 ) -> tuple[Floats, Floats]:
-    """Return decay and free rise, m, with the secant conductance at the load of mid step.
-
-    It is predicted with the one at the start: second order, like the rest.
-    """
+    """Return decay and free rise, m, with the conductance at the predicted load of mid step: second order."""
     grown = middle = _exponential(start.exponent)
     for _ in range(2):
         conductance = valve.conductance(to_load * np.maximum(middle - start.relaxed, 0.0))

@@ -55,11 +55,7 @@ class Explicit:
         return ExplicitPlan(cell, queue, segments, find_speeds(cell))
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
-        """Return how far the rows go in one step, s long.
-
-        `rates`: rates of the rows, at rows and a node of the step; `y` (r, n), state rows at the start of the
-        step; `step`, s.
-        """
+        """Return how far rows y (r, n) go in one step, s long, by their rates at rows and a node."""
         raise NotImplementedError
 
     def prepare(self, plan: ExplicitPlan, rows: Floats, near: int) -> Movement:
@@ -67,11 +63,7 @@ class Explicit:
         return partial(self.advance, plan, rows)
 
     def advance(self, plan: ExplicitPlan, rows: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place; see `interfaces.Movement`.
-
-        `rows` (r + q, n), state rows, then the commands of the queue, oldest first; `under` (p, k), underside
-        of the finger over the first k cells at the period's instants, m.
-        """
+        """Move rows and commands (r + q, n) on by one control period, in place; see `interfaces.Movement`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = rows[: cell.rows], rows[cell.rows :]
         thrown = np.zeros(y.shape[1:], np.bool_)

@@ -75,12 +75,7 @@ class Richardson:
 
 
 def extrapolate(cell: Cell, fine: Floats, coarse: Floats, reach: tuple[Floats, Floats]) -> None:
-    """Take the leading term of the error out of rows, in place, and keep them within what there can be.
-
-    `fine`, `coarse` (r, n) or (r, n, b), rows moved by halved steps and by whole ones, from the same start;
-    `reach` (ndarray, ndarray), the lowest and the highest that the pins can be, m; see
-    `physics.Speeds.reach`.
-    """
+    """Take the leading error out of rows (r, n[, b]), in place, within the heights there can be."""
     own, pulp = fine[: cell.rows], fine[cell.pulp_rows]
     np.add(own, (own - coarse[: cell.rows]) / 3.0, out=own)
     # Where the two have little in common the extrapolation lies beyond what there can be.
