@@ -70,7 +70,7 @@ class Relaxation(Parameters):
         return self.rates * (tension - own)
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]:
-        """Return map and share of a step's mean loss of force ``map . (z, T_0) + share T``; exact for linear T."""
+        """Return map and share of a mean loss of force ``map . (z, T_0) + share T``, exact for linear T."""
         turns = self.rates[:, 0] * step
         kept = -np.expm1(-turns) / turns
         # Of a small number of turns the difference is rounding only; its series takes over there.
