@@ -7,9 +7,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants, Flags, Floats
+from ..base.arrays import Constants, Flags, Floats, Modes
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import Parameters, quantity
@@ -42,18 +41,14 @@ class Blister(Parameters):
             raise ParameterError("Blister", "edge_radius", rule, f"{self.edge_radius:g} m")
 
     def evaluate_profile(self, distance: Floats) -> Floats:
-        """Return the profile p(r), 1 at the center, for distances r inside the blister, m.
-
-        *cone*: 1 on the flat top, then falling linearly to 0 at the radius.
-        *gaussian*: ``exp(-r²/(2 σ²))``.
-        """
+        """Return the profile p(r), 1 at the center, for distances r inside the blister, m."""
         return self.interpolate(distance, 0.0, 1.0)
 
     def interpolate(self, distance: Floats, edge: Any, top: Any) -> Floats:
-        """Return heights ``edge + p(r) (top - edge)``, m.
+        """Return heights ``edge + p(r) (top - edge)``, m, at distances (m[, b]) from the middle, m.
 
-        `distance` (m,) or (m, b), from the middle, m; `edge`, `top` (m,) or (b,), heights of the surface
-        around the blister and of its top, m.
+        *cone*: p is 1 on the flat top, then falls linearly to 0 at the radius. *gaussian*: ``exp(-r²/(2
+        σ²))``. `edge`, `top` (m,) or (b,), heights of the surface around the blister and of its top, m.
         """
         if self.profile == "gaussian":
             height: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
@@ -81,15 +76,7 @@ CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
 
 
 class BlisterCells(NamedTuple):
-    """Cells about the middle of a blister.
-
-    Attributes
-    ----------
-    distance, ahead : ndarray (m,) or (m, b)
-        From it, and ahead of it, m.
-    inside, ring : ndarray of bool (m,) or (m, b)
-        In the blister, and in the ring around it.
-    """
+    """Cells about the middle of a blister, (m[, b]): distance and lead, m; within it, in the ring around."""
 
     distance: Floats
     ahead: Floats
@@ -105,10 +92,8 @@ class BlisterRule:
     ----------
     behind : float or ndarray (b,)
         Cosine below which a cell lies behind the fingertip.
-    release : float or ndarray (b,)
-        Force that releases a frozen cell, N.
-    felt : float or ndarray (b,)
-        Force above which a cell is touched, N.
+    release, felt : float or ndarray (b,)
+        Forces that release a frozen cell, and above which a cell is touched, N.
     """
 
     blister: Blister
@@ -117,11 +102,7 @@ class BlisterRule:
     felt: Any
 
     def divide(self, pose: tuple[Any, Any, Any, Any], basis: Floats) -> BlisterCells:
-        """Return the cells about the middle of a blister.
-
-        `pose` (b,), x, y of the middle, m, and the direction of travel, a unit vector; `basis` (6, m) or (6,
-        m, b), rows 1, x, y, x², x y, y² of the cells.
-        """
+        """Return the cells about the middle of a blister: x, y, m, and its direction, a unit vector, (b,)."""
         distance, ahead = measure_offsets(*pose, basis)
         _, radius, edge_radius, *_ = self._limits[distance.shape]
         inside = distance <= radius
@@ -130,10 +111,7 @@ class BlisterRule:
         return BlisterCells(distance, ahead, inside, ring)
 
     def find_edge(self, cells: BlisterCells) -> Flags:
-        """Return which cells give the height of the surface: while a fingertip travels, those ahead of it.
-
-        The finished ridge behind is no edge.
-        """
+        """Return which cells give the surface's height: those ahead, for the finished ridge is no edge."""
         facing: Flags = cells.ahead >= self._limits[cells.ahead.shape][0]
         facing &= cells.ring
         return facing
@@ -141,9 +119,8 @@ class BlisterRule:
     def find_frozen(self, cells: BlisterCells, seen: Measurement, uneven: Any = False) -> Flags:
         """Return which cells are left behind, and which of those left before stay so: none that is pressed.
 
-        `seen`: gives the modes of the last period, and the forces; `uneven` bool (m,) or (m, b), cells that
-        sink into uneven ground: they freeze nearer to the fingertip, and are freed when they lie ahead of it
-        again.
+        Cells that sink into uneven ground, bool (m[, b]), freeze nearer to the fingertip, and are freed when
+        they lie ahead of it again.
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
         limit = behind * cells.distance
@@ -159,13 +136,9 @@ class BlisterRule:
         return frozen
 
     def set_modes(
-        self, mode: NDArray[np.int8], cells: BlisterCells, force: Floats, touched_mode: Any, frozen: Flags
+        self, mode: Modes, cells: BlisterCells, force: Floats, touched_mode: Any, frozen: Flags
     ) -> None:
-        """Set the modes of the blister's cells, in place.
-
-        `mode` int (m,) or (m, b); `force` (m,) or (m, b), N; `touched_mode` (b,), mode of touched cells;
-        `frozen` bool (m,) or (m, b).
-        """
+        """Set the modes of the blister's cells, (m[, b]), in place; `touched_mode` (b,)."""
         edge, formed, froze = CODES[mode.shape]
         touched = force > self._limits[force.shape][-1]
         touched &= cells.inside
@@ -176,10 +149,9 @@ class BlisterRule:
 
     @cached_property
     def _limits(self) -> Constants:
-        """Thresholds of the cells.
+        """How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N.
 
-        How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N. Circles are widened by a
-        billionth, for the sake of cells exactly on them.
+        Circles are widened by a billionth, for the sake of cells exactly on them.
         """
         blister = self.blister
         wider = (

@@ -1,9 +1,9 @@
 """Data of the device that a controller may use, and the noise floor of its sensors.
 
 The noise floor is the force from which on one reading is no noise, five standard deviations of a cell's
-sensor (`sensors.Sensing.force_floor`); 0 with sensors without noise. Touch is told cell by cell: a sum of n
-readings would need five times √n, more than a finger at the rim of its contact presses with. A force that is
-controlled is the sum of the readings as they are, which has no bias.
+sensor (`sensors.Sensing.force_floor`); 0 with sensors without noise. Touch is decided cell by cell: a sum of
+n readings would need five times √n, more than a fingertip at the rim of its contact presses with. A force
+that is controlled is the sum of the readings as they are, which has no bias.
 """
 
 from __future__ import annotations
@@ -28,18 +28,14 @@ class DeviceInfo:
     ----------
     cell : Cell
         The cells' physics.
-    period : float
-        Control period, s.
+    period, dead_time : float
+        Control period, and dead time of the valves' commands, s.
     blister : Blister or None
         For the methods that form one.
     heights : ndarray (n,) or None
         The shape from outside that is to be displayed, m.
-    force_floor : float
-        Force from which on the reading of a cell is no noise, N; see `sensors.Sensing`.
-    height_floor : float
-        How far the reading of a height may be off, m.
-    dead_time : float
-        Of the valves' commands, s.
+    force_floor, height_floor : float
+        Force from which on the reading of a cell is no noise, N; how far that of a height may be off, m.
     """
 
     grid: Grid
@@ -58,16 +54,12 @@ class DeviceInfo:
 
 
 def suppress_noise(force: Floats, floor: Any) -> Floats:
-    """Return forces, but 0 where they may be noise. `force` (m,) or (m, b), N; `floor` (b,), N."""
+    """Return forces (m[, b]), N, but 0 where they are below the noise floor (b,), N."""
     return np.where(force >= floor, force, 0.0)
 
 
 def check_floor(carried: float, field: str, asked: float, floor: float) -> None:
-    """Refuse noise above the set point, since contact would not be detected.
-
-    `carried`: force on a cell when all is as asked, N; `field`: of the control, for the message; `asked`: its
-    value, N; `floor`, N. Raises ParameterError.
-    """
+    """Refuse a noise floor above the force that a cell carries, N: contact would not be detected."""
     if floor >= carried:
         rule = f"must keep five standard deviations below {carried:.3g} N, what a cell carries at most"
         raise ParameterError(

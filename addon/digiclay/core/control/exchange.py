@@ -13,16 +13,10 @@ from ..model.layout import Grid
 
 @dataclass(frozen=True)
 class Exchange:
-    """Exchange between neighbors in one control period.
+    """Exchange between neighbors in one control period, on a bed with so many columns.
 
-    Attributes
-    ----------
-    columns : int
-        Cells in a row.
-    shifted : bool
-        Whether odd rows are shifted, so that a cell has six neighbors, not four.
-    along, across : float
-        Share of their difference that two neighbors exchange, in a row and between rows.
+    Two neighbors in a row exchange a share `along` of their difference, those of two rows `across`. Where odd
+    rows are `shifted`, a cell has six neighbors, not four.
     """
 
     columns: int
@@ -41,21 +35,17 @@ class Exchange:
             steps.append((self.columns + 1, odd & (column < last), self.across))
         order = np.argsort(cells)
         ascending = cells[order]
-        found = []
+        pairs = []
         for step, exists, share in steps:
             start = np.flatnonzero(exists)
             goal = cells[start] + step
             at = np.minimum(np.searchsorted(ascending, goal), cells.size - 1)
             here = ascending[at] == goal
-            found.append((start[here], order[at[here]], share))
-        return found
+            pairs.append((start[here], order[at[here]], share))
+        return pairs
 
     def even_out(self, cells: Cells, values: Floats) -> Floats:
-        """Return values of some cells, shape (m,), after neighbors among them have exchanged.
-
-        What one gives the other gets, and nothing is exchanged with a cell that is not there: the
-        sum stays what it was.
-        """
+        """Return values of some cells, (m,), after neighbors among them have exchanged; their sum is kept."""
         change = np.zeros(cells.size)
         for one, other, share in self.find_pairs(cells):
             flow = share * (values[other] - values[one])

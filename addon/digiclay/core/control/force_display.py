@@ -46,13 +46,8 @@ class ForceDisplay(TouchParameters):
 class ForceDisplayControl(CellwiseControl):
     """Controller of the force display for a bed.
 
-    A cell that feels the finger: ``c dH/dt = F_com - F``, up to `rise` above rest. Let go: back to rest.
-    A cell remembers for how many periods it has felt nothing.
-
-    Attributes
-    ----------
-    field : ndarray (n,) or (n, b)
-        F_com of every cell of the bed, N.
+    A cell that feels the fingertip: ``c dH/dt = F_com - F``, up to `rise` above rest. Let go: back to rest.
+    A cell remembers for how many periods it has felt nothing. `field`: F_com of all cells, (n[, b]), N.
     """
 
     parameters: ForceDisplay
@@ -64,16 +59,16 @@ class ForceDisplayControl(CellwiseControl):
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Control the force of touched cells and the height of the others; see `Controller`."""
-        known, rest = self.parameters, self.actuator.rest_height
+        gains, rest = self.parameters, self.actuator.rest_height
         asked = take_cells(self.field, seen.cells)
-        pressed = seen.force >= known.felt_force
+        pressed = seen.force >= gains.felt_force
         alone = np.where(pressed, 0.0, seen.own[0] + 1.0)
-        kept = (seen.mode == Mode.FORCE_FOLLOW) & (alone * self.period <= known.release_time)
+        kept = (seen.mode == Mode.FORCE_FOLLOW) & (alone * self.period <= gains.release_time)
         felt = pressed | kept
         seen.own[0] = np.where(felt, alone, 0.0)
-        limit = np.minimum(rest + known.rise, self.actuator.stroke)
+        limit = np.minimum(rest + gains.rise, self.actuator.stroke)
         pressing = np.minimum(
-            (asked - seen.force) / known.damping, (limit - seen.height) / self.drive.settling_time
+            (asked - seen.force) / gains.damping, (limit - seen.height) / self.drive.settling_time
         )
         speed = np.where(felt, pressing, self.drive.approach(rest - seen.height))
         mode = np.where(felt, np.int8(Mode.FORCE_FOLLOW), np.int8(Mode.REST))
@@ -82,11 +77,7 @@ class ForceDisplayControl(CellwiseControl):
 
 
 def build(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
-    """Put force display together for a device.
-
-    Raises ParameterError when the field asks for more than a pin can press or less than it feels, or its file
-    cannot be used.
-    """
+    """Put force display together; ParameterError when pins cannot press or feel the field."""
     check_damping(parameters.damping, device.cell, device.period)
     check_floor(parameters.force, "force", parameters.force, device.force_floor)
     parameters = raise_felt_force(device.force_floor, parameters)
@@ -100,10 +91,5 @@ def build(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
         if field.min() < parameters.felt_force:
             rule = f"must keep the field at or above control.felt_force, {parameters.felt_force:g} N"
             raise ParameterError("control", "contrast", rule, f"{field.min():.3g} N at its smallest")
-    return ForceDisplayControl(
-        parameters,
-        device.cell.actuator,
-        make_drive(parameters, device.cell, device.period),
-        device.period,
-        field,
-    )
+    drive = make_drive(parameters, device.cell, device.period)
+    return ForceDisplayControl(parameters, device.cell.actuator, drive, device.period, field)

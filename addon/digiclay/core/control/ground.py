@@ -4,13 +4,13 @@ The paper takes one height for all cells, the mean at the blister's edge. What i
 a ridge across another one has a gap on either side. With a ground of its own a cell goes from the height that
 it was commanded to when the blister came over it, and one at the blister's rim stays where it is.
 
-A level blister on a slope moves every cell to one height: behind a finger that climbs, what it has pressed is
-raised again, and ahead of it what it is to climb is lowered. So a blister that sinks, its top below the own
-ground of the cells under the finger, raises no cell, and lowers none farther than those. What it has raised
-before stays: a finger that climbs out of a valley which it fills sinks into the far side. Where the ground
-is uneven, what the finger has left freezes sooner, and what it has lowered is freed when it lies ahead again:
-on a slope the finger is felt beside its lowest point. On even ground that would leave a groove with ragged
-flanks.
+A level blister on a slope moves every cell to one height: behind a fingertip that climbs, what it has pressed
+is raised again, and ahead of it what it is to climb is lowered. So a blister that sinks, its top below the
+own ground of the cells under the fingertip, raises no cell, and lowers none farther than those. What it has
+raised before stays: a fingertip that climbs out of a valley which it fills sinks into the far side. Where the
+ground is uneven, what the fingertip has left freezes sooner, and what it has lowered is freed when it lies
+ahead again: on a slope the fingertip is felt beside its lowest point. On even ground that would leave a
+groove with ragged flanks.
 """
 
 from __future__ import annotations
@@ -26,51 +26,35 @@ from ..model.control_interface import Measurement
 from .blister import Blister
 from .servo import sum_weighted
 
-#: Least weight of a cell in the ground under the finger, N: a blister that nobody touches has a ground, too.
+#: Least weight of a cell in the ground under the fingertip, N: an untouched blister has a ground, too.
 UNTOUCHED = 1e-9
-#: How many standard deviations about its mean the ground under the finger reaches.
+#: How many standard deviations about its mean the ground under the fingertip reaches.
 SPREAD = 1.0
-#: The ground under the finger is uneven when it reaches that far about its mean, as a share of the depth.
+#: The ground under the fingertip is uneven when it reaches that far about its mean, as a share of the depth.
 UNEVEN = 0.1
 
 
 @dataclass(frozen=True)
 class EdgeGround:
-    """One height for all cells, that of the edge (the paper's).
+    """One height for all cells, that of the edge (the paper's)."""
 
-    Attributes
-    ----------
-    rows : int
-        State rows a cell needs.
-    turning : float
-        Distance traveled back that reverses the direction, as a share of the radius of the flat top.
-    """
-
+    #: State rows a cell needs.
     rows = 0
+    #: Distance traveled back that reverses the direction, as a share of the radius of the flat top.
     turning = 0.0
 
     def find(self, seen: Measurement, edge: Any) -> Any:
-        """Return the ground, m. `edge` (b,), height of the surface around the blister, m."""
+        """Return the ground for a height of the surface around the blister, (b,), m."""
         return edge
 
     def find_profile(
         self, blister: Blister, distance: Floats, inside: Flags, ground: Any, top: Any, seen: Measurement
     ) -> tuple[Floats, Any]:
-        """Return the height of the blister at each cell, m, and which cells sink into uneven ground.
-
-        See `OwnGround`.
-
-        `distance` (m,) or (m, b); `inside` bool (m,) or (m, b); `ground`, `top` (b,).
-        """
+        """Return the height of the blister at each cell, m, and which cells sink into uneven ground: none."""
         return blister.interpolate(distance, ground, top), False
 
     def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
-        """Tell which frozen cells keep their command: those farther off the ground than the profile.
-
-        `target`, `profile` (m,) or (m, b), commanded heights, and those of the blister, m; `ground` (b,), see
-        `find`, m; `top` (b,), height of the blister's top, m; `uneven` bool (m,) or (m, b), see
-        `find_profile`.
-        """
+        """Tell which frozen cells keep their command, m: those farther off the ground than the profile, m."""
         kept: Flags = target > profile
         kept ^= top < ground
         return kept
@@ -84,7 +68,7 @@ class OwnGround:
     turning = 1.0
 
     def find(self, seen: Measurement, edge: Any) -> Any:
-        """Return the ground of each cell, m; see `EdgeGround.find`. `edge` (b,)."""
+        """Return the ground of each cell, (m[, b]), m; see `EdgeGround.find`."""
         own: Floats = seen.own[0]
         # Their modes are those of the last period: these cells were outside the blister then.
         np.copyto(own, seen.target, where=seen.mode <= Mode.EDGE)
@@ -95,11 +79,8 @@ class OwnGround:
     ) -> tuple[Floats, Any]:
         """Return the height of the blister at each cell, m, and which cells sink into uneven ground.
 
-        `distance` (m,) or (m, b), from the middle of the blister, m; `inside` bool (m,) or (m, b), cells of
-        the blister; `ground` (m,) or (m, b), m; `top` (b,), height of the top, m; `seen`: gives the forces,
-        N: the ground under the finger is its mean and standard deviation, weighted with them; and the
-        commanded heights, m. Returns `profile` (m,) or (m, b), m; `uneven` bool (m,) or (m, b), cells that
-        are not above their ground, where the blister sinks into uneven ground.
+        `distance` (m[, b]) from the middle of the blister, and `top` (b,), m. The ground under the fingertip
+        is its mean and standard deviation, weighted with the forces. A cell above its ground does not sink.
         """
         level = blister.interpolate(distance, ground, top)
         weight = np.maximum(seen.force, UNTOUCHED)
@@ -123,10 +104,7 @@ class OwnGround:
         return np.where(sinks, profile, level), uneven & ~raised
 
     def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
-        """Tell which frozen cells keep their command; see `EdgeGround.find_kept`.
-
-        `target`, `profile`, `ground` (m,) or (m, b), m; `top` (b,), m; `uneven` bool (m,) or (m, b).
-        """
+        """Tell which frozen cells keep their command; see `EdgeGround.find_kept`."""
         kept: Flags = target > profile
         # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one
         # that sinks into uneven ground is not raised where the ground falls below its top.

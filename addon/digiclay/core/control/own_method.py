@@ -1,8 +1,8 @@
 """Control methods of one's own: their class, what they are shown and order, and the guard around them.
 
 An own method is one frozen dataclass: its fields are the parameters, its methods are pure functions. `begin`
-returns the memory before a session, `locate` says which cells are to be commanded, and `command` turns
-forces and heights into commanded heights or valve openings. Whoever needs more overrides `build`.
+returns the memory before a session, `locate` the cells to be commanded, and `command` turns forces and
+heights into commanded heights or valve openings. A method with a controller of its own overrides `build`.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from enum import Enum
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Cells as Numbers
+from ..base.arrays import Floats, Modes
 from ..base.errors import DigiclayError, MethodError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.control_interface import Commands, Controller, Measurement
+from ..model.layout import Disc
 from .device_info import DeviceInfo, suppress_noise
 from .drive import Drive, DriveParameters, make_drive
 
@@ -56,9 +57,9 @@ class Cells(NamedTuple):
     height: Floats
     force: Floats
     target: Floats
-    mode: NDArray[np.int8]
+    mode: Modes
     rows: Floats
-    number: NDArray[np.intp]
+    number: Numbers
 
 
 class Orders(NamedTuple):
@@ -109,9 +110,7 @@ class OwnMethod(DriveParameters):
     def begin(self, device: DeviceInfo) -> Any:
         """Return the memory before a session: None, numbers, arrays, and (named) tuples of them."""
 
-    def locate(
-        self, memory: Any, touched: Cells, device: DeviceInfo
-    ) -> tuple[Any, tuple[float, float, float] | None]:
+    def locate(self, memory: Any, touched: Cells, device: DeviceInfo) -> tuple[Any, Disc | None]:
         """Return memory and the disc x, y, radius of the cells to command, m; None: those that move.
 
         `memory`: from `begin`, or `command` a period before; `touched`: those the finger may touch.
@@ -154,24 +153,34 @@ class OwnControl:
         return self.parameters.begin(self.device)
 
     def locate(self, memory: Any, touched: Measurement) -> Any:
-        """Let the method say which cells it commands; see `Controller`."""
+        """Let the method choose the cells it commands; see `Controller`."""
         return self.parameters.locate(memory, show_cells(touched), self.device)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Let the method order, and work out what it leaves open; see `Controller`."""
+        """Check the method's orders, and fill in what it leaves open; see `Controller`."""
         given = self.parameters.command(memory, show_cells(seen), self.device)
         memory, orders = take_results(given, 2, "memory and orders")
-        height, opening, mode, rows = _check_orders(orders, seen)
-        actuator = self.device.cell.actuator
+        if not isinstance(orders, Orders):
+            raise TypeError(f"must return Orders as its second result (got {type(orders).__name__})")
+        size, actuator = seen.height.shape, self.device.cell.actuator
+        mode = None if orders.mode is None else check_modes(orders.mode, size)
+        height, opening, rows = (
+            None if order is None else check_array(order, name, shape)
+            for order, name, shape in (
+                (orders.height, "height", size),
+                (orders.opening, "opening", size),
+                (orders.rows, "rows", seen.own.shape),
+            )
+        )
         target = np.clip(seen.target if height is None else height, 0.0, actuator.stroke)
         if opening is None:
             command = self.drive.command(self.drive.approach(target - seen.height), seen.force)
         else:
             command = np.clip(opening, -1.0, 1.0)
         if mode is None:
-            formed = np.abs(target - actuator.rest_height) > self.parameters.dead_band
             touched = suppress_noise(seen.force, self.device.force_floor) > 0.0
-            mode = np.where(touched, np.int8(Mode.FORCE_FOLLOW), formed.view(np.int8))
+            formed = self.drive.mark_formed(target, actuator.rest_height)
+            mode = np.where(touched, np.int8(Mode.FORCE_FOLLOW), formed)
         if rows is not None:
             seen.own[:] = rows
         return memory, Commands(target, mode, command)
@@ -192,26 +201,8 @@ def take_results(given: Any, count: int, wanted: str) -> Any:
     return given
 
 
-def _check_orders(orders: Any, seen: Measurement) -> tuple[Any, Any, Any, Any]:
-    """Return orders as arrays of the right shape and type, None where there are none; else TypeError."""
-    if not isinstance(orders, Orders):
-        raise TypeError(f"must return Orders as its second result (got {type(orders).__name__})")
-    size = seen.height.shape
-    modes = check_array(orders.mode, "mode", size, "iu")
-    if modes is not None:
-        modes = check_modes(modes)
-    return (
-        check_array(orders.height, "height", size),
-        check_array(orders.opening, "opening", size),
-        modes,
-        check_array(orders.rows, "rows", seen.own.shape),
-    )
-
-
 def check_array(values: Any, name: str, shape: tuple[int, ...], kinds: str = "fiu") -> Any:
-    """Return values as an array of a shape and kinds of numbers, or raise the rule; None stays None."""
-    if values is None:
-        return None
+    """Return values as an array of a shape and kinds of numbers, or raise the rule."""
     array = np.asarray(values)
     if array.shape != shape:
         raise ValueError(f"must return {name} of the shape {shape} of the cells (got {array.shape})")
@@ -228,11 +219,13 @@ def check_array(values: Any, name: str, shape: tuple[int, ...], kinds: str = "fi
     return array
 
 
-def check_modes(modes: NDArray[Any]) -> NDArray[np.int8]:
-    """Return modes as they are stored; ValueError, with the rule, where one is none of `Mode`."""
+def check_modes(values: Any, size: tuple[int, ...]) -> Modes:
+    """Return modes as they are stored, or raise the rule where they are no codes of `Mode`."""
+    modes = check_array(values, "mode", size, "iu")
     if modes.size and not (modes.min() >= 0 and modes.max() <= HIGHEST):
         raise ValueError(f"must return mode as codes of Mode, from 0 to {HIGHEST} (got {modes.max()})")
-    return modes.astype(np.int8, copy=False)
+    stored: Modes = modes.astype(np.int8, copy=False)
+    return stored
 
 
 #: Control periods that the calls of one control period may take on average, in processor time; and how many
@@ -293,18 +286,18 @@ class Guarded:
 
     def begin(self) -> Any:
         """Return the memory before a session."""
-        with self._told("begin"):
+        with self._report("begin"):
             memory = self.inner.begin()
             _check_memory(memory)
         return memory
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
-        """Let the method say which cells it commands; see `Controller`."""
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
+        """Let the method choose the cells it commands; see `Controller`."""
         start = time.thread_time()
-        with self._told("locate"), np.errstate(all="ignore"):
-            given = _hand_out(touched)
-            found = self.inner.locate(memory, given)
-            after, disc = take_results(found, 2, "memory and a disc, or None")
+        with self._report("locate"), np.errstate(all="ignore"):
+            given = _copy_read_only(touched)
+            wanted = "memory and a disc, or None"
+            after, disc = take_results(self.inner.locate(memory, given), 2, wanted)
             _check_alike(memory, after)
             touched.own[:] = given.own
             if disc is not None:
@@ -314,21 +307,25 @@ class Guarded:
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Let the method command the cells; see `Controller`."""
-        start, size = time.thread_time(), seen.height.shape
-        with self._told("command"), np.errstate(all="ignore"):
-            given = _hand_out(seen)
+        start = time.thread_time()
+        with self._report("command"), np.errstate(all="ignore"):
+            given = _copy_read_only(seen)
             after, orders = take_results(self.inner.command(memory, given), 2, "memory and orders")
             _check_alike(memory, after)
-            target, mode, command = take_results(orders, 3, "target, mode and command")
-            target = check_array(target, "target", size)
-            mode = check_modes(check_array(mode, "mode", size, "iu"))
-            command = check_array(command, "command", size)
-            if command.size and not (command.max() <= 1.0 and command.min() >= -1.0):
-                raise ValueError(f"must return commands from -1 to 1 (got {np.abs(command).max():.6g})")
-            if self.rows:
-                seen.own[:] = check_array(given.own, "rows", seen.own.shape)
+            commands = orders if type(self.inner) is OwnControl else self._check(orders, given)
+            seen.own[:] = given.own
         self._judge(time.thread_time() - start)
-        return after, Commands(target, mode, command)
+        return after, commands
+
+    def _check(self, orders: Any, given: Measurement) -> Commands:
+        """Return the commands of a controller of unknown code, or raise the broken rule."""
+        target, mode, command = take_results(orders, 3, "target, mode and command")
+        size = given.height.shape
+        target, command = check_array(target, "target", size), check_array(command, "command", size)
+        if command.size and not (command.max() <= 1.0 and command.min() >= -1.0):
+            raise ValueError(f"must return commands from -1 to 1 (got {np.abs(command).max():.6g})")
+        check_array(given.own, "rows", given.own.shape)
+        return Commands(target, check_modes(mode, size), command)
 
     def _judge(self, spent: float) -> None:
         """Refuse a method that is too slow: a live session would stand still."""
@@ -339,8 +336,8 @@ class Guarded:
             raise MethodError(f"{self.origin}: command {rule} (got {got}).")
 
     @contextmanager
-    def _told(self, function: str) -> Iterator[None]:
-        """Turn whatever goes wrong into one line."""
+    def _report(self, function: str) -> Iterator[None]:
+        """Turn any error into one line."""
         try:
             yield
         except (MethodError, MemoryError, KeyboardInterrupt):
@@ -371,24 +368,23 @@ def describe_failure(error: BaseException, file: str) -> str:
 
     A rule that a check of ours found broken is the error's own text, ``must ...``.
     """
-    said = str(error).rstrip(".")
-    if said.startswith("must ") and isinstance(error, (TypeError, ValueError)):
-        return said
+    text = str(error).rstrip(".")
+    if text.startswith("must ") and isinstance(error, (TypeError, ValueError)):
+        return text
     line = error.lineno if isinstance(error, SyntaxError) else None
     trace = error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == file:
             line = trace.tb_lineno
         trace = trace.tb_next
-    kind = type(error).__name__
     where = f" in line {line}" if line else ""
-    return f"must not raise (got {kind}{where}{': ' + said if said else ''})"
+    return f"must not raise (got {type(error).__name__}{where}{': ' + text if text else ''})"
 
 
-def _hand_out(seen: Measurement) -> Measurement:
+def _copy_read_only(seen: Measurement) -> Measurement:
     """Return copies, so that no view leads to the bed's own arrays; read-only but the controller's rows."""
-    rows: Any = seen[:-1]  # a method of unknown code is asked about one run at a time
-    given = Measurement(*(array.copy() for array in rows))
+    arrays: Any = seen[:-1]  # a method of unknown code is called for one run at a time
+    given = Measurement(*(array.copy() for array in arrays))
     for array in given[:-1]:
         array.flags.writeable = array is given.own
     return given
@@ -400,8 +396,8 @@ def _check_memory(memory: Any) -> None:
         for item in memory:
             _check_memory(item)
         return
-    known = memory is None or isinstance(memory, (bool, int, float, np.number, np.bool_, Enum))
-    if not known and not (isinstance(memory, np.ndarray) and memory.dtype.kind in "biuf"):
+    single = memory is None or isinstance(memory, (bool, int, float, np.number, np.bool_, Enum))
+    if not single and not (isinstance(memory, np.ndarray) and memory.dtype.kind in "biuf"):
         rule = "must return a memory of numbers, arrays, enumerations and tuples of them, or None"
         raise TypeError(f"{rule} (got {type(memory).__name__})")
 
@@ -412,24 +408,23 @@ def _check_alike(before: Any, after: Any) -> None:
         return
     if isinstance(after, tuple) and type(after) is type(before) and len(after) == len(before):
         for old, new in zip(before, after, strict=True):
-            if new is not old:
-                _check_alike(old, new)
+            _check_alike(old, new)
     elif isinstance(after, np.ndarray) and isinstance(before, np.ndarray):
         if (after.ndim, after.dtype.kind) != (before.ndim, before.dtype.kind):
             rule = f"must keep the memory's array of {before.ndim} dimensions and {before.dtype}"
             raise TypeError(f"{rule} (got {after.ndim} and {after.dtype})")
-    elif type(after) is not type(before) and not _is_number_like(before, after):
+    elif type(after) is not type(before) and (_rank(before), _rank(after)) not in ALIKE:
         rule = f"must keep the kinds of its memory, here {type(before).__name__}"
         raise TypeError(f"{rule} (got {type(after).__name__})")
     elif isinstance(after, (float, np.floating)) and math.isnan(after):
         raise ValueError("must return a memory without NaN")
 
 
-def _is_number_like(before: Any, after: Any) -> bool:
-    """Return whether a number may stand where another one stood: a float may become any real number."""
-    if isinstance(before, (float, np.floating)):
-        return isinstance(after, (int, float, np.integer, np.floating)) and not isinstance(after, bool)
-    whole = (int, np.integer)
-    if isinstance(before, (bool, np.bool_)):
-        return isinstance(after, (bool, np.bool_))
-    return isinstance(before, whole) and isinstance(after, whole) and not isinstance(after, bool)
+#: Kinds of numbers, each by its rank; and which rank may follow which: a float may become a whole number.
+NUMBERS = ((bool, np.bool_), (int, np.integer), (float, np.floating))
+ALIKE = ((0, 0), (1, 1), (2, 2), (2, 1))
+
+
+def _rank(value: Any) -> int:
+    """Return the rank of a number in `NUMBERS`, -1 for anything else."""
+    return next((rank for rank, kinds in enumerate(NUMBERS) if isinstance(value, kinds)), -1)

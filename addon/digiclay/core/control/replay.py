@@ -9,18 +9,12 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..model.control_interface import Commands, Measurement
-from ..model.layout import Grid
+from ..model.layout import Disc, Grid
 
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """Controller with recorded commands and without measurements.
-
-    Attributes
-    ----------
-    commands : ndarray (t, n)
-        Valve commands, a row a control period; none afterwards.
-    """
+    """Controller of recorded valve commands, (t, n), a row a control period; none afterwards."""
 
     grid: Grid
     commands: Floats
@@ -29,7 +23,7 @@ class Replay:
     rows = 0
 
     @cached_property
-    def disc(self) -> tuple[float, float, float] | None:
+    def disc(self) -> Disc | None:
         """The disc that holds every cell that is ever commanded: x, y, radius, m."""
         cells = np.flatnonzero(self.commands.any(axis=0))
         if not cells.size:
@@ -42,7 +36,7 @@ class Replay:
         """Return the number of periods played."""
         return 0
 
-    def locate(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float] | None]:
+    def locate(self, memory: int, touched: Measurement) -> tuple[int, Disc | None]:
         """Take every commanded cell along."""
         return memory, self.disc
 

@@ -1,7 +1,8 @@
 """Direction of the fingertip, and the cells behind it (Fig. 6 of the paper).
 
-The direction is settled by distance traveled, not by speed: a finger that slows down or
-rests keeps its direction, and what it has formed is not called back.
+The direction is settled by distance traveled, not by speed: a fingertip that slows down or
+rests keeps its direction, and what it has formed is not called back. The basis of cells are rows
+1, x, y, x², x y, y², (6, m) of one run or (6, m, b) of a batch; what differs from run to run is (b,).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 
-#: A cell no farther behind than this is abeam, and counts as ahead, m: cells lie in rows that a finger
+#: A cell no farther behind than this is abeam, and counts as ahead, m: cells lie in rows that a fingertip
 #: may cross at a right angle, and rounding must not decide on them.
 ABEAM = 1e-12
 #: A direction is opposite to another when the cosine of the angle between them is below this.
@@ -30,11 +31,10 @@ class Heading(NamedTuple):
 
 
 def update_heading(heading: Heading, x: float, y: float, travel: float, reversal: float = 0.0) -> Heading:
-    """Return the heading of a finger; a new one once it has traveled far enough.
+    """Return the heading of a fingertip at x, y, m; a new one once it has gone a distance `travel`, m.
 
-    `x`, `y`: where the finger is now, m; `travel`: distance that settles the direction, m; `reversal`:
-    distance that settles one opposite to the last one, within 60 degrees, m, if longer: on a slope the
-    centroid of the forces moves about under a finger that goes one way.
+    A direction opposite to the last one, within 60 degrees, takes `reversal`, m, if that is longer: on a
+    slope the centroid of the forces moves about under a fingertip that goes one way.
     """
     dx, dy = x - heading.x, y - heading.y
     way = math.hypot(dx, dy)
@@ -44,21 +44,14 @@ def update_heading(heading: Heading, x: float, y: float, travel: float, reversal
 
 
 def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
-    """Return how far cells lie ahead of a point, m; negative behind it, 0 before any travel.
-
-    `x`, `y`: the point, m; `basis` (6, m), rows 1, x, y, ... of the cells.
-    """
+    """Return how far cells (6, m) lie ahead of a point, m; negative behind it, 0 before any travel."""
     _, _, toward_x, toward_y = heading
     ahead: Floats = np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
     return ahead
 
 
 def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats) -> tuple[Floats, Floats]:
-    """Return distances from a point, and how far cells lie ahead of it, see `measure_lead`.
-
-    `x`, `y` (b,), the point, m; `toward_x`, `toward_y` (b,), the direction, a unit vector; `basis` (6, m) or
-    (6, m, b), rows 1, x, y, x², x y, y² of the cells. Returns `distance`, `ahead` (m,) or (m, b), m.
-    """
+    """Return how far cells lie from a point, m, and ahead of it in a direction, (m[, b]) each, m."""
     if basis.ndim == 2:  # one product
         forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
         distance, ahead = np.array((_circle(x, y), forward)).dot(basis)
@@ -75,10 +68,7 @@ def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats)
 
 
 def measure_excess(x: Any, y: Any, radius: Any, basis: Floats) -> Floats:
-    """Return by how much the squares of distances from a point exceed that of a radius, m².
-
-    `x`, `y`, `radius` (b,), m; `basis` (6, m) or (6, m, b), rows 1, x, y, x², x y, y² of the cells.
-    """
+    """Return by how much the squares of distances from a point exceed that of a radius, (m[, b]), m²."""
     if basis.ndim == 2:  # one product
         excess: Floats = np.array(_circle(x, y, radius)).dot(basis)
         return excess
@@ -96,10 +86,7 @@ def _circle(x: float, y: float, radius: float = 0.0) -> tuple[float, ...]:
 
 
 def measure_square(x: Floats | float, y: Floats | float, basis: Floats) -> Floats:
-    """Return squared distances from one point, shape (m,), or from s points, shape (s, m), m².
-
-    `x`, `y` (s,), m; `basis` (6, m), rows 1, x, y, x², x y, y² of the cells.
-    """
+    """Return squared distances from one point, (m,), or from s points, (s, m), m²."""
     one = x * 0.0 + 1.0
     form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T
     square: Floats = form.dot(basis)
