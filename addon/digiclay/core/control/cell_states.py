@@ -1,8 +1,8 @@
 """Method II: a state machine in every cell, driven by its own force (Fig. 5 of the paper).
 
 No coordinator: a cell pressed hard enough follows the force, its neighbors become a blister
-around it, those of them that feel the finger follow the force in turn, and so the contact
-set spreads and moves with the finger.
+around it, those of them that feel the fingertip follow the force in turn, and so the contact
+set spreads and moves with the fingertip.
 """
 
 from __future__ import annotations
@@ -12,21 +12,19 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Flags, Floats, any_true
+from ..base.arrays import Flags, Floats, Modes, any_true
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement, SetPoint
-from ..model.layout import RELATIVE_TOLERANCE
+from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .servo import Tracking, lock_overloaded
 from .travel import ABEAM, Heading, measure_lead, measure_square, update_heading
 
-Modes = NDArray[np.int8]
 VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
 
 
@@ -47,7 +45,7 @@ BY_FORCE = (
     Arrow((Mode.CRITICAL,), Mode.BLISTER, "timed_out"),
 )
 
-#: What the distance to the nearest cell under the finger decides.
+#: What the distance to the nearest cell under the fingertip decides.
 BY_PLACE = (
     Arrow(VIRTUAL_SPRING, Mode.BLISTER, "in_blister"),
     Arrow((Mode.BLISTER,), Mode.FROZEN, "left_behind"),
@@ -57,10 +55,7 @@ BY_PLACE = (
 
 
 def follow_arrows(mode: Modes, arrows: tuple[Arrow, ...], conditions: dict[str, Flags]) -> Modes:
-    """Return the modes after all arrows were followed at once; of two from one mode the later wins.
-
-    `mode` int (m,); `conditions` bool (m,), every condition the arrows name.
-    """
+    """Return the modes after all arrows were followed at once; of two from one mode the later wins."""
     after = mode.copy()
     for source, goal, condition in arrows:
         starts = _MEMBERS[source].take(mode)
@@ -73,20 +68,9 @@ _MEMBERS = {arrow.source: np.isin(np.arange(len(Mode)), arrow.source) for arrow 
 
 
 class Patch(NamedTuple):
-    """Memory of the controller: position of the contact and direction of the fingertip.
+    """Memory of the controller: centroid of the forces when last felt, m, direction of travel, losses.
 
-    Attributes
-    ----------
-    x, y : float
-        Centroid of the forces when last felt, m.
-    heading : Heading
-        Which way it travels.
-    edge : float
-        Height of the surface around the blister, m.
-    felt : bool
-        Whether some cell is under the finger.
-    losses : int
-        How often the finger was lost.
+    `edge`: height of the surface around the blister, m; `felt`: whether some cell is under the fingertip.
     """
 
     x: float = 0.0
@@ -160,15 +144,11 @@ class CellStatesControl:
     Attributes
     ----------
     blister : Blister
-        Its radii count from the nearest cell under the finger.
-    actuator : Actuator
-        The cells' cylinders.
-    lift : float
-        Force the high reservoir can lift, N.
+        Its radii count from the nearest cell under the fingertip.
+    lift, floor : float
+        Force the high reservoir can lift, and from which on the reading of a cell is no noise, N.
     period : float
         Control period, s.
-    floor : float
-        Force from which on the reading of a cell is no noise, N.
     """
 
     parameters: CellStates
@@ -186,8 +166,8 @@ class CellStatesControl:
         """Return the memory before a session."""
         return Patch()
 
-    def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
-        """Find where the finger presses, and how far its blister can reach; see `Controller`."""
+    def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, Disc | None]:
+        """Find where the fingertip presses, and how far its blister can reach; see `Controller`."""
         pressed = touched.force > self._least(touched.mode)
         if not any_true(pressed):
             return memory, None
@@ -224,27 +204,27 @@ class CellStatesControl:
     def _least(self, mode: Modes) -> Floats | float:
         """Return the force above which a cell counts to the patch, N: one that follows keeps what it reads.
 
-        The forces fall below the noise when the finger rises; the few readings that happen not to would
-        draw the centroid to and fro.
+        The forces fall below the noise when the fingertip rises; the few readings that do not would draw the
+        centroid to and fro.
         """
         return np.where(_under_finger(mode), 0.0, self.floor) if self.floor else 0.0
 
-    def _by_force(self, seen: Measurement) -> dict[str, NDArray[np.bool_]]:
+    def _by_force(self, seen: Measurement) -> dict[str, Flags]:
         """Return the conditions of `BY_FORCE`."""
-        known, force = self.parameters, seen.force
+        limits, force = self.parameters, seen.force
+        critical = force < limits.critical_trigger
         return {
-            "above_spring_trigger": force >= known.spring_trigger,
-            "above_blister_trigger": force >= known.blister_trigger,
-            "below_critical_trigger": force < known.critical_trigger,
-            "above_critical_trigger": force >= known.critical_trigger,
-            "timed_out": (force < known.critical_trigger)
-            & (seen.own[0] * self.period >= known.critical_time),
+            "above_spring_trigger": force >= limits.spring_trigger,
+            "above_blister_trigger": force >= limits.blister_trigger,
+            "below_critical_trigger": critical,
+            "above_critical_trigger": ~critical,
+            "timed_out": critical & (seen.own[0] * self.period >= limits.critical_time),
         }
 
     def _around(
-        self, memory: Patch, seen: Measurement, mode: Modes, under: NDArray[np.bool_], target: Floats
+        self, memory: Patch, seen: Measurement, mode: Modes, under: Flags, target: Floats
     ) -> tuple[Patch, Modes, Floats]:
-        """Form the blister around the cells under the finger: their neighborhoods superposed."""
+        """Form the blister around the cells under the fingertip: their neighborhoods superposed."""
         blister, basis = self.blister, seen.quadratic_basis
         distance = np.sqrt(measure_square(basis[1, under], basis[2, under], basis))
         nearest = distance.min(axis=0)
@@ -281,19 +261,19 @@ class CellStatesControl:
         )
         return np.where(spring, kind, mode)
 
-    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: NDArray[np.bool_]) -> Floats:
-        """Return valve commands: force control under the finger, springs and profile elsewhere."""
-        known = self.parameters
+    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags) -> Floats:
+        """Return valve commands: force control under the fingertip, springs and profile elsewhere."""
+        gains = self.parameters
         springs = (mode <= Mode.EDGE) | (mode == Mode.SPRING)
-        command = self.parameters.command(target - springs * seen.force / known.spring_stiffness, seen.height)
-        follow = known.force_gain * (known.force_setpoint - seen.force)
+        command = gains.command(target - springs * seen.force / gains.spring_stiffness, seen.height)
+        follow = gains.force_gain * (gains.force_setpoint - seen.force)
         np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), 1.0))
         return lock_overloaded(command, seen.force, self.lift)
 
 
-def _under_finger(mode: Modes) -> NDArray[np.bool_]:
+def _under_finger(mode: Modes) -> Flags:
     """Return the cells that follow the force, or did in the last period."""
-    following: NDArray[np.bool_] = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
+    following: Flags = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
     return following
 
 

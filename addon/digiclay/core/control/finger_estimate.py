@@ -2,8 +2,9 @@
 
 The state is x, y, z of the lowest point, m; their velocities, m/s; the logarithm of the fingertip's size over
 the known one; its elongation along x and along the diagonal (`level_fingertip`). The last three are the
-curvatures of the underside at the lowest point, which take in what is known wrongly: a pulp that is stiffer
+curvatures of the underside at the lowest point, which take in errors of the model: a pulp that is stiffer
 than known makes the fingertip look flatter, that is larger; a fingertip too long, or tilted, is elongated.
+The basis of cells are rows 1, x, y, x², x y, y², (6, m).
 """
 
 from __future__ import annotations
@@ -23,17 +24,7 @@ Form = tuple[float, float, float, float, float, float]
 
 
 class Place(NamedTuple):
-    """Place of a level fingertip.
-
-    Attributes
-    ----------
-    x, y, z : float
-        Lowest point, m.
-    size : float
-        Logarithm of its size over the known one.
-    along, askew : float
-        Elongation along x, and along the diagonal between x and y; see above.
-    """
+    """Lowest point of a level fingertip, m, logarithm of its size over the known one, and elongations."""
 
     x: float
     y: float
@@ -44,33 +35,16 @@ class Place(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Underside over cells, and its slopes.
-
-    Attributes
-    ----------
-    under : ndarray (m,)
-        m.
-    slopes : ndarray (6, m)
-        By size, x, y, the two elongations and z.
-    """
+    """Underside over cells, (m,), m, and its slopes, (6, m), by size, x, y, the two elongations and z."""
 
     under: Floats
     slopes: Floats
 
 
 class _Profile(NamedTuple):
-    """Numbers of ``h(q) = slope q - lowest + (sqrt(max(bend (1 - q), least)) - root)²``.
+    """Numbers of ``h(q) = slope q - lowest + (sqrt(max(bend (1 - q), least)) - root)²``, m.
 
-    They are those of `fingertip.compute_forms`.
-
-    Attributes
-    ----------
-    mean : float
-        M of the known fingertip, 1/m².
-    slope, bend, lowest, least : float
-        m.
-    root : float
-        Root of `least`.
+    They are those of `fingertip.compute_forms`; `mean`: M of the known fingertip, 1/m²; `root`: of `least`.
     """
 
     mean: float
@@ -110,42 +84,38 @@ class LevelFingertip:
         return _Profile(*map(float, (mean, slope, bend, lowest, least, root)))
 
     def find_underside(self, place: Place, basis: Floats) -> Floats:
-        """Return the underside over cells, (m,), m.
-
-        `basis` (6, m), rows 1, x, y, x², x y, y² of the cells.
-        """
-        known = self._profile.resize(place.size)
-        inner, tangent = np.array(_list_surfaces(known, place, _find_radius(known, place))).dot(basis)
-        return join_surfaces(inner, tangent, known.least, known.root)
+        """Return the underside over cells, (m,), m."""
+        profile = self._profile.resize(place.size)
+        surfaces = _list_surfaces(profile, place, _find_radius(profile, place))
+        inner, tangent = np.array(surfaces).dot(basis)
+        return join_surfaces(inner, tangent, profile.least, profile.root)
 
     def measure(self, place: Place, basis: Floats) -> Slopes:
-        """Return the underside over cells, with its slopes.
-
-        `basis` (6, m), rows 1, x, y, x², x y, y² of the cells.
-        """
-        known = self._profile.resize(place.size)
-        radius = _find_radius(known, place)
+        """Return the underside over cells, with its slopes."""
+        profile = self._profile.resize(place.size)
+        radius = _find_radius(profile, place)
         rows = np.empty((8, basis.shape[1]))
-        forms = (*_list_surfaces(known, place, radius), *_list_slopes(known, place, radius))
+        forms = (*_list_surfaces(profile, place, radius), *_list_slopes(profile, place, radius))
         np.array(forms).dot(basis, out=rows[:7])
         under, tangent, slopes = rows[0], rows[1], rows[2:]
-        bend = np.sqrt(np.maximum(under, known.least))
-        join_surfaces(under, tangent, known.least, known.root)
+        bend = np.sqrt(np.maximum(under, profile.least))
+        join_surfaces(under, tangent, profile.least, profile.root)
         # h'(q) of each cell: what the slopes of q are to be multiplied with.
-        np.divide(known.bend * known.root, bend, out=bend)
-        bend += known.slope - known.bend
-        slopes[:5] *= bend
+        np.divide(profile.bend * profile.root, bend, out=bend)
+        bend += profile.slope - profile.bend
+        by_form, by_size = slopes[:5], slopes[0]
+        by_form *= bend
         # With the size h grows, while q shrinks.
-        slopes[0] += under
-        slopes[0] -= place.z
+        by_size += under
+        by_size -= place.z
         slopes[5] = 1.0
         return Slopes(under, slopes)
 
 
-def _find_radius(known: _Profile, place: Place) -> Form:
+def _find_radius(profile: _Profile, place: Place) -> Form:
     """Return q."""
     x, y, _, _, along, askew = place
-    mean = known.mean
+    mean = profile.mean
     return _place_form(x, y, mean * (1.0 - along), -2.0 * mean * askew, mean * (1.0 + along))
 
 
@@ -155,20 +125,20 @@ def _place_form(x: float, y: float, xx: float, xy: float, yy: float) -> Form:
     return (0.5 * (by_x * x + by_y * y), -by_x, -by_y, xx, xy, yy)
 
 
-def _list_surfaces(known: _Profile, place: Place, radius: Form) -> tuple[Form, Form]:
+def _list_surfaces(profile: _Profile, place: Place, radius: Form) -> tuple[Form, Form]:
     """Return what `fingertip.join_surfaces` joins: ``bend (1 - q)``, and ``z - lowest + slope q``."""
     one, x, y, xx, xy, yy = radius
-    r, t = -known.bend, known.slope
+    r, t = -profile.bend, profile.slope
     return (
         (r * one - r, r * x, r * y, r * xx, r * xy, r * yy),
-        (t * one + place.z - known.lowest, t * x, t * y, t * xx, t * xy, t * yy),
+        (t * one + place.z - profile.lowest, t * x, t * y, t * xx, t * xy, t * yy),
     )
 
 
-def _list_slopes(known: _Profile, place: Place, radius: Form) -> tuple[Form, ...]:
+def _list_slopes(profile: _Profile, place: Place, radius: Form) -> tuple[Form, ...]:
     """Return the slopes of q by size, x, y and the two elongations."""
     one, x, y, xx, xy, yy = radius
-    mean = known.mean
+    mean = profile.mean
     return (
         (-2.0 * one, -2.0 * x, -2.0 * y, -2.0 * xx, -2.0 * xy, -2.0 * yy),
         (-x, -2.0 * xx, -xy, 0.0, 0.0, 0.0),
@@ -193,14 +163,7 @@ FIRST = (2e-3, 2e-3, 1e-3, 2e-2, 2e-2, 2e-2, 0.1, 0.2, 0.2)
 
 
 class Estimate(NamedTuple):
-    """Estimated fingertip.
-
-    Attributes
-    ----------
-    mean : ndarray (9,)
-        State.
-    covariance : ndarray (9, 9)
-    """
+    """Estimated state of the fingertip, (9,), and its covariance, (9, 9)."""
 
     mean: Floats
     covariance: Floats
@@ -208,16 +171,9 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard deviations of a finger's motion, and of what the model leaves out.
+    """Standard deviations of a fingertip's motion, and of what the model leaves out.
 
-    Attributes
-    ----------
-    acceleration : float
-        m/s².
-    turn, size : float
-        Change within a second, rad and 1.
-    underside : float
-        m.
+    Acceleration, m/s²; turn and relative size within a second, rad and 1; measured underside, m.
     """
 
     acceleration: float
@@ -228,23 +184,14 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class FingerFilter:
-    """Filter of a known fingertip.
-
-    Attributes
-    ----------
-    period : float
-        Control period, s.
-    """
+    """Filter of a known fingertip; `period`: control period, s."""
 
     fingertip: Fingertip
     spread: Spread
     period: float
 
     def begin(self, x: float, y: float, z: float) -> Estimate:
-        """Return the estimate of a fingertip that has just touched, at rest.
-
-        `x`, `y`, `z`: lowest point, m.
-        """
+        """Return the estimate of a fingertip that has just touched, at rest; lowest point, m."""
         return Estimate(np.array([x, y, z, *(0.0,) * (STATES - 3)]), np.diag(np.square(FIRST)))
 
     def predict(self, before: Estimate) -> Estimate:
@@ -269,9 +216,9 @@ class FingerFilter:
         return step, noise
 
     def correct(self, guess: Estimate, at: Slopes, seen: Floats, variance: Floats) -> tuple[Estimate, Floats]:
-        """Return an estimate corrected by measured undersides, and what it leaves of their errors, m.
+        """Return an estimate corrected by measured undersides, (m,), m, and the errors that it leaves, m.
 
-        `at`: undersides of `guess`; `seen` (m,), measured, m; `variance` (m,), m².
+        `at`: undersides of `guess`; `variance` (m,), of the measured ones, m².
         """
         slopes = at.slopes
         error = seen - at.under
@@ -293,20 +240,13 @@ class FingerFilter:
         return Estimate(mean, 0.5 * (covariance + covariance.T)), error
 
     def measure(self, mean: Floats, basis: Floats) -> Slopes:
-        """Return the undersides of an estimated fingertip over cells, with their slopes.
-
-        `mean` (9,), state; `basis` (6, m), rows 1, x, y, ... of the cells.
-        """
+        """Return the undersides of a fingertip of an estimated state, (9,), over cells, with their slopes."""
         x, y, z, _, _, _, *shape = mean.tolist()
         return self._level.measure(Place(x, y, z, *shape), basis)
 
-    def find_underside(self, place: tuple[float, float, float], known: Estimate, basis: Floats) -> Floats:
-        """Return the underside over cells, (m,), m, of the estimated fingertip at another place.
-
-        `place`: x, y, z of the lowest point, m; `known`: gives size and elongation; `basis` (6, m), rows 1,
-        x, y, ... of the cells.
-        """
-        return self._level.find_underside(Place(*place, *known.mean[6:].tolist()), basis)
+    def find_underside(self, place: tuple[float, float, float], like: Estimate, basis: Floats) -> Floats:
+        """Return the underside over cells, (m,), m, of a fingertip like the estimated one at a place, m."""
+        return self._level.find_underside(Place(*place, *like.mean.tolist()[6:]), basis)
 
     @cached_property
     def _level(self) -> LevelFingertip:
@@ -315,11 +255,9 @@ class FingerFilter:
 
 
 def invert_six(matrix: Floats) -> Floats:
-    """Return the inverse of a matrix of six rows by elimination with pivots, in plain numbers.
+    """Return the inverse of a matrix, (6, 6), by elimination with pivots; NaN of a singular one.
 
-    LAPACK wakes threads, which takes milliseconds on a busy machine.
-
-    `matrix` (6, 6).
+    In plain numbers: LAPACK wakes threads, which takes milliseconds on a busy machine.
     """
     rows: list[tuple[float, ...]] = list(map(tuple, matrix.tolist()))
     swaps = []
@@ -329,7 +267,7 @@ def invert_six(matrix: Floats) -> Floats:
             rows[step], rows[pivot] = rows[pivot], rows[step]
             swaps.append((step, pivot))
         first, a, b, c, d, e = rows[step]
-        scale = 1.0 / first
+        scale = 1.0 / (first or math.nan)  # singular is only a crafted snapshot: no fit comes of NaN
         head = a, b, c, d, e, _ = a * scale, b * scale, c * scale, d * scale, e * scale, scale
         # The first column is eliminated; that of the inverse comes in as the last one.
         rows = [

@@ -1,6 +1,6 @@
 """Height servo by the inverse of the flow law: openings that bring loaded pins to their heights in time.
 
-The speed asked for is ``w = (e - Σ w_j t_j) / (T_a - δ)`` for the error e, the time T_a until the height is
+The commanded speed is ``w = (e - Σ w_j t_j) / (T_a - δ)`` for the error e, the time T_a until the height is
 aimed at, the delay δ of the valve, and earlier commands with speeds w_j that still act for t_j. The error of
 a free pin then decays with poles at 0 and about 0.3.
 """
@@ -18,7 +18,7 @@ from ..model.delay import Queue
 from ..model.physics import Cell
 from .drive import OPENINGS, find_free_speeds
 
-#: Instants of a control period at which the lag of the valve is looked at.
+#: Instants of a control period at which the lag of the valve is evaluated.
 INSTANTS = 64
 #: Speeds smaller than this share of the free speed are none: a valve must not stay open for them.
 STILL = 1e-6
@@ -40,8 +40,6 @@ class FlowServo:
         Time until the heights aimed at, s.
     left : tuple of float (q,)
         How long earlier commands still act, s, the newest first.
-    dead_band : float
-        m.
     exact : bool
         Whether the flow is proportional to the pressure drop, so that a load scales all speeds alike.
     """
@@ -72,7 +70,8 @@ class FlowServo:
         """Return the lowest (negative) and highest speeds of pins under forces (m,), N; (2, m), m/s."""
         limits: Floats = np.multiply.outer((-self.fall / self.pull, -self.rise / self.lift), force)
         limits += self._free
-        np.maximum(limits[1], 0.0, out=limits[1])
+        highest = limits[1]
+        np.maximum(highest, 0.0, out=highest)
         return limits
 
     @cached_property
@@ -81,10 +80,7 @@ class FlowServo:
         return np.array([[-self.fall], [self.rise]])
 
     def coast(self, height: Floats, speeds: Floats) -> Floats:
-        """Return the heights at which commands that still act will leave pins, (m,), m.
-
-        `height` (m,), measured, m; `speeds` (q, m), asked for earlier, the newest first, m/s.
-        """
+        """Return the heights, (m,), m, at which earlier commands of speeds (q, m), m/s, will leave pins."""
         coasted: Floats = self._times.dot(speeds)
         coasted += height
         return coasted
@@ -100,10 +96,10 @@ class FlowServo:
         return Constants((1.0 / self.span, self.dead_band, STILL * self.rise, 0.0))
 
     def serve(self, error: Floats, limits: Floats, force: Floats, speeds: Floats) -> Floats:
-        """Return the valve commands (m,); the speeds asked for are put before the earlier ones, in place.
+        """Return the valve commands (m,); their speeds are put before the earlier ones, in place.
 
         `error` (m,), commanded heights less those of `coast`, m; `limits` (2, m), from `find_limits`, m/s;
-        `force` (m,), N; `speeds` (q, m), asked for earlier, the newest first, m/s.
+        `speeds` (q, m), of earlier commands, the newest first, m/s.
         """
         fall, rise = limits
         per_span, band, slowest, none = self._numbers[error.shape]
@@ -113,7 +109,8 @@ class FlowServo:
         still = np.abs(error) <= band
         still |= np.abs(speed) < slowest
         np.putmask(speed, still, none)
-        speeds[1:] = speeds[:-1]
+        if len(self.left) > 1:
+            speeds[1:] = speeds[:-1]
         speeds[0] = speed
         speed /= np.where(speed > none, rise, -fall)
         command: Floats = np.interp(speed, self.ratios, self.openings)
@@ -122,25 +119,19 @@ class FlowServo:
         return command
 
     def _refine(self, command: Floats, speed: Floats, force: Floats) -> Floats:
-        """Return commands at which the flow law gives the speeds: one step from those of a load that scales.
-
-        `command` (m,); `speed` (m,), m/s; `force` (m,), N.
-        """
+        """Return commands at which the flow law gives the speeds: a step from those of a load that scales."""
         moving = np.flatnonzero(command)
         opening, wanted = command[moving], speed[moving]
         drop = self.cell.supply.pressure(opening) - self.cell.actuator.pressure(force[moving])
-        found = self.cell.flow.flow(opening, drop) / self.cell.actuator.area
+        reached = self.cell.flow.flow(opening, drop) / self.cell.actuator.area
         share = np.interp(opening, self.openings, self.ratios)
-        share *= np.clip(wanted / found, 0.5, 2.0)
+        share *= np.clip(wanted / reached, 0.5, 2.0)
         command[moving] = np.interp(share, self.ratios, self.openings)
         return command
 
 
 def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: float) -> FlowServo:
-    """Make the servo of a device; it aims two control periods ahead, plus the whole periods of the dead time.
-
-    `period`: control period, s; `dead_time`: of the valve's commands, s; `dead_band`, m.
-    """
+    """Make the servo of a device; it aims two periods ahead, plus the whole periods of the dead time, s."""
     area, supply = cell.actuator.area, cell.supply
     up, down = find_free_speeds(cell, supply.high), find_free_speeds(cell, -supply.low)
     ratios = np.concatenate((-down[::-1] / down[-1], up[1:] / up[-1]))

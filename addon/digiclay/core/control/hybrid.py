@@ -3,9 +3,9 @@
 It is the framework that the paper asks for in its conclusion.
 
 Observe, fit, solve, serve: the pulp's tension over each cell from its force; the known fingertip from the
-undersides; the one height of the blister's top at which the forces predicted add up to the set point; the
+undersides; the one height of the blister's top at which the predicted forces add up to the set point; the
 valve commands that bring every pin to its height in time. Heights are the blister's around the predicted
-place of the finger, and ahead of it as far as the speed of the pins asks for.
+place of the fingertip, and ahead of it as far as the speed of the pins requires.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Hybrid(ControlParameters):
         return SetPoint(self.force_setpoint)
 
 
-#: Rows of a cell but for its filters and the speeds asked for.
+#: Rows of a cell but for its filters and commanded speeds.
 OWN_ROWS = 6
 
 
@@ -105,9 +105,7 @@ class OwnRows(NamedTuple):
     Attributes
     ----------
     pulp : slice
-        Relaxation of the pulp over it, and its tension, N.
-    tension : int
-        N.
+        Relaxation of the pulp over it, and its `tension`, N.
     coming, later : int
         Predicted undersides a period and two from now, m.
     residual : int
@@ -136,12 +134,12 @@ def number_rows(filters: int) -> OwnRows:
     return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
 
 
-#: Share of the set point within which the force counts as held: then the trim learns; it is at most as large.
+#: Share of the set point within which the trim learns; it is at most as large.
 LEARNED = 0.5
-#: While the force is within this share of the set point, and the finger no faster than this, m/s, the finger
-#: is fitted and the top solved for in one of so many periods; in the others the top goes along with it.
-HELD, SLOW, EVERY = 0.02, 20e-3, 2
-#: How far a touched cell may be from the predicted place of the finger, in semi-axes: beyond is a new touch.
+#: While the force is within this share of the set point, and the fingertip no faster than this, m/s, it is
+#: fitted and the top solved for in one of so many periods; in the others the top goes along with it.
+NEAR, SLOW, EVERY = 0.02, 20e-3, 2
+#: How far a touched cell may be from the predicted fingertip, in semi-axes: beyond is a new touch.
 JUMP = 1.5
 #: Underside where none is predicted, m.
 AWAY = 1.0
@@ -150,19 +148,11 @@ AWAY = 1.0
 DOUBTED, PERIODS = 0.4, 20.0
 
 
-class Moved(NamedTuple):
-    """Motion of the cells that no command of this period changes.
-
-    Attributes
-    ----------
-    limits : ndarray (2, m)
-        Lowest and highest speeds, m/s.
-    coasted : ndarray (m,)
-        Heights at which earlier commands leave them, m.
-    """
+class Coasting(NamedTuple):
+    """Motion that no command of this period changes: lowest and highest speeds, and heights reached, m."""
 
     limits: Floats
-    coasted: Floats
+    heights: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,14 +161,12 @@ class HybridControl:
 
     Attributes
     ----------
-    felt : float
-        Force above which a cell is touched, N.
-    noise : float
-        Standard deviation of forces, N.
+    felt, noise : float
+        Force above which a cell is touched, and standard deviation of forces, N.
     contact_radius : float
-        Within which the finger may touch, m.
+        Within which the fingertip may touch, m.
     substitute : VirtualMasterControl
-        Method I, for a finger that the model does not predict.
+        Method I, for a fingertip that the model does not predict.
     """
 
     parameters: Hybrid
@@ -207,14 +195,14 @@ class HybridControl:
 
     @cached_property
     def _loss(self) -> LossRule:
-        """When a finger is given up."""
+        """When a fingertip is given up."""
         return LossRule(self.device.period, self.parameters.loss_time)
 
     @cached_property
     def _surface(self) -> LedBlister:
         """Blister and the pins led ahead of it."""
-        known = self.parameters
-        rule = BlisterRule(self.blister, known.behind, max(known.release_force, self.felt), self.felt)
+        release = max(self.parameters.release_force, self.felt)
+        rule = BlisterRule(self.blister, self.parameters.behind, release, self.felt)
         return LedBlister(self.blister, rule, self.profile, self.servo.ahead)
 
     @cached_property
@@ -238,7 +226,7 @@ class HybridControl:
         return Follower(due=self._unknown)
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
-        """Observe the pulp, and fit the finger; see `Controller`."""
+        """Observe the pulp, and fit the fingertip; see `Controller`."""
         if memory.master.phase is not Phase.IDLE:
             return self._substitute(memory, touched)
         idle, period = memory.phase is Phase.IDLE, memory.period + 1
@@ -248,7 +236,7 @@ class HybridControl:
         return memory, self._surface.find_disc(memory)
 
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
-        """Let Method I follow the finger; the next one is predicted again."""
+        """Let Method I follow the fingertip; the next one is predicted again."""
         master, disc = self.substitute.locate(memory.master, touched)
         if memory.led_radius:
             led = (memory.led_x, memory.led_y, memory.led_radius)
@@ -257,7 +245,7 @@ class HybridControl:
         return memory._replace(period=period, phase=phase, losses=losses, master=master), disc
 
     def _observe(self, memory: Follower, touched: Measurement) -> Follower:
-        """Observe the pulp of the cells the finger may touch, and follow or find the finger."""
+        """Observe the pulp of the cells the fingertip may touch, and follow or find it."""
         at, own, force = self._at, touched.own, touched.force
         late = (memory.period - 1.0) - own[at.stamp]
         if np.count_nonzero(late):
@@ -289,18 +277,18 @@ class HybridControl:
         return float(np.add.reduce(force)) > self.felt * math.sqrt(force.size)
 
     def _holds(self, memory: Follower, force: float) -> bool:
-        """Tell whether a finger is slow, and a total force, N, near the set point: then less is solved."""
+        """Tell whether a fingertip is slow, and a total force, N, near the set point: then less is solved."""
         _, _, _, vx, vy, vz, *_ = memory.estimate.mean.tolist()
         error = abs(force - self.parameters.force_setpoint)
-        return error <= HELD * self.parameters.force_setpoint and math.hypot(vx, vy, vz) <= SLOW
+        return error <= NEAR * self.parameters.force_setpoint and math.hypot(vx, vy, vz) <= SLOW
 
     def _has_jumped(self, guess: Estimate, position: Floats) -> bool:
         """Tell whether no touched cell, at (2, m), m, is where the fingertip can be."""
-        place, (x, y) = tuple(guess.mean[:2].tolist()), position.tolist()
+        place, (x, y) = guess.mean.tolist()[:2], position.tolist()
         return not any(math.dist(place, cell) <= self.farthest for cell in zip(x, y, strict=True))
 
     def _find(self, memory: Follower, touched: Measurement, here: NDArray[np.intp]) -> Follower:
-        """Begin to follow a finger that has touched: at the centroid of its forces (equation 13)."""
+        """Begin to follow a fingertip that has touched: at the centroid of its forces (equation 13)."""
         force, basis = touched.force.take(here), touched.quadratic_basis.take(here, 1)
         under, _ = self.pulp.find_underside(
             touched.height.take(here), touched.own[self._at.tension].take(here), self.noise
@@ -322,7 +310,7 @@ class HybridControl:
         return self._fit(memory, touched, here, basis)
 
     def _fit(self, memory: Follower, touched: Measurement, here: NDArray[np.intp], basis: Floats) -> Follower:
-        """Fit the finger to the undersides over the touched cells, whose basis is given."""
+        """Fit the fingertip to the undersides over the touched cells, whose basis is given."""
         seen, noise = self.pulp.find_underside(
             touched.height.take(here), touched.own[self._at.tension].take(here), self.noise
         )
@@ -330,9 +318,9 @@ class HybridControl:
         noise += self.finger.spread.underside**2
         at = self.finger.measure(memory.estimate.mean, basis)
         estimate, left = self.finger.correct(memory.estimate, at, seen, noise)
-        x, y = estimate.mean[:2].tolist()
-        if not math.dist((x, y), memory.estimate.mean[:2].tolist()) <= self.farthest:
-            # No finger is that quick: these undersides are not its own.
+        x, y, *_ = estimate.mean.tolist()
+        if not math.dist((x, y), memory.estimate.mean.tolist()[:2]) <= self.farthest:
+            # No fingertip is that quick: these undersides are not its own.
             return memory._replace(alone=0)
         touched.own[self._at.residual, here] = left
         heading = update_heading(memory.heading, x, y, self.parameters.travel)
@@ -342,11 +330,11 @@ class HybridControl:
         """Form the blister, and drive all pins to their heights; see `Controller`."""
         lead, speeds = seen.own[self._at.lead], seen.own[self._at.speeds]
         if memory.master.phase is not Phase.IDLE:
-            known = seen._replace(target=seen.target - lead)
+            unled = seen._replace(target=seen.target - lead)
             lead[:] = speeds[:] = 0.0
-            master, commands = self.substitute.command(memory.master, known)
+            master, commands = self.substitute.command(memory.master, unled)
             return memory._replace(master=master, led_radius=0.0), commands
-        moved = Moved(self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds))
+        coasting = Coasting(self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds))
         left = seen.target - lead
         rest, band, lowest, highest = self._limits[left.shape]
         off = left - rest
@@ -356,19 +344,18 @@ class HybridControl:
         if memory.phase is Phase.IDLE:
             memory = memory._replace(led_radius=0.0)
         else:
-            edge, region = self._surface.survey(memory, seen.quadratic_basis, left)
-            raised = memory.top > edge
-            memory = self._follow_force(memory._replace(edge=edge), seen, region, moved, raised=raised)
+            region = self._surface.survey(memory, seen.quadratic_basis, left)
+            memory = self._follow_force(memory._replace(edge=region.edge), seen, region, coasting)
             left = self._surface.leave(memory, seen, left, region.cells, mode)
-            target = lead_heights(left, memory.top, region.drop, raised=raised)
+            target = lead_heights(left, memory.top, region.drop, raised=region.raised)
             np.maximum(target, lowest, out=target)
             np.minimum(target, highest, out=target)
         np.subtract(target, left, out=lead)
-        command = self.servo.serve(target - moved.coasted, moved.limits, seen.force, speeds)
+        command = self.servo.serve(target - coasting.heights, coasting.limits, seen.force, speeds)
         return memory, Commands(target, mode, command)
 
     def _follow_force(
-        self, memory: Follower, seen: Measurement, region: Region, moved: Moved, *, raised: bool
+        self, memory: Follower, seen: Measurement, region: Region, coasting: Coasting
     ) -> Follower:
         """Turn the force into the height of the top; without contact go back to where it was felt."""
         top, felt, trim = memory.felt, memory.felt, memory.trim
@@ -376,8 +363,11 @@ class HybridControl:
             memory = memory._replace(due=self._unknown)
         else:
             asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
-            holds = self._holds(memory, force)
-            top, coming = self._set_top(memory, seen, region, moved, holds, raised=raised)
+            if memory.period % EVERY and self._holds(memory, force):
+                top, coming = self._keep_top(memory, seen)
+            else:
+                top, coming = self._solve_top(memory, seen, region, coasting)
+            top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
             memory = self._doubt(memory, force, coming, seen.force.size, top)
@@ -396,26 +386,26 @@ class HybridControl:
         doubt = max(doubt, 0.0)
         if doubt <= (DOUBTED * asked) ** 2:
             return memory._replace(due=(*later, coming), doubt=doubt)
-        x, y = memory.estimate.mean[:2].tolist()
+        x, y, *_ = memory.estimate.mean.tolist()
         master = Master(
             Phase.SHAPING, x, y, top, 0.0, top, memory.edge, memory.heading, top, 0, memory.losses
         )
         return memory._replace(master=master, doubt=0.0)
 
-    def _set_top(
-        self, memory: Follower, seen: Measurement, region: Region, moved: Moved, held: bool, *, raised: bool
-    ) -> tuple[float, float]:
-        """Return height of the top, m, and its force, N: solved for, or while held along with the finger."""
-        guess = memory.top + float(memory.estimate.mean[5]) * self.device.period
-        if held and memory.period % EVERY:
-            seen.own[self._at.later] += guess - memory.top
-            top, force = guess, self.parameters.force_setpoint + memory.trim
-        else:
-            top, force = self._solve_top(memory, seen, region, moved, guess, raised=raised)
-        return min(max(top, 0.0), self.device.cell.actuator.stroke), force
+    def _keep_top(self, memory: Follower, seen: Measurement) -> tuple[float, float]:
+        """Return the height of the top, m, along with the fingertip, and the force that it keeps, N."""
+        top = self._move_top(memory)
+        later = seen.own[self._at.later]
+        later += top - memory.top
+        return top, self.parameters.force_setpoint + memory.trim
+
+    def _move_top(self, memory: Follower) -> float:
+        """Return the height of the top, m, along with the fingertip for a period."""
+        speed: float = memory.estimate.mean.tolist()[5]
+        return memory.top + speed * self.device.period
 
     def _solve_top(
-        self, memory: Follower, seen: Measurement, region: Region, moved: Moved, guess: float, *, raised: bool
+        self, memory: Follower, seen: Measurement, region: Region, coasting: Coasting
     ) -> tuple[float, float]:
         """Return the height of the top at which predicted forces add up to the set point, and that sum."""
         (near,) = (region.cells.distance <= self.contact_radius).nonzero()
@@ -426,16 +416,16 @@ class HybridControl:
         under += own[at.residual]
         seen.own[at.later] = AWAY
         seen.own[at.later, near] = under
-        ends = moved.limits.take(near, 1)
+        ends = coasting.limits.take(near, 1)
         ends *= self.servo.span
-        ends += moved.coasted.take(near)
+        ends += coasting.heights.take(near)
         *_, lowest, highest = self._limits[ends.shape]
         np.maximum(ends, lowest, out=ends)
         np.minimum(ends, highest, out=ends)
         part = self.blister.evaluate_profile(region.cells.distance.take(near))
         wanted, lost = self.parameters.force_setpoint + memory.trim, self.pulp.predict_loss(own[at.pulp])
-        reach = Reach(part, region.drop.take(near), ends)
-        return find_top(wanted, guess, memory.edge, reach, under, lost, self.pulp, raised=raised)
+        reach = Reach(region.edge, region.raised, part, region.drop.take(near), ends)
+        return find_top(wanted, self._move_top(memory), reach, under, lost, self.pulp)
 
 
 #: How far beyond the fingertip's largest semi-axis cells may be touched, m.

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats, any_true, count_true
+from ..base.arrays import Floats, Modes, any_true, count_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
@@ -19,7 +18,7 @@ from .ground import EdgeGround
 from .travel import Heading
 from .virtual_master import Master, Phase
 
-#: A finger slower than this has no direction, m/s.
+#: A fingertip slower than this has no direction, m/s.
 SLOWEST = 1e-3
 #: Slope where pins are not led: it puts them below every surface.
 STEEP = 1e9
@@ -27,7 +26,7 @@ STEEP = 1e9
 
 @dataclass(frozen=True)
 class LeadProfile:
-    """Slopes of the heights around the finger.
+    """Slopes of the heights around the fingertip.
 
     Attributes
     ----------
@@ -45,19 +44,14 @@ class LeadProfile:
     skirt: float
 
     def find_reach(self, height: float, speed: float) -> float:
-        """Return the radius within which pins may be led, m.
-
-        `height`: of the top over the surface around, m; negative below; `speed`: of the finger in the plane,
-        m/s.
-        """
+        """Return the radius within which pins may be led, m, for a height over the surface and a speed."""
         quickest = max(speed, self.skirt)
         return self.level + abs(height) * quickest / (self.rise if height > 0.0 else self.fall)
 
     def find_drop(self, distance: Floats, ahead: Floats, speed: float, *, raised: bool) -> Floats:
-        """Return how far below the top (above it, in a valley) pins may stand at most, (m,), m.
+        """Return how far from the top, below it if `raised` above the surface, pins may stand, (m,), m.
 
-        `distance` (m,), from the finger, m; `ahead` (m,), how far ahead of it, m; `speed`: of the finger in
-        the plane, m/s; `raised`: whether the top is above the surface around it.
+        `distance`, `ahead` (m,), from the fingertip and ahead of it, m; `speed`: of it in the plane, m/s.
         """
         free = self.rise if raised else self.fall
         around = free / self.skirt if self.skirt else STEEP
@@ -78,19 +72,19 @@ class Follower(NamedTuple):
     period : int
         Control periods so far.
     estimate : Estimate
-        The finger.
+        The fingertip.
     top, edge : float
         Heights of the blister's top and of the surface around it, m.
     heading : Heading
-        Which way the finger travels.
+        Direction of travel.
     trim : float
         Slow correction of the set point, N.
     felt : float
-        Top when the finger was last felt, m.
+        Top when the fingertip was last felt, m.
     alone : int
         Control periods since then.
     losses : int
-        How often the finger was lost.
+        How often the fingertip was lost.
     led_x, led_y, led_radius : float
         Disc within which pins may stand where they will not be left, m; a radius of 0: none does.
     due : tuple of float
@@ -123,25 +117,31 @@ class Follower(NamedTuple):
 GROUND = EdgeGround()
 #: Plain number: numpy takes an enumeration's member ten times as long.
 FORCE_FOLLOW = int(Mode.FORCE_FOLLOW)
-#: How much farther than the place estimated and the reach of the period before pins may be led, m.
+#: How much farther than the estimated place and the reach of the period before pins may be led, m.
 MARGIN = 2e-3
 
 
 class Region(NamedTuple):
-    """Cells about the predicted place of the finger.
+    """Cells about the predicted place of the fingertip.
 
     Attributes
     ----------
+    edge : float
+        Height of the surface ahead, m.
+    raised : bool
+        Whether the blister's top is above it.
     aim : (float, float, float)
-        Lowest point of the finger then, m.
+        Lowest point of the fingertip then, m.
     speed : float
-        Of the finger in the plane, m/s.
+        Of the fingertip in the plane, m/s.
     cells : BlisterCells
         About the aim.
     drop : ndarray (m,)
         How far they may stand from the top; see `LeadProfile.find_drop`, m.
     """
 
+    edge: float
+    raised: bool
     aim: tuple[float, float, float]
     speed: float
     cells: BlisterCells
@@ -150,13 +150,7 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LedBlister:
-    """Blister that is led.
-
-    Attributes
-    ----------
-    ahead : float
-        Time over which the fingertip is predicted, s.
-    """
+    """Blister that is led; `ahead`: time over which the fingertip is predicted, s."""
 
     blister: Blister
     rule: BlisterRule
@@ -173,12 +167,8 @@ class LedBlister:
         disc = (x, y, max(self.blister.edge_radius, reach) + MARGIN)
         return enclose_discs(disc, led) if memory.led_radius else disc
 
-    def survey(self, memory: Follower, basis: Floats, left: Floats) -> tuple[float, Region]:
-        """Return the height of the surface ahead, m, and the cells about the predicted finger.
-
-        `basis` (6, m), rows 1, x, y, x², x y, y² of the cells; `left` (m,), heights at which pins were left
-        so far, m.
-        """
+    def survey(self, memory: Follower, basis: Floats, left: Floats) -> Region:
+        """Return the cells about the predicted fingertip, by the heights at which pins were left, (m,), m."""
         x, y, z, vx, vy, vz, *_ = memory.estimate.mean.tolist()
         time, speed = self.ahead, math.hypot(vx, vy)
         aim = (x + vx * time, y + vy * time, z + vz * time)
@@ -186,16 +176,14 @@ class LedBlister:
         facing = self.rule.find_edge(cells)
         count = count_true(facing)
         edge = float(left.dot(facing)) / count if count else memory.edge
-        drop = self.profile.find_drop(cells.distance, cells.ahead, speed, raised=memory.top > edge)
-        return edge, Region(aim, speed, cells, drop)
+        raised = memory.top > edge
+        drop = self.profile.find_drop(cells.distance, cells.ahead, speed, raised=raised)
+        return Region(edge, raised, aim, speed, cells, drop)
 
     def leave(
-        self, memory: Follower, seen: Measurement, left: Floats, cells: BlisterCells, mode: NDArray[np.int8]
+        self, memory: Follower, seen: Measurement, left: Floats, cells: BlisterCells, mode: Modes
     ) -> Floats:
-        """Return the heights at which pins are left by the finger, m; modes are set in place.
-
-        `left` (m,), those heights so far, m; `mode` int (m,).
-        """
+        """Return the heights at which pins are left by the fingertip, m; modes, (m,), are set in place."""
         top, edge = memory.top, memory.edge
         heights = self.blister.interpolate(cells.distance, edge, top)
         frozen = self.rule.find_frozen(cells, seen)

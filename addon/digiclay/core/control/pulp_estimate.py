@@ -12,9 +12,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Flags, Floats
 from ..model.touch import Touch
 
 #: Expected force from which on a cell counts as touched: a share of the least one that is no noise; and N. At
@@ -51,10 +50,8 @@ class PulpEstimate:
     ----------
     touch : Touch
         Contact law and relaxation as known to the controller.
-    period : float
-        Control period, s.
-    ahead : float
-        Time over which forces are predicted, s.
+    period, ahead : float
+        Control period, and time over which forces are predicted, s.
     floor : float
         Force below which a reading is no contact, N.
     """
@@ -90,14 +87,11 @@ class PulpEstimate:
         return Span(np.vstack((kept, pulp.shares @ kept / held)), np.append(late, 1.0)[:, None], held)
 
     def age(self, pulp: Floats, periods: Floats) -> None:
-        """Let the pulp over cells without contact relax, in place; cells with 0 periods stay.
-
-        `pulp` (k + 1, m), filters z and tension T, N; `periods` (m,), control periods without contact.
-        """
+        """Let the pulp over cells relax for their control periods, (m,), without contact, in place."""
         self.touch.pulp.age(pulp[:-1], self.period * periods)
         pulp[-1, periods > 0.0] = 0.0
 
-    def observe(self, pulp: Floats, force: Floats, expected: Floats) -> NDArray[np.bool_]:
+    def observe(self, pulp: Floats, force: Floats, expected: Floats) -> Flags:
         """Bring filters and tensions of cells up to date, in place; return which cells are touched.
 
         Pulp that is relieved faster than it relaxes is still indented, and carries no force. So the tension
@@ -105,35 +99,30 @@ class PulpEstimate:
         A cell is also touched where a force is expected, whatever is measured: that there is none tells where
         the fingertip ends; and a choice by noisy forces would take the cells whose noise is positive.
 
-        `pulp` (k + 1, m), filters z and tension T a period before, N; `force` (m,), measured, N; `expected`
-        (m,), tension under the predicted fingertip, N.
+        `pulp` (k + 1, m), filters z and tension T a period before, N; `expected` (m,), tension under the
+        predicted fingertip, N.
         """
         span = self.once
         kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
-        touched: NDArray[np.bool_] = expected > kept[-1] + max(EXPECTED * self.floor, LEAST) / share
+        lost = kept[-1]
+        touched: Flags = expected > lost + max(EXPECTED * self.floor, LEAST) / share
         touched |= force > self.floor
-        found = np.where(touched, np.maximum(force, 0.0), self.floor)
-        found *= 1.0 / share
-        found += kept[-1]
-        np.minimum(found, expected, out=found, where=~touched)
-        kept[-1] = 0.0
-        np.multiply(span.late, found, out=pulp)
+        tension = np.where(touched, np.maximum(force, 0.0), self.floor)
+        tension *= 1.0 / share
+        tension += lost
+        np.minimum(tension, expected, out=tension, where=~touched)
+        lost[:] = 0.0
+        np.multiply(span.late, tension, out=pulp)
         pulp += kept
         return touched
 
     def predict_loss(self, pulp: Floats) -> Floats:
-        """Return the tension at which there would be no force at the end of the prediction, (m,), N.
-
-        `pulp` (k + 1, m), filters z and tension T, N.
-        """
+        """Return the tension at which there would be no force at the end of the prediction, (m,), N."""
         lost: Floats = self.later.kept[-1].dot(pulp)
         return lost
 
     def predict_force(self, depth: Floats, lost: Floats) -> Floats:
-        """Return the forces at the end of the prediction, N.
-
-        `depth` (..., m), indentations then, m; `lost` (m,), from `predict_loss`, N.
-        """
+        """Return the forces at the end of the prediction, N, of indentations then, (..., m), m."""
         force = self.touch.contact.tension(depth)
         force -= lost
         np.maximum(force, 0.0, out=force)
@@ -141,11 +130,9 @@ class PulpEstimate:
         return force
 
     def find_underside(self, height: Floats, tension: Floats, noise: float) -> tuple[Floats, Floats]:
-        """Return the undersides over cells, m, and their standard deviations for noise of the force, m.
+        """Return the undersides over cells, m, and their standard deviations for that of the force, N.
 
         The indentation is equation 11 solved for x; the stiffness is ``f_d dT/dx = f_d (b + m T)``.
-
-        `height` (m,), measured, m; `tension` (m,), N; `noise`: standard deviation of the force, N.
         """
         contact = self.touch.contact
         stiffening = tension * (contact.exponent / contact.stiffness)
@@ -162,10 +149,14 @@ SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])
 
 
 class Reach(NamedTuple):
-    """Range of the cells near the finger until the heights aimed at.
+    """Heights that the cells near the fingertip can have at the time aimed at.
 
     Attributes
     ----------
+    edge : float
+        Height of the surface around, m.
+    raised : bool
+        Whether the blister's top is above it.
     part : ndarray (m,)
         Profile of the blister, 1 at its top.
     drop : ndarray (m,)
@@ -174,49 +165,31 @@ class Reach(NamedTuple):
         Lowest and highest they can be, m.
     """
 
+    edge: float
+    raised: bool
     part: Floats
     drop: Floats
     ends: Floats
 
-
-def form_heights(top: Floats | float, edge: float, part: Floats, drop: Floats, *, raised: bool) -> Floats:
-    """Return heights of cells for a top: the blister's, or nearer to the top where they are led, m.
-
-    `top` (t, 1), m; `edge`: height of the surface around, m; `part`, `drop` (m,), see `Reach`; `raised`:
-    whether the top is above the surface around it.
-    """
-    heights: Floats = (top - edge) * part
-    heights += edge
-    return lead_heights(heights, top, drop, raised=raised)
+    def form_heights(self, top: Floats | float) -> Floats:
+        """Return heights, m, for tops (t, 1), m: the blister's, or nearer to the top where cells are led."""
+        heights: Floats = (top - self.edge) * self.part
+        heights += self.edge
+        return lead_heights(heights, top, self.drop, raised=self.raised)
 
 
 def lead_heights(heights: Floats, top: Floats | float, drop: Floats, *, raised: bool) -> Floats:
-    """Return heights, but no farther from the top than cells may stand that are led, m.
-
-    `heights` (m,) or (t, m), m; `top` (t, 1), m; `drop` (m,), see `Reach`; `raised`: whether the top is above
-    the surface around it.
-    """
+    """Return heights (m,) or (t, m), m, but no farther from the top than cells may stand; see `Reach`."""
     return np.maximum(heights, top - drop) if raised else np.minimum(heights, top + drop)
 
 
 def find_top(
-    wanted: float,
-    guess: float,
-    edge: float,
-    reach: Reach,
-    under: Floats,
-    lost: Floats,
-    pulp: PulpEstimate,
-    *,
-    raised: bool,
+    wanted: float, guess: float, reach: Reach, under: Floats, lost: Floats, pulp: PulpEstimate
 ) -> tuple[float, float]:
     """Return the height of the top at which the predicted forces add up to a force, m, and their sum, N.
 
-    Where none does, it is the end of the range nearest to it.
-
-    `wanted`, N; `guess`: where it is looked for most closely, m; `edge`: height of the surface around, m;
-    `under` (m,), predicted undersides of the finger, m; `lost` (m,), from `PulpEstimate.predict_loss`, N;
-    `raised`: whether the top is above the surface around it.
+    Where none does, it is the end of the range nearest to it. `guess`: where the top is sought most closely,
+    m; `under` (m,), predicted undersides, m; `lost` (m,), from `PulpEstimate.predict_loss`, N.
     """
     (level,) = (reach.part >= reach.part.max()).nonzero()
     lowest, highest = reach.ends.take(level, 1).tolist()
@@ -225,10 +198,11 @@ def find_top(
     tops += min(max(guess, low), high)
     np.maximum(tops, low, out=tops)
     np.minimum(tops, high, out=tops)
-    depths = form_heights(tops[:, None], edge, reach.part, reach.drop, raised=raised)
-    np.maximum(depths, reach.ends[0], out=depths)
-    np.minimum(depths, reach.ends[1], out=depths)
+    depths = reach.form_heights(tops[:, None])
+    least, most = reach.ends
+    np.maximum(depths, least, out=depths)
+    np.minimum(depths, most, out=depths)
     depths -= under
     forces = np.add.reduce(pulp.predict_force(depths, lost), axis=1)
-    least, *_, most = forces.tolist()
-    return float(np.interp(wanted, forces, tops)), min(max(wanted, least), most)
+    weakest, *_, strongest = forces.tolist()
+    return float(np.interp(wanted, forces, tops)), min(max(wanted, weakest), strongest)

@@ -11,15 +11,14 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Flags, Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement
-from ..model.layout import RELATIVE_TOLERANCE
+from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
 from .travel import measure_square
@@ -89,9 +88,7 @@ class PushPullControl:
         """Return the memory before a session."""
         return Listening()
 
-    def locate(
-        self, memory: Listening, touched: Measurement
-    ) -> tuple[Listening, tuple[float, float, float] | None]:
+    def locate(self, memory: Listening, touched: Measurement) -> tuple[Listening, Disc | None]:
         """Listen where a hand may be; see `Controller`.
 
         The far pins of a real bed would listen as well; a free pin that listens stays where it is, so
@@ -107,7 +104,7 @@ class PushPullControl:
 
     def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Commands]:
         """Drag commanded heights along, and move every pin up or down; see `Controller`."""
-        known, target = self.parameters, seen.target
+        speeds, target = self.parameters, seen.target
         limit = memory.radius * memory.radius * (1.0 + RELATIVE_TOLERANCE) if memory.radius >= 0.0 else -1.0
         listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit
         rising = memory.period % CYCLE == 0
@@ -115,17 +112,16 @@ class PushPullControl:
             target = self._drag_targets(seen, listening)
         touched = seen.own[0] > 0.0
         error = target - seen.height
-        stroke = np.where(touched, known.following_speed, known.listening_speed)
+        stroke = np.where(touched, speeds.following_speed, speeds.listening_speed)
         # Brought back in the rising half alone, and so at twice the speed.
-        centering = CYCLE * error / known.centring_time
+        centering = CYCLE * error / speeds.centring_time
         swing = stroke + centering if rising else -stroke
-        speed = np.where(listening, swing + known.assist * seen.own[1], self.drive.approach(error))
-        formed = np.abs(target - self.actuator.rest_height) > known.dead_band
-        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        speed = np.where(listening, swing + speeds.assist * seen.own[1], self.drive.approach(error))
+        mode = self.drive.mark_formed(target, self.actuator.rest_height)
         np.putmask(mode, touched & listening, np.int8(Mode.FORCE_FOLLOW))
         return memory, Commands(target, mode, self.drive.open_for(speed))
 
-    def _drag_targets(self, seen: Measurement, listening: NDArray[np.bool_]) -> Floats:
+    def _drag_targets(self, seen: Measurement, listening: Flags) -> Floats:
         """Return the targets after a cycle; what the cells remember is brought up to date in place."""
         known, left = self.parameters, seen.own[0]
         error = seen.target - seen.height
@@ -143,10 +139,7 @@ class PushPullControl:
 
 
 def build(parameters: PushPull, device: DeviceInfo) -> PushPullControl:
-    """Put push and pull together for a device.
-
-    Raises ParameterError when a pin's own ripple would be a touch.
-    """
+    """Put push and pull together for a device; ParameterError when a pin's own ripple would be a touch."""
     ripple = parameters.listening_speed * device.period
     if device.height_floor:
         threshold = max(parameters.threshold, ripple + device.height_floor)
@@ -154,10 +147,6 @@ def build(parameters: PushPull, device: DeviceInfo) -> PushPullControl:
     if not parameters.threshold > ripple:
         rule = f"must be above a listening pin's own way in a control period, {ripple:g} m"
         raise ParameterError("control", "threshold", rule, f"{parameters.threshold:g} m")
-    return PushPullControl(
-        parameters,
-        device.cell.actuator,
-        make_drive(parameters, device.cell, device.period),
-        device.period,
-        device.grid.layout.pitch,
-    )
+    drive = make_drive(parameters, device.cell, device.period)
+    margin = device.grid.layout.pitch
+    return PushPullControl(parameters, device.cell.actuator, drive, device.period, margin)

@@ -14,7 +14,7 @@ from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement
-from ..model.layout import Grid
+from ..model.layout import Disc, Grid
 from ..shapes.request import Shape
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
@@ -88,8 +88,8 @@ class ShapeDisplayControl:
         Of the shape, m.
     patience : int
         Control periods.
-    whole : (float, float, float)
-        Disc x, y, radius that holds the bed, m.
+    whole : Disc
+        That holds the bed, m.
     """
 
     parameters: ShapeDisplay
@@ -99,7 +99,7 @@ class ShapeDisplayControl:
     heights: Floats
     moves: tuple[Move, ...]
     patience: int
-    whole: tuple[float, float, float]
+    whole: Disc
 
     name = "shape_display"
     rows = 0
@@ -108,21 +108,18 @@ class ShapeDisplayControl:
         """Return the memory before a session."""
         return Progress()
 
-    def locate(
-        self, memory: Progress, touched: Measurement
-    ) -> tuple[Progress, tuple[float, float, float] | None]:
+    def locate(self, memory: Progress, touched: Measurement) -> tuple[Progress, Disc | None]:
         """Request all cells during the moves; see `Controller`."""
         return memory, self.whole if memory.move < len(self.moves) else None
 
     def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Commands]:
         """Set the heights of the move under way, and command every cell; see `Controller`."""
-        rest, target = self.actuator.rest_height, seen.target
+        target = seen.target
         if memory.move < len(self.moves):
             memory, target = self._make_moves(memory, seen)
         error = target - seen.height
         command = self.drive.command(self.drive.approach(error), seen.force)
-        formed = np.abs(target - rest) > self.parameters.dead_band
-        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        mode = self.drive.mark_formed(target, self.actuator.rest_height)
         np.putmask(mode, np.abs(error) > self.parameters.dead_band, np.int8(Mode.BLISTER))
         return memory, Commands(target, mode, command)
 
@@ -135,18 +132,15 @@ class ShapeDisplayControl:
             first, last, share = self.moves[memory.move]
             mine = (row >= first) & (row <= last)
             np.putmask(target, mine, rest + share * (goal - rest))
-            amiss = np.abs(target - seen.height)[mine].max(initial=0.0)
-            if amiss > self.parameters.dead_band and memory.periods < self.patience:
+            error = np.abs(target - seen.height)[mine].max(initial=0.0)
+            if error > self.parameters.dead_band and memory.periods < self.patience:
                 return memory._replace(periods=memory.periods + 1), target
             memory = Progress(memory.move + 1)
         return memory, target
 
 
 def build(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
-    """Put shape display together for a device; a shape of the scene's own is displayed in place of its own.
-
-    Raises ParameterError when the shape leaves the stroke, or its file cannot be used.
-    """
+    """Put shape display together, of a scene's shape first; ParameterError when it leaves the stroke."""
     actuator, grid = device.cell.actuator, device.grid
     if device.heights is not None:
         heights = device.heights
@@ -215,31 +209,29 @@ class Handover:
         """Return whether the shape stands, and the method has taken over."""
         return memory.display.move >= len(self.display.moves)
 
-    def locate(
-        self, memory: Handed, touched: Measurement
-    ) -> tuple[Handed, tuple[float, float, float] | None]:
+    def locate(self, memory: Handed, touched: Measurement) -> tuple[Handed, Disc | None]:
         """Delegate to the display or the method; see `Controller`."""
         if not self.is_displayed(memory):
             progress, disc = self.display.locate(memory.display, touched)
             return memory._replace(display=progress), disc
         if self.method is None:
             return memory, None
-        known, disc = self.method.locate(memory.method, self._subtract_shape(touched))
-        return memory._replace(method=known), disc
+        remembered, disc = self.method.locate(memory.method, self._subtract_shape(touched))
+        return memory._replace(method=remembered), disc
 
     def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Commands]:
         """Delegate to the display or the method; see `Controller`."""
         if self.method is None or not self.is_displayed(memory):
             progress, orders = self.display.command(memory.display, seen)
             return memory._replace(display=progress), orders
-        known, orders = self.method.command(memory.method, self._subtract_shape(seen))
+        remembered, orders = self.method.command(memory.method, self._subtract_shape(seen))
         if self.raised is not None:
             target = orders.target + self.raised.take(seen.cells)
-            orders = Commands(target, orders.mode, orders.command)
-        return memory._replace(method=known), orders
+            orders = orders._replace(target=target)
+        return memory._replace(method=remembered), orders
 
     def _subtract_shape(self, seen: Measurement) -> Measurement:
-        """Return what the method is to see: the bed without the shape, where its cells go back to rest."""
+        """Return the bed without the shape, for a method whose cells go back to rest."""
         if self.raised is None:
             return seen
         raised = self.raised.take(seen.cells)
@@ -247,16 +239,12 @@ class Handover:
 
 
 def make_handover(shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool) -> Handover:
-    """Put a shape's display in front of a method.
-
-    `shape`: says how the surface gets there; `device`: with the heights to display; `recovers`: whether the
-    method's cells go back to rest.
-    """
+    """Put a shape's display in front of a method; `recovers`: whether the method's cells go back to rest."""
     assert device.heights is not None
     # As quick as a display is by itself, and never quicker than its control period allows.
     settling = max(DriveParameters().settling_time, 2.0 * device.period)
-    known = ShapeDisplay(
+    parameters = ShapeDisplay(
         refresh=shape.refresh, surfaces=shape.surfaces, patience=shape.patience, settling_time=settling
     )
     raised = device.heights - device.cell.actuator.rest_height if recovers else None
-    return Handover(build(known, device), method, raised)
+    return Handover(build(parameters, device), method, raised)

@@ -46,21 +46,14 @@ class SmoothingControl:
     """Controller of one control period with an order: the method's, but for the cells that are smoothed.
 
     Its memory is the method's, and its cells remember nothing of their own: one that is smoothed, or has not
-    arrived yet, is in the mode BLISTER. A session can be kept after any period, and go on with the method
-    alone.
+    arrived yet, is in the mode BLISTER. After any period the method alone can continue the session.
 
     Attributes
     ----------
-    drive : Drive
-        Of the pins that are smoothed.
     exchange : Exchange
-        Of their commanded heights, in one period.
-    actuator : Actuator
-        The cells' cylinders.
-    disc : (float, float, float)
-        x, y and radius, m.
-    reach : (float, float, float)
-        Disc that holds the neighbors of its cells as well, m.
+        Of the commanded heights, in one period.
+    disc, reach : Disc
+        Cells to be smoothed, and these with their neighbors, m.
     strength : float
         From 0 to 1.
     """
@@ -104,8 +97,7 @@ class SmoothingControl:
         own = (weight > 0.0) | (moved & (orders.mode <= Mode.HOLD))
         target = self._smooth(seen, weight)
         error, band = target - seen.height, self.drive.dead_band
-        formed = np.abs(target - self.actuator.rest_height) > band
-        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        mode = self.drive.mark_formed(target, self.actuator.rest_height)
         np.putmask(mode, (weight > 0.0) | (np.abs(error) > band), np.int8(Mode.BLISTER))
         command = self.drive.command(self.drive.approach(error), seen.force)
         np.copyto(target, orders.target, where=~own)
@@ -135,10 +127,7 @@ class SmoothingControl:
 def order_periods(
     method: Controller, grid: Grid, cell: Cell, period: float, orders: Floats
 ) -> Iterator[Controller]:
-    """Yield the controller of each control period: the method itself where nothing is ordered.
-
-    `period`: control period, s; `orders` (t, 4), a row a period.
-    """
+    """Yield the controller of each control period, s, by its row of orders (t, 4)."""
     # As quick as a display is, and never quicker than the control period allows.
     known = DriveParameters(settling_time=max(DriveParameters().settling_time, 2.0 * period))
     drive, margin = make_drive(known, cell, period), MARGIN * max(grid.layout.pitch, grid.layout.row_spacing)
