@@ -1,1 +1,1 @@
-"""Sessions for other programs: poses in, forces and heights out, by WebSocket, OSC and serial line."""
+"""Sessions for other programs: poses in, forces and heights out, by WebSocket and OSC."""

@@ -1,61 +1,17 @@
-"""Link of the doors to the session: bed, newest frame, orders, lease of the fingertip, counts."""
+"""Link of the doors to the session: newest frame, orders, lease of the fingertip, counts."""
 
 from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from digiclay.core.base.errors import DigiclayError
-from digiclay.core.engine.system import System
-from digiclay.core.scene.schema import Scene
 
-from .latest_slot import LatestSlot, Order, pack_order
-from .protocol import LIMITS, Frame, Limits, Pose, Reset, Status, unpack_frame
-
-#: Most pins whose positions are told: libraries refuse messages of a megabyte.
-MOST_POSITIONS = 10_000
-
-
-@dataclass(frozen=True)
-class Bed:
-    """Bed of the session, sent to a client once.
-
-    Attributes
-    ----------
-    name : str
-        Of the scene.
-    pitch, stroke : float
-        m.
-    period : float
-        Control period, s.
-    positions : tuple of (float, float)
-        Of the pins, m; none of a bed of more than 10,000.
-    most_force, most_speed : float
-        Largest total force handed out, N, and largest speed of the fingertip, m/s.
-    """
-
-    name: str
-    rows: int
-    columns: int
-    pitch: float
-    stroke: float
-    period: float
-    positions: tuple[tuple[float, float], ...]
-    most_force: float = LIMITS.force
-    most_speed: float = LIMITS.speed
-
-
-def describe_bed(scene: Scene, system: System, limits: Limits) -> Bed:
-    """Return what clients are told of the bed of a scene."""
-    layout, grid = scene.layout, system.grid
-    told = grid.positions if grid.count <= MOST_POSITIONS else grid.positions[:0]
-    return Bed(
-        scene.name, layout.rows, layout.columns, layout.pitch, system.cell.actuator.stroke, system.period,
-        tuple((float(x), float(y)) for x, y in told), limits.force, limits.speed,
-    )  # fmt: skip
-
+from .doors import LatestSlot, Order, pack_order
+from .protocol import Bed, Frame, Pose, Reset, Status, unpack_frame
 
 #: Time after the last pose of a client when another one may move the fingertip, s.
 LEASE = 2.0
@@ -89,6 +45,14 @@ def claim(lease: Lease, client: object, now: float) -> tuple[bool, Lease]:
 def release(lease: Lease, client: object) -> Lease:
     """Return the lease after a client has gone."""
     return Lease() if lease.holder == client else lease
+
+
+@dataclass(frozen=True)
+class Door:
+    """Open door: its port, and a function that closes it."""
+
+    port: int
+    close: Callable[[], Awaitable[None]]
 
 
 class DoorLink:

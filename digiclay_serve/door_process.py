@@ -11,18 +11,21 @@ import json
 import logging
 import os
 import sys
+from collections.abc import Awaitable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from digiclay.core.base.errors import DigiclayError, OutputError
 
-from .display_line import Display, open_display
-from .door_link import Bed, DoorLink
-from .doors import LENGTH
-from .latest_slot import open_slot
+from .door_link import Door, DoorLink
+from .doors import LENGTH, open_slot
 from .osc_door import open_osc
+from .protocol import Bed
 from .websocket_door import open_websocket
+
+#: Doors by the key of their port in the settings and in the answer.
+DOORS = {"port": open_websocket, "osc_port": open_osc}
 
 #: How much more readily the system is to give the processor to the session.
 NICE = 5
@@ -87,26 +90,18 @@ async def _serve(settings: dict[str, Any]) -> None:
     host = settings["host"]
     ended = asyncio.Event()
     asyncio.get_running_loop().add_reader(0, _take_wake, link, ended)
-    server = await _opened(open_websocket(link, host, settings["port"]), host, settings["port"])
-    osc, sending = await _opened(open_osc(link, host, settings["osc_port"]), host, settings["osc_port"])
-    display: Display | None = None
-    if settings["display"] is not None:
-        display = open_display(link, **settings["display"])
-    _tell({"port": server.sockets[0].getsockname()[1], "osc_port": osc.get_extra_info("sockname")[1]})
+    opened = {
+        key: await _open(door(link, host, settings[key]), host, settings[key]) for key, door in DOORS.items()
+    }
+    _tell({key: door.port for key, door in opened.items()})
     await ended.wait()
-    sending.cancel()
-    counts: dict[str, Any] = dict(link.counts)
-    if display is not None:
-        counts["display"] = display.close()
-    _tell({"counts": counts})  # before clients that take their time to close
-    osc.close()
-    server.close()
+    _tell({"counts": dict(link.counts)})  # before clients that take their time to close
     with suppress(asyncio.TimeoutError):
-        await asyncio.wait_for(server.wait_closed(), 3.0)
+        await asyncio.wait_for(asyncio.gather(*(door.close() for door in opened.values())), 3.0)
 
 
-async def _opened(opening: Any, host: str, port: int) -> Any:
-    """Return what has been opened. Raises OutputError when the address cannot be used."""
+async def _open(opening: Awaitable[Door], host: str, port: int) -> Door:
+    """Return an opened door. Raises OutputError when the address cannot be used."""
     try:
         return await opening
     except (OSError, OverflowError) as error:

@@ -12,7 +12,7 @@ from digiclay.core.base.errors import DigiclayError, ParameterError
 from pythonosc import osc_bundle, osc_message
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from .door_link import DoorLink
+from .door_link import Door, DoorLink
 from .protocol import Frame, Pose, Reset, check_pose, is_token
 
 #: What can be subscribed to: the pose and the total force, or every pin's height and force besides.
@@ -202,11 +202,14 @@ class _OscDoor(asyncio.DatagramProtocol):
                     self._link.counts["frames sent"] += 1
 
 
-async def open_osc(link: DoorLink, host: str, port: int) -> tuple[Any, asyncio.Task[None]]:
-    """Open the door; return its transport, and the task that sends frames.
-
-    `port`: 0: chosen by the system. Raises OSError when the address cannot be used.
-    """
+async def open_osc(link: DoorLink, host: str, port: int) -> Door:
+    """Open the door at a port, 0: chosen by the system; OSError when the address cannot be used."""
     loop = asyncio.get_running_loop()
     transport, door = await loop.create_datagram_endpoint(lambda: _OscDoor(link), local_addr=(host, port))
-    return transport, asyncio.ensure_future(door.send_frames())
+    sending = asyncio.ensure_future(door.send_frames())
+
+    async def close() -> None:
+        sending.cancel()
+        transport.close()
+
+    return Door(transport.get_extra_info("sockname")[1], close)

@@ -18,9 +18,8 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import format_json, write_whole
 from digiclay.core.scene.scene_source import Setting
 
-from .door_link import describe_bed
 from .doors import Doors, DoorSettings
-from .protocol import LIMITS, VARIABLE, Limits, choose_token, pack_frame
+from .protocol import LIMITS, VARIABLE, Limits, choose_token, describe_bed, pack_frame
 from .real_time_loop import run_session
 from .served_session import PartWriter, begin_session, make_frame
 
@@ -28,7 +27,7 @@ EXAMPLES = f"""\
 examples:
   digiclay serve                                    the device of the paper, 200 control periods a second
   digiclay serve --rate 1000 --out recorded
-  digiclay serve my.toml --display /dev/ttyUSB0 --display-rate 30 --display-baud 1000000
+  digiclay serve my.toml --port 9000 --seconds 60 --report times.json
 
 Ctrl-C stops. Other programs send poses of the fingertip and receive forces and heights, by WebSocket and
 OSC; both need the token, which is printed once, or given by --token or {VARIABLE}.
@@ -75,14 +74,6 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--report", metavar="FILE", type=Path, help="write times and counts as JSON in the end"
     )
-    parser.add_argument("--display", metavar="TTY", help="serial line of a pin display")
-    parser.add_argument(
-        "--display-rate", metavar="HZ", type=_within(1.0, 1000.0, "Hz"), default=30.0,
-        help="its frames a second; default: 30",
-    )  # fmt: skip
-    parser.add_argument(
-        "--display-baud", metavar="B", type=int, default=115200, help="its speed; default: 115200"
-    )
     parser.add_argument(
         "--seconds", metavar="S", type=_within(0.0, 1e9, "s"), help="stop after this time; default: Ctrl-C"
     )
@@ -104,12 +95,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     arguments.scene = arguments.scene or SCENE
     scene, _ = scene_of(arguments)
     session = begin_session(scene, Limits(arguments.most_force, 1e-3 * arguments.most_speed))
-    display = None
-    if arguments.display is not None:
-        display = {
-            "path": arguments.display, "rate": arguments.display_rate, "baud": arguments.display_baud
-        }  # fmt: skip
-    settings = DoorSettings(arguments.host, arguments.port, arguments.osc_port, token, display)
+    settings = DoorSettings(arguments.host, arguments.port, arguments.osc_port, token)
     bed = describe_bed(scene, session.system, session.limits)
     size, out = len(pack_frame(make_frame(session))), arguments.out
     with (
@@ -192,11 +178,8 @@ def _summary(figures: Mapping[str, Any]) -> Iterator[str]:
         f"{periods} control periods of {1e3 * period:g} ms: {figures['missed']} late ({missed:.2g} %), "
         f"{figures['left_out']} of them left out; {shares}"
     )
-    counts = {name: count for name, count in sorted(figures["counts"].items()) if name != "display"}
+    counts = dict(sorted(figures["counts"].items()))
     flagged = {f"frames {name.replace('_', ' ')}": count for name, count in figures["flagged"].items()}
     for found in (flagged, counts):
         if found:
             yield ", ".join(f"{name}: {count}" for name, count in found.items())
-    ended = figures["counts"].get("display", {}).get("ended")
-    if ended:
-        yield f"The line of the pin display ended: {ended}."

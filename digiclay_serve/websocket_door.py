@@ -12,11 +12,11 @@ from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 from digiclay.core.base.errors import DigiclayError, ParameterError
-from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from .door_link import DoorLink, HeldError
+from .door_link import Door, DoorLink, HeldError
 from .protocol import (
     LARGEST_REQUEST,
     VERSION,
@@ -97,15 +97,21 @@ def count_message(pace: Pace, now: float) -> tuple[bool, Pace]:
     return after.count > FLOOD, after
 
 
-async def open_websocket(link: DoorLink, host: str, port: int) -> Server:
+async def open_websocket(link: DoorLink, host: str, port: int) -> Door:
     """Open the door at a port, 0: chosen by the system; OSError when the address cannot be used."""
     door = _WebSocketDoor(link)
-    return await serve(
+    server = await serve(
         door.handle, host, port, process_request=door.admit, create_connection=door.connect,
         compression=None,
         max_size=LARGEST_REQUEST, max_queue=16, write_limit=UNSENT, open_timeout=OPENING,
         ping_interval=PING, ping_timeout=PING, close_timeout=2.0, server_header=None, backlog=1024,
     )  # fmt: skip
+
+    async def close() -> None:
+        server.close()
+        await server.wait_closed()
+
+    return Door(server.sockets[0].getsockname()[1], close)
 
 
 class _Connection(ServerConnection):

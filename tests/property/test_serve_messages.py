@@ -14,13 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonosc.osc_message import OscMessage
 
-from digiclay_serve.display_line import (
-    pack_acknowledgement,
-    pack_heights,
-    read_acknowledgement,
-    read_heights,
-    split_frames,
-)
 from digiclay_serve.osc_door import format_osc_frame, read_osc
 from digiclay_serve.protocol import (
     Flag,
@@ -35,6 +28,7 @@ from digiclay_serve.protocol import (
     unpack_frame,
 )
 from digiclay_serve.websocket_door import read_wishes
+from tests.served import load_example
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 poses = st.lists(numbers, min_size=7, max_size=7).filter(lambda one: 1e-6 < math.hypot(*one[3:]) < math.inf)
@@ -122,28 +116,22 @@ def test_any_address_is_read_or_refused_in_one_line(query: str) -> None:
         assert "\n" not in said
 
 
-@given(st.integers(0, 65535), heights, st.binary(max_size=20))
-def test_heights_survive_the_line_to_within_half_a_count(
-    sequence: int, values: list[float], noise: bytes
+@pytest.mark.skipif("sys.platform == 'win32'", reason="the example is for Linux and macOS")
+@given(st.integers(0, 65535), heights, st.binary(max_size=20), st.data())
+def test_heights_survive_the_line_of_a_display_to_within_half_a_count_or_are_refused(
+    sequence: int, values: list[float], noise: bytes, data: st.DataObject
 ) -> None:
-    sent = pack_heights(sequence, 9, 0.1, np.array(values)) + pack_acknowledgement(sequence)
-    assert sent.count(b"\xc0") == 2
-    bodies, rest = split_frames(noise.replace(b"\xc0", b"") + b"\xc0" + sent + sent[:5])
+    display = load_example("pin_display")
+    sent = display.pack_heights(sequence, 9, 0.1, np.array(values))
+    assert sent.count(b"\xc0") == 1
+    bodies, rest = display.split(noise.replace(b"\xc0", b"") + b"\xc0" + sent + sent[:5])
     assert rest == sent[:5]
-    first, second = bodies[-2:]
-    assert first is not None
-    assert second is not None
-    read = read_heights(first)
-    assert read is not None
-    assert (read[:2], read_acknowledgement(second)) == ((sequence, 9), sequence)
+    start = display.HEAD.size + display.BODY.size
+    assert display.HEAD.unpack_from(bodies[-1]) == (1, 1, sequence)
+    assert display.BODY.unpack_from(bodies[-1], display.HEAD.size)[::2] == (9, len(values))
     # Half a count of the stroke, and what 32 bits round.
-    np.testing.assert_allclose(read[2], values, rtol=0, atol=0.1 / 65535 / 2 + 1e-8)
-
-
-@given(st.integers(0, 65535), st.data())
-def test_a_frame_with_one_wrong_byte_is_never_taken_for_another(sequence: int, data: st.DataObject) -> None:
-    sent = bytearray(pack_heights(sequence, 9, 0.1, np.array([0.04, 0.05, 0.06])))
-    place = data.draw(st.integers(0, len(sent) - 2))
-    sent[place] ^= data.draw(st.integers(1, 255))
-    bodies, _ = split_frames(bytes(sent))
-    assert all(body is None for body in bodies)
+    read = np.frombuffer(bodies[-1], "<u2", offset=start) / 65535 * 0.1
+    np.testing.assert_allclose(read, values, rtol=0, atol=0.1 / 65535 / 2 + 1e-8)
+    damaged = bytearray(sent)
+    damaged[data.draw(st.integers(0, len(sent) - 2))] ^= data.draw(st.integers(1, 255))
+    assert not any(display.split(bytes(damaged))[0])

@@ -1,15 +1,16 @@
-"""OSC and a pin display at a server that runs: datagrams, and a pty that stands for a serial line."""
+"""OSC at a server that runs, and the example of a pin display, with a pty as its serial line."""
 
 from __future__ import annotations
 
-import json
 import os
 import re
+import select
+import signal
 import socket
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,7 @@ import pytest
 from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from digiclay_serve.display_line import pack_acknowledgement, read_heights, split_frames
-from tests.served import TOKEN, Server, serve
+from tests.served import TOKEN, Server, load_example, serve
 from tests.timeouts import TIMEOUT, wait_until
 
 if sys.platform == "win32":
@@ -27,42 +27,16 @@ if sys.platform == "win32":
 
 import pty
 
+pin_display = load_example("pin_display")
 PLACE = (0.0, 0.0, 0.038)
 
 
-@dataclass
-class Reader:
-    """Other end of the serial line."""
-
-    line: int
-    rest: bytes = b""
-    seen: list[Any] = field(default_factory=list)
-
-    def receive(self) -> tuple[int, int, np.ndarray]:
-        """Return sequence number, period and heights of the next frame."""
-        while not self.seen:
-            bodies, self.rest = split_frames(self.rest + os.read(self.line, 65536))
-            self.seen += [read_heights(body) for body in bodies if body is not None]
-        return self.seen.pop(0)
-
-
 @pytest.fixture(scope="module")
-def line() -> Iterator[tuple[Reader, str]]:
-    """A pty: this end, and the name of the other one."""
-    ours, theirs = pty.openpty()
-    yield Reader(ours), os.ttyname(theirs)
-    for one in (ours, theirs):
-        with suppress(OSError):
-            os.close(one)
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory, line: tuple[Reader, str]) -> Iterator[Server]:
-    """One server for all tests; in the end it must be alive, and account for every frame of the line."""
-    with serve(tmp_path_factory.mktemp("served"), "--display", line[1], "--display-rate", "100") as one:
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One server for all tests; in the end it must be alive."""
+    with serve(tmp_path_factory.mktemp("served")) as one:
         yield one
-        counts = one.stop()["counts"]["display"]
-        assert counts["sent"] == counts["acknowledged"] + counts["dropped"]
+        one.stop()
 
 
 @pytest.fixture
@@ -187,75 +161,52 @@ def test_garbage_harms_nobody(door: socket.socket) -> None:
     is_well(door, 4)
 
 
-def test_heights_arrive_at_the_display_and_are_acknowledged(
-    server: Server, line: tuple[Reader, str], door: socket.socket
-) -> None:
-    reader = line[0]
-    first = reader.receive()
-    os.write(reader.line, pack_acknowledgement(first[0]))
-    is_well(door, 5)
-    lowest = 1.0
-    while lowest > 0.0399:  # pressed, to within a count of 0.1 m / 65,535
-        sequence, _, heights = reader.receive()
-        os.write(reader.line, pack_acknowledgement(sequence))
-        lowest = heights.min()
-    assert heights.shape == (81,)
-    assert np.argmin(heights) == 40
+def test_the_example_shows_the_heights_on_a_pin_display(server: Server, door: socket.socket) -> None:
+    ours, theirs = pty.openpty()
+    command = [sys.executable, str(pin_display.__file__), f"ws://127.0.0.1:{server.port}", os.ttyname(theirs)]
+    environment = {**os.environ, "DIGICLAY_SERVE_TOKEN": TOKEN, "PYTHONPATH": os.pathsep.join(sys.path)}
+    rest, bodies = b"", []
+
+    def receive() -> bytes:
+        nonlocal rest
+        while not bodies:
+            assert select.select([ours], [], [], TIMEOUT)[0], example.poll()
+            found, rest = pin_display.split(rest + os.read(ours, 65536))
+            bodies.extend(body for body in found if body)
+        return bodies.pop(0)
+
+    with subprocess.Popen(
+        [*command, "--rate", "100"], env=environment, stdout=subprocess.PIPE, text=True
+    ) as example:
+        is_well(door, 5)
+        heights = np.ones(81)
+        while heights.min() > 0.0399:  # pressed, to within a count of 0.1 m / 65,535
+            body = receive()
+            assert body[:2] == bytes([1, 1])
+            stroke = pin_display.BODY.unpack_from(body, pin_display.HEAD.size)[1]
+            start = pin_display.HEAD.size + pin_display.BODY.size
+            heights = np.frombuffer(body, "<u2", offset=start) / 65535 * stroke
+            os.write(ours, acknowledgement(body))
+        assert (heights.shape, np.argmin(heights)) == ((81,), 40)
+        damaged = bytearray(acknowledgement(receive()))
+        damaged[3] ^= 0x11
+        os.write(ours, bytes(damaged) + b"\xff" * 40 + b"\xc0")
+        lost = [receive() for _ in range(pin_display.WINDOW)]  # more come when these are dropped
+        os.write(ours, acknowledgement(receive()))
+        os.write(ours, acknowledgement(lost[0]))
+        os.write(ours, acknowledgement(receive()))
+        example.send_signal(signal.SIGINT)
+        said = example.communicate(timeout=TIMEOUT)[0]
+    counts = {name: int(count) for name, count in re.findall(r"(\w+): (\d+)", said)}
+    assert counts["sent"] == counts["acknowledged"] + counts["dropped"]
+    assert counts["dropped"] >= len(lost)
+    assert counts["damaged"] >= 3
+    assert counts["skipped"] > 0
+    for line in (ours, theirs):
+        os.close(line)
 
 
-def wait_for(server: Server, reader: Reader, name: str, count: int, *, answer: bool = True) -> int:
-    """Read on, and acknowledge or not, until the server has counted so many frames more; return these."""
-    with server.connect("?rate=0") as client:
-        client.recv(TIMEOUT)
-        found, first = 0, None
-        while first is None or found < first + count:
-            sequence = reader.receive()[0]
-            if answer:
-                os.write(reader.line, pack_acknowledgement(sequence))
-            client.send('{"type": "status"}')
-            found = json.loads(client.recv(TIMEOUT))["counts"][f"display frames {name}"]
-            first = found if first is None else first
-    return found - first
-
-
-def test_a_display_that_corrupts_is_counted(server: Server, line: tuple[Reader, str]) -> None:
-    reader = line[0]
-    sequence = reader.receive()[0]
-    damaged = bytearray(pack_acknowledgement(sequence))
-    damaged[3] ^= 0x11
-    for _ in range(3):
-        os.write(reader.line, bytes(damaged) + b"\xff" * 40 + b"\xc0")
-    assert wait_for(server, reader, "acknowledged", 3) >= 3
-    assert server.count("display frames damaged") >= 6
-
-
-def test_a_display_that_drops_is_counted(server: Server, line: tuple[Reader, str]) -> None:
-    assert wait_for(server, line[0], "dropped", 4, answer=False) >= 4
-    assert wait_for(server, line[0], "acknowledged", 3) >= 3
-
-
-def test_a_display_that_delays_is_counted(server: Server, line: tuple[Reader, str]) -> None:
-    reader = line[0]
-    with server.connect("?format=binary&rate=100") as client:
-        late = 0
-        while late < 3:
-            sequence = reader.receive()[0]
-            for _ in range(4):  # frames at the display's rate: three of its periods at least have gone by
-                while not isinstance(client.recv(TIMEOUT), bytes):
-                    pass
-            os.write(reader.line, pack_acknowledgement(sequence))
-            client.send('{"type": "status"}')
-            answer = client.recv(TIMEOUT)
-            while isinstance(answer, bytes):
-                answer = client.recv(TIMEOUT)
-            late = json.loads(answer)["counts"]["display frames late"] if "counts" in answer else late
-    assert late >= 3
-
-
-def test_a_display_that_stops_reading_costs_nothing_but_its_frames(
-    server: Server, line: tuple[Reader, str], door: socket.socket
-) -> None:
-    least = server.count("display frames skipped") + 20
-    while server.count("display frames skipped") < least:
-        is_well(door, 6)
-    assert wait_for(server, line[0], "acknowledged", 3) >= 3
+def acknowledgement(body: bytes) -> bytes:
+    """Return the acknowledgement of a frame of heights."""
+    sequence = pin_display.HEAD.unpack_from(body)[2]
+    return pin_display.pack(pin_display.HEAD.pack(1, 2, sequence))

@@ -1,4 +1,4 @@
-"""Parts of the server without a process: deadlines, session, take, token, lease, account of a line."""
+"""Parts of the server without a process: deadlines, session, take, token, lease."""
 
 from __future__ import annotations
 
@@ -15,10 +15,8 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, from_bytes, make_take, replay, to_bytes
 
-from digiclay_serve.display_line import LOST, WINDOW, Ledger, acknowledge, expire, send, split_frames
-from digiclay_serve.display_line import pack_acknowledgement as acknowledged
 from digiclay_serve.door_link import LEASE, Lease, claim, release
-from digiclay_serve.latest_slot import Order, make_slot, open_slot, pack_order, unpack_order
+from digiclay_serve.doors import Order, make_slot, open_slot, pack_order, unpack_order
 from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token
 from digiclay_serve.real_time_loop import Schedule, TimeCounts, plan_periods
 from digiclay_serve.served_session import (
@@ -292,33 +290,3 @@ def test_the_fingertip_is_anothers_when_its_client_is_silent_or_gone() -> None:
     assert claim(lease, "two", 10.0 + LEASE)[0]
     assert claim(release(lease, "one"), "two", 10.1)[0]
     assert not claim(release(lease, "two"), "two", 10.1)[0]
-
-
-def body_of(sequence: int) -> bytes | None:
-    """Return the body of an acknowledgement."""
-    return split_frames(acknowledged(sequence))[0][0]
-
-
-def test_an_account_has_every_frame_once() -> None:
-    ledger = Ledger(late_after=0.02)
-    for now in (0.0, 0.01):
-        _, ledger = send(ledger, now, busy=False)
-    number, ledger = send(ledger, 0.02, busy=True)
-    assert (number, ledger.sent, ledger.skipped) == (None, 2, 1)
-    ledger = acknowledge(acknowledge(ledger, body_of(0), 0.019), body_of(1), 0.05)
-    assert (ledger.acknowledged, ledger.late) == (2, 1)
-    for wrong in (body_of(1), None, b"\x01\x02"):
-        ledger = acknowledge(ledger, wrong, 0.06)
-    assert ledger.damaged == 3
-    _, ledger = send(ledger, 1.0, busy=False)
-    assert expire(ledger, 1.0 + 0.99 * LOST).dropped == 0
-    assert expire(ledger, 1.0 + LOST).dropped == 1
-
-
-def test_only_so_many_frames_are_on_their_way_and_their_numbers_go_round() -> None:
-    ledger, numbers = replace(Ledger(0.02), next=65534), []
-    for _ in range(WINDOW + 2):
-        number, ledger = send(ledger, 0.0, busy=False)
-        numbers.append(number)
-    assert numbers == [65534, 65535, 0, 1, None, None]
-    assert (ledger.sent, ledger.skipped) == (4, 2)

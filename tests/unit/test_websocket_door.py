@@ -12,7 +12,7 @@ if sys.platform == "win32":
 
 from digiclay_serve import door_link, websocket_door
 from digiclay_serve.door_link import Bed, DoorLink, HeldError
-from digiclay_serve.latest_slot import Order, make_slot, pack_order
+from digiclay_serve.doors import Order, make_slot, pack_order
 from digiclay_serve.protocol import Pose, pack_pose
 from digiclay_serve.websocket_door import open_websocket
 from tests.served import TOKEN, frame_message
@@ -37,8 +37,8 @@ def make_link() -> DoorLink:
 
 async def connect(link: DoorLink, sent: bytes = b"") -> bytes:
     """Send bytes, answer nothing; return what comes until the door closes and another client has pressed."""
-    server = await open_websocket(link, "127.0.0.1", 0)
-    reader, writer = await asyncio.open_connection("127.0.0.1", server.sockets[0].getsockname()[1])
+    door = await open_websocket(link, "127.0.0.1", 0)
+    reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
     writer.write(sent)
     try:
         async with asyncio.timeout(TIMEOUT):
@@ -46,7 +46,7 @@ async def connect(link: DoorLink, sent: bytes = b"") -> bytes:
             await press_elsewhere(link)
     finally:
         writer.close()
-        server.close()
+        await door.close()
     return said
 
 
