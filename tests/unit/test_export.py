@@ -165,7 +165,7 @@ def test_the_same_mesh_gives_the_same_bytes(solid, tmp_path, kind):
 @pytest.mark.parametrize("kind", mesh_writer.FORMATS)
 def test_pieces_of_a_body_are_written_like_the_whole(solid, tmp_path, kind, monkeypatch):
     whole = mesh_writer.write(solid, tmp_path / "whole", kind=kind).read_bytes()
-    monkeypatch.setattr("digiclay.core.surface.body.PIECE", 7)
+    monkeypatch.setattr("digiclay.core.surface.formed.PIECE", 7)
     assert mesh_writer.write(solid, tmp_path / "pieces", kind=kind).read_bytes() == whole
 
 
