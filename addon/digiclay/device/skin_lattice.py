@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.base.arrays import Floats
+from ..core.surface.skin_mesh import find_grid_shape, take_corners, take_outline
 from .instant import Instant
 
 Indices = NDArray[np.int32]
@@ -96,8 +97,7 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
     `instant`: for the positions and the size of the pins; `parts`: points a pitch.
     """
     x, y = instant.position.T
-    columns = _count_columns(y)
-    rows = len(y) // columns
+    rows, columns = find_grid_shape(instant.position)
     starts, spacing = x[::columns], float(y[columns] - y[0]) if rows > 1 else instant.pitch
     fine_x = _divide(x.min(), x.max(), instant.pitch, parts)
     fine_y = _divide(y.min(), y.max(), spacing, parts)
@@ -115,7 +115,7 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
     point = np.arange(rows * fine_x.size, dtype=np.int32).reshape(rows, -1)
     low, share = _find_cells((fine_y - y[0]) / spacing, rows)
     surface = np.arange(fine_y.size * fine_x.size, dtype=np.int32).reshape(fine_y.size, -1)
-    edge = np.concatenate([surface[0, :-1], surface[:-1, -1], surface[-1, :0:-1], surface[:0:-1, 0]])
+    edge = take_outline(surface)
     of = np.concatenate([surface.ravel(), edge, edge])
     sunk = np.arange(of.size) >= surface.size + edge.size
     spread = np.repeat(share, fine_x.size)[of]
@@ -141,12 +141,6 @@ def interpolate(lattice: SkinLattice, height: Floats, kind: str) -> Floats:
         value, weights = np.column_stack([height, slope]), step.weights[kind]
         height = (value[step.low] * weights.low + value[step.high] * weights.high).sum(axis=1)
     return height
-
-
-def _count_columns(y: Floats) -> int:
-    """Return how many pins the first row has."""
-    other = np.flatnonzero(np.abs(y - y[0]) > SLACK * float(np.ptp(y)))
-    return int(other[0]) if other.size else len(y)
 
 
 def _divide(first: float, last: float, step: float, parts: int) -> Floats:
@@ -193,8 +187,7 @@ def _drop(weights: Weights, which: NDArray[np.bool_]) -> Weights:
 
 def _join(surface: Indices, edge: int) -> Indices:
     """Return the faces of a surface and of its sides, which have points of their own: a crease."""
-    a, b, c, d = surface[:-1, :-1], surface[:-1, 1:], surface[1:, 1:], surface[1:, :-1]
-    top = np.stack([a, b, c, d], axis=-1).reshape(-1, 4)
+    top = np.stack(take_corners(surface), axis=-1).reshape(-1, 4)
     upper = surface.size + np.arange(edge, dtype=np.int32)
     lower = upper + np.int32(edge)
     sides = np.column_stack([lower, np.roll(lower, -1), np.roll(upper, -1), upper])

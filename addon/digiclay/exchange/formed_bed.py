@@ -29,10 +29,7 @@ SHOWN = 1e-7
 
 
 def read_formed(bed: Any) -> Formed:
-    """Return the pins of a bed; before, they were as they were kept, or all at rest.
-
-    Raises DigiclayError when the bed's mesh was edited so that it is no bed any more.
-    """
+    """Return the pins of a bed, and before: as kept, or at rest; DigiclayError when it is no bed."""
     if any(name not in bed.data.attributes for name in bridge.ATTRIBUTES):
         raise OutputError(
             f"{bed.name} has lost the attributes of its pins: press Rebuild in the Device panel."
@@ -67,32 +64,22 @@ def clear_reference(bed: Any) -> None:
         bed.data.attributes.remove(found)
 
 
-def model(bed: Any, **told: Any) -> Model:
-    """Return what is to be made of a bed; the flat ends of its pins are those of its device.
-
-    `bed` bpy.types.Object; `told`: fields of `Model`.
-    """
-    return Model(cap=_scene(bed).actuator.bore / 2.0, **told)
+def model(bed: Any, **fields: Any) -> Model:
+    """Return a `Model` of a bed from its other fields; the flat ends of its pins are those of its device."""
+    return Model(cap=_scene(bed).actuator.bore / 2.0, **fields)
 
 
 def _of_session(bed: Any) -> dict[str, Any]:
-    """Return heights, forces and modes of the session that is shown; nothing when something else is.
-
-    A session draws the forces only where they are to be seen, so its bed's mesh may not have them.
-    """
-    found = _state(bed)
-    shown = bridge.read_cells(bed.data)["height"]
-    if found is None:
+    """Return heights, forces and modes of the session if that is shown: the mesh may not have its forces."""
+    current = _state(bed)
+    if current is None:
         return {}
-    system, state = found
-    height = state.row(0)
+    system, state = current
+    height, shown = state.row(0), bridge.read_cells(bed.data)["height"]
     if height.shape != shown.shape or np.abs(height - shown).max() > SHOWN:
         return {}
-    return {
-        "height": height.copy(),
-        "force": state.row(system.rows.force).copy(),
-        "mode": state.mode().copy(),
-    }
+    force = state.row(system.rows.force).copy()
+    return {"height": height.copy(), "force": force, "mode": state.mode().copy()}
 
 
 def _state(bed: Any) -> tuple[System, State] | None:
@@ -125,11 +112,7 @@ UPWARDS = 1e-6
 
 
 def make_object(body: Body, name: str, *, smooth: bool) -> Any:
-    """Return a new object, in no collection yet, with the body in Blender units.
-
-    `body`: with values, as `export_model.make_bodies` makes it; `name`: of the object and its mesh; `smooth`:
-    shade its skin smooth. Walls and base stay flat, and the rim between them and the skin is sharp.
-    """
+    """Return a new object, in no collection yet, of a body that has values; `smooth` shades its skin."""
     made = bpy.data.objects.new(name, _mesh(body, name, smooth=smooth))
     for number, group in enumerate(body.groups, 1):
         members = np.flatnonzero(body.vertex_group == number).tolist()
@@ -162,15 +145,11 @@ def _find_skin(body: Body) -> Flags:
     """Return which faces belong to the skin: it is a height everywhere, so that all of it faces up."""
     first, second, third = (body.vertices[body.faces[:, corner]] for corner in range(3))
     normal = np.cross(second - first, third - first)
-    upwards: Flags = normal[:, 2] > UPWARDS * np.linalg.norm(normal, axis=1)
-    return upwards
+    return np.asarray(normal[:, 2] > UPWARDS * np.linalg.norm(normal, axis=1))
 
 
 def _mark_rim(mesh: Any, skin: Flags) -> None:
-    """Mark the edges around flat faces as sharp, and none within the skin, however steep it is.
-
-    `mesh` bpy.types.Mesh, of triangles; `skin` bool (f,), which of them are shaded smooth.
-    """
+    """Mark the edges around flat faces as sharp, and none within the skin (f,), however steep it is."""
     mesh.set_sharp_from_angle(angle=SHARP)
     edge = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("edge_index", edge)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +19,7 @@ BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
 
 def pixels(path: Path) -> NDArray[np.float64]:
-    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first.
-
-    Raises ParameterError when Blender cannot read it, or it is too large.
-    """
+    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first."""
     try:
         image = bpy.data.images.load(str(path.resolve()), check_existing=False)
     except RuntimeError:
@@ -39,21 +35,15 @@ def pixels(path: Path) -> NDArray[np.float64]:
         if width * height > MOST:
             share = math.sqrt(MOST / (width * height))
             image.scale(max(2, int(width * share)), max(2, int(height * share)))
-        return _brightness(image, path)
+        width, height = image.size
+        table = np.empty((height, width, image.channels), np.float32)
+        if len(image.pixels) != table.size:
+            raise _unreadable(path)
+        image.pixels.foreach_get(table.ravel())
+        bright = table[..., :3] @ BRIGHTNESS if image.channels > 2 else table[..., 0]
+        return np.asarray(bright, np.float64)
     finally:
         bpy.data.images.remove(image)
-
-
-def _brightness(image: Any, path: Path) -> NDArray[np.float64]:
-    """Return the brightness of an image's pixels."""
-    width, height = image.size
-    table = np.empty(width * height * image.channels, np.float32)
-    if len(image.pixels) != table.size:
-        raise _unreadable(path)
-    image.pixels.foreach_get(table)
-    table = table.reshape(height, width, image.channels)
-    bright = table[..., :3] @ BRIGHTNESS if image.channels > 2 else table[..., 0]
-    return np.asarray(bright, np.float64)
 
 
 def _unreadable(path: Path) -> ParameterError:

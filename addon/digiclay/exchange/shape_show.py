@@ -41,11 +41,7 @@ def has_surface(thing: Any) -> bool:
 
 
 def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
-    """Return the surface of an object, all modifiers included, in the space of a bed, m.
-
-    `thing` bpy.types.Object; `bed` bpy.types.Object; `depsgraph` bpy.types.Depsgraph. Raises DigiclayError
-    when it has no face, a vertex is not finite, or the bed is not uniformly scaled.
-    """
+    """Return the surface of an object, all modifiers included, in the space of a bed, m."""
     bridge.uniform(bed)
     evaluated = thing.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
@@ -61,22 +57,18 @@ def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
         evaluated.to_mesh_clear()
     way = np.array(bed.matrix_world.inverted() @ thing.matrix_world, np.float64)
     vertices = places.reshape(-1, 3) @ way[:3, :3].T + way[:3, 3]
-    return make_shape_mesh(
-        thing.name, vertices / bridge.SCALE, faces.reshape(-1, 3).astype(np.int64), "z", 1.0
-    )
+    triangles = faces.reshape(-1, 3).astype(np.int64)
+    return make_shape_mesh(thing.name, vertices / bridge.SCALE, triangles, "z", 1.0)
 
 
 def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
-    """Display a shape on a bed; return how it was fitted, and what the display is off by, m.
-
-    `bed` bpy.types.Object; `shape`: how it is fitted.
-    """
+    """Display a relief on a bed as `shape` requests; return the fit, and what the display is off by, m."""
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fit_relief(shape, relief, make_grid(scene.layout), scene.actuator))
 
 
 def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
-    """Display the shape a file or sample holds on a bed; see `show_relief`. `bed` bpy.types.Object."""
+    """Display the shape of a file or sample on a bed; see `show_relief`."""
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fit_shape(shape, make_grid(scene.layout), scene.actuator))
 

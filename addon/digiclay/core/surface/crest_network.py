@@ -60,10 +60,10 @@ class Network:
     def path(self, end: End) -> Floats:
         """Return the unit vector in which a branch leaves its node."""
         points, half = self.away(end), self.half[self.branches[end[0]].nodes[end[1]]]
-        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        run = measure_run(points)
         near, far = min(SHOWS[0] * half, run[-1] / 2.0), min(SHOWS[1] * half, run[-1])
-        step = np.array([np.interp(far, run, axis) - np.interp(near, run, axis) for axis in points.T])
-        return step / max(float(np.hypot(*step)), 1e-12)
+        start, stop = place_along(np.array([near, far]), run, points)
+        return np.asarray((stop - start) / max(float(np.hypot(*(stop - start))), 1e-12))
 
 
 def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Network:
@@ -81,7 +81,7 @@ def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Ne
             group.update(more)
             waiting += more
         cluster |= dict.fromkeys(group, len(network.position))
-        _add_node(network, position[sorted(group)], [wide[one] for one in group])
+        _add_node(network, position[sorted(group)], [wide[member] for member in group])
     seen: set[tuple[int, int]] = set()
 
     def walk(start: int, step: int) -> list[int]:
@@ -89,11 +89,11 @@ def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Ne
         while path[-1] not in cluster and path[-1] != start:
             path.append(next(n for n in around[path[-1]] if n != path[-2]))
         seen.update(((path[0], path[1]), (path[-1], path[-2])))
-        seen.update((one, -1) for one in path[1:-1])
+        seen.update((inner, -1) for inner in path[1:-1])
         return path
 
-    def add(path: Iterable[int], nodes: list[int]) -> None:
-        points = np.array([position[one] for one in path])
+    def add(path: list[int], nodes: list[int]) -> None:
+        points = position[path]
         points[0], points[-1] = network.position[nodes[0]], network.position[nodes[1]]
         network.branches[len(network.branches)] = Branch(nodes, points)
 
@@ -111,16 +111,12 @@ def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Ne
 
 
 def _neighbors(beside: Pins, pins: Pins) -> dict[int, list[int]]:
-    """Return for each pin of a skeleton those it is joined to: corners only where there is no side way."""
-    among = set(pins.tolist())
-    found: dict[int, list[int]] = {}
-    for pin, row in zip(pins.tolist(), beside[pins].tolist(), strict=True):
-        there = [n in among for n in row]
-        straight = [
-            len(row) == 6 or k % 2 == 0 or not (there[k - 1] or there[(k + 1) % 8]) for k in range(len(row))
-        ]
-        found[pin] = [n for n, one, path in zip(row, there, straight, strict=True) if one and path]
-    return found
+    """Return for each pin of a skeleton those it is joined to: corners only where no side leads there."""
+    there = np.isin(beside[pins], pins)
+    if there.shape[1] == 8:
+        there[:, 1::2] &= ~(there[:, ::2] | np.roll(there[:, ::2], -1, axis=1))
+    rows = zip(pins.tolist(), beside[pins], there, strict=True)
+    return {pin: row[joined].tolist() for pin, row, joined in rows}
 
 
 def _add_node(network: Network, places: Floats, half: list[float]) -> int:
@@ -133,6 +129,16 @@ def _add_node(network: Network, places: Floats, half: list[float]) -> int:
 def measure_length(points: Floats) -> float:
     """Return the length of a line in plan, m."""
     return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+def measure_run(points: Floats) -> Floats:
+    """Return how far along a line (m, 2) in plan its points are, (m,), m."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+def place_along(at: Floats, run: Floats, points: Floats) -> Floats:
+    """Return the places at some distances (k,), m, along a line whose points are at `run`, (k, 2)."""
+    return np.column_stack([np.interp(at, run, axis) for axis in points.T])
 
 
 #: A free branch is shorter than this many half widths when it is only the flank.
@@ -227,35 +233,27 @@ def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:
         if joined[branch.nodes[0]] == joined[branch.nodes[1]]:
             first, last = find_stretch(height < SADDLE * bank, low)
             del network.branches[number]
-            for node, part in zip(
-                branch.nodes, (branch.points[:first], branch.points[:last:-1]), strict=True
-            ):
+            parts = (branch.points[:first], branch.points[:last:-1])
+            for node, part in zip(branch.nodes, parts, strict=True):
                 if len(part) > 1:
-                    network.branches[max(network.branches, default=0) + 1] = Branch(
-                        [node, len(network.position)], part
-                    )
-                    network.position.append(part[-1])
-                    network.half.append(0.0)
+                    free = _add_node(network, part[-1:], [0.0])
+                    network.branches[max(network.branches, default=0) + 1] = Branch([node, free], part)
 
 
 def find_stretch(there: NDArray[np.bool_], at: int) -> tuple[int, int]:
-    """Return the first and the last of those about a place that all have something."""
+    """Return the first and the last of the places about one that all are `there`."""
     out = np.flatnonzero(~there)
     before, after = out[out < at], out[out > at]
     return int(before[-1]) + 1 if len(before) else 0, int(after[0]) - 1 if len(after) else len(there) - 1
 
 
 def _open_small_loops(network: Network) -> None:
-    """Take off what closes a loop that is smaller than the line it is in is wide."""
+    """Remove branches that close a loop smaller than its line is wide."""
     for number, branch in list(network.branches.items()):
         one, two = branch.nodes
-        others = [k for k, b in network.branches.items() if k != number and set(b.nodes) == {one, two}]
+        others = [b.length for k, b in network.branches.items() if k != number and set(b.nodes) == {one, two}]
         about = 2.0 * np.pi * max(network.half[one], network.half[two])
-        if one == two:
-            small = branch.length < about
-        else:
-            small = any(network.branches[k].length + branch.length < about for k in others)
-        if small:
+        if any(length + branch.length < about for length in ([0.0] if one == two else others)):
             del network.branches[number]
 
 
@@ -268,9 +266,8 @@ def _prune(network: Network, pitch: float) -> None:
             for free, node in (branch.nodes, branch.nodes[::-1]):
                 if len(network.ends(free)) == 1 and len(network.ends(node)) > 2:
                     beyond = np.stack([_foot(network, number, node), network.position[free]])
-                    if not all(
-                        reaches_out(one, network.half[node], pitch) for one in (branch.points, beyond)
-                    ):
+                    lines = (branch.points, beyond)
+                    if not all(reaches_out(line, network.half[node], pitch) for line in lines):
                         short.append((branch.length, number))
         if not short:
             return
@@ -327,8 +324,7 @@ def _round(network: Network, one: End, two: End) -> Floats:
 
 def _begin(network: Network, end: End) -> Floats:
     """Return where a branch comes out of its junction, (2,)."""
-    point: Floats = _without_nodes(network, end, {end: (end, np.empty((0, 2)))})[0]
-    return point
+    return np.asarray(_without_nodes(network, end, {end: (end, np.empty((0, 2)))})[0])
 
 
 def _meeting(network: Network, one: End, two: End) -> Floats | None:
@@ -356,11 +352,10 @@ def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]])
     most = TURN_OF_LOOPS if len({end[0] for side in sides for end in side}) == 2 else TURN
     if np.arccos(np.clip(cosines_along, -1.0, 1.0)).mean() > most:
         return
-    order = min(permutations((0, 1)), key=lambda known: float(np.sum(ways[0] * ways[1][list(known)])))
+    order = min(permutations((0, 1)), key=lambda pair: float(np.sum(ways[0] * ways[1][list(pair)])))
     # A way that is shorter than wide is a crossing, which each line passes straight.
-    way = (
-        branch.points if branch.length > 2.0 * max(network.half[one], network.half[two]) else np.empty((0, 2))
-    )
+    crossing = branch.length <= 2.0 * max(network.half[one], network.half[two])
+    way = branch.points[:0] if crossing else branch.points
     for k in (0, 1):
         a, b = sides[0][k], sides[1][order[k]]
         joints[a], joints[b] = (b, way), (a, way[::-1])
@@ -376,8 +371,7 @@ def _assembled(
     for start in [*free, *((k, 0) for k in network.branches)]:
         if start[0] in used:
             continue
-        parts, end = [], start
-        nodes: set[int] = set()
+        parts, end, nodes = [], start, set[int]()
         while True:
             used.add(end[0])
             nodes.update(network.branches[end[0]].nodes)
@@ -404,5 +398,4 @@ def _without_nodes(network: Network, end: End, joints: dict[End, tuple[End, Floa
             kept &= np.hypot(*(points - network.position[node]).T) > THROUGH * network.half[node]
     middle = len(points) // 2
     kept[middle] |= not kept.any()
-    left: Floats = points[kept]
-    return left
+    return np.asarray(points[kept])

@@ -1,9 +1,8 @@
 """Crests: lines along the top of a boss or the bottom of a crease, to a fraction of a pitch.
 
-The pins along the top give their number and their order (feature_skeleton, feature_network). Each line is
-then drawn through the middle of the feature's sections, and ends where its spine does: half the width at half
-its height before the height has fallen to a half (feature_line). A line that is not as long as the feature is
-wide is the top of a mound, and no crest.
+The pins along the top give their number and their order (skeleton, crest_network). Each line is then drawn
+through the middle of the feature's sections, and ends where its spine does: half the width at half its height
+before the height has fallen to a half. A line shorter than the feature is wide is the top of a mound.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
-from .crest_network import SADDLE, Chain, find_chains, find_stretch, reaches_out
+from .crest_network import SADDLE, Chain, find_chains, find_stretch, measure_run, place_along, reaches_out
 from .formed import Lattice, measure_distance
 from .skeleton import find_skeleton, measure_half_width
 
@@ -63,14 +62,9 @@ class Field:
         """Return how far it is at least to where the feature falls to half its height at places, m."""
         angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
         ways = np.column_stack([np.cos(angles), np.sin(angles)])
-        k = len(position)
-        distance = self.falls(
-            np.repeat(position, AROUND, axis=0),
-            np.tile(ways, (k, 1)),
-            np.repeat(0.5 * self.at(position), AROUND),
-        )
-        least: Floats = np.minimum(distance.reshape(k, AROUND).min(axis=1), self.most)
-        return least
+        places, level = np.repeat(position, AROUND, axis=0), np.repeat(0.5 * self.at(position), AROUND)
+        distance = self.falls(places, np.tile(ways, (len(position), 1)), level).reshape(-1, AROUND)
+        return np.asarray(np.minimum(distance.min(axis=1), self.most))
 
     def line(self, chain: Chain) -> Floats | None:
         """Return the line along the top that a chain of pins stands for, or none where it has no length."""
@@ -85,10 +79,9 @@ class Field:
                 return None
             line = smooth(spread, 1, chain.closed)
         half = self.half_width(line, chain.closed)
-        for end in (0, 1):
+        for end, way in ((0, -1), (1, 1)):
             if not (chain.closed or chain.joined[end]):
-                line = self._find_line_ends(line[::-1] if end == 0 else line, half)
-                line = line[::-1] if end == 0 else line
+                line = self._find_line_ends(line[::way], half)[::way]
                 if len(line) < 2:
                     return None
         return self._sharpened(line, half, chain.closed)
@@ -110,28 +103,29 @@ class Field:
             i for i in np.flatnonzero(turn > TURN) if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()
         ]
         ends = [0, *peaks, len(fine) - 1]
-        pieces, start = [], 0
+        pieces, start, reach = [], 0, width + wide
         for before, i, after in zip(ends, peaks, ends[2:], strict=False):
-            reach = width + wide
             legs = [
                 fine[max(i - reach, (before + i + 1) // 2 if before else 0) : i - width + 1],
                 fine[i + width : min(i + reach, (i + after) // 2 if after < len(fine) - 1 else after) + 1],
             ]
             corner = self._meeting(legs[0], legs[1][::-1], half)
             if corner is not None and i - width >= start:
-                pieces += [np.concatenate([fine[start : i - width + 1], corner])]
+                pieces.append(np.concatenate([fine[start : i - width + 1], corner]))
                 fine[i + width - 1], start = corner[0], i + width - 1
         if not pieces:
             return line
+        # The last point of a piece is the first one of the next.
         evenly = [space_evenly(piece, 2.0 * step) for piece in (*pieces, fine[start:])]
+        stops = [*[-1] * len(pieces), None]
         return np.concatenate(
-            [one[: None if k == len(pieces) else -1] for k, one in enumerate(evenly) if one is not None]
+            [even[:stop] for even, stop in zip(evenly, stops, strict=True) if even is not None]
         )
 
     def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
         """Return a line led on straight from its last leg to one of others, or from its end to the next."""
         step = self.lattice.pitch / 4.0
-        there = [fine for fine in (space_evenly(other, step) for other in others) if fine is not None]
+        there = [even for other in others if (even := space_evenly(other, step)) is not None]
         fine = space_evenly(line, step)
         if not there or fine is None:
             return line
@@ -164,10 +158,8 @@ class Field:
         corner = (middles[0] + away[0] * ways[0])[None]
         path = np.concatenate([m + np.linspace(0.0, 1.0, 9)[:, None] * (corner - m) for m in middles])
         high = float(np.median(self.at(np.concatenate([one, two]))))
-        turn = max(np.arccos(np.clip(-ways[0] @ ways[1], -1.0, 1.0)), 1e-3)
-        out = (
-            np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn / 2.0) - 1.0 / np.tan(turn / 2.0))
-        )
+        turn = max(np.arccos(np.clip(-ways[0] @ ways[1], -1.0, 1.0)), 1e-3) / 2.0
+        out = np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn) - 1.0 / np.tan(turn))
         least = max(HIGH, 1.0 - 0.25 * (out / half) ** 2)
         return corner if away.min() > 0.0 and self.at(path).min() >= least * high else None
 
@@ -189,9 +181,9 @@ class Field:
         if not seen.any():
             return line
         seen &= wide <= EVEN * float(np.median(wide[seen]))
-        # Across a junction the line goes on as it does beside it.
-        known = np.flatnonzero(seen)
-        shift = np.interp(np.arange(len(line)), known, 0.5 * (left[known] - right[known]))
+        # Across a junction the line continues as it does beside it.
+        valid = np.flatnonzero(seen)
+        shift = np.interp(np.arange(len(line)), valid, 0.5 * (left[valid] - right[valid]))
         shift = np.clip(shift, -self.lattice.pitch, self.lattice.pitch)
         for end in (0, 1):
             if chain.joined[end] and not chain.closed:
@@ -209,7 +201,7 @@ class Field:
     def _find_line_ends(self, line: Floats, half: float) -> Floats:
         """Return a line that ends, with its last point, where its spine ends; it may be longer or shorter."""
         pitch = self.lattice.pitch
-        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        run = measure_run(line)
         # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight on there.
         around = line[-1] + (half + pitch) * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         at_edge = bool(np.isnan(self.lattice.at(self.off, around)).any())
@@ -217,59 +209,53 @@ class Field:
         kept = run <= run[-1] - (aside_at_end if run[-1] > 4.0 * half else 0.0)
         line, run = line[kept], run[kept]
         back = max(0.0, run[-1] - max(2.0 * half, 2.0 * pitch))
-        from_there = np.array([np.interp(back, run, axis) for axis in line.T])
-        direction = (line[-1] - from_there) / max(float(np.hypot(*(line[-1] - from_there))), 1e-12)
+        leg = line[-1] - place_along(np.array([back]), run, line)[0]
+        direction = leg / max(float(np.hypot(*leg)), 1e-12)
         longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * direction
         path = np.concatenate([line, line[-1] + longer])
         fine = space_evenly(path, pitch / 4.0)
         if fine is None:  # a line of a pitch that comes back to where it began
             return line[:1]
-        known = self.lattice.at(self.off, fine)
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
-        beyond = np.flatnonzero(np.isnan(known))
-        last = int(beyond[0]) if len(beyond) else len(known)
+        off, along = self.lattice.at(self.off, fine), measure_run(fine)
+        beyond = np.flatnonzero(np.isnan(off))
+        last = int(beyond[0]) if len(beyond) else len(off)
         end = float(run[-1])
         for _ in range(ROUNDS_AT_END):
             near = (along[:last] >= end - max(0.5 * half, pitch)) & (along[:last] <= end)
             if not near.any():
                 break
-            level = float(known[:last][near].mean())
-            start = int(np.flatnonzero(near)[0])
-            fallen_to = np.minimum.accumulate(known[start:last])
-            again = (fallen_to < FALLEN * level) & (known[start:last] > fallen_to + LEVEL * level)
-            low = np.flatnonzero((known[start:last] < 0.5 * level) | again)
+            level = float(off[:last][near].mean())
+            start, at = np.flatnonzero(near)[[0, -1]].tolist()
+            lowest = np.minimum.accumulate(off[start:last])
+            again = (lowest < FALLEN * level) & (off[start:last] > lowest + LEVEL * level)
+            low = np.flatnonzero((off[start:last] < 0.5 * level) | again)
             if not len(low):
-                end = float(along[last - 1])  # the feature goes on beyond the bed
+                end = float(along[last - 1])  # the feature continues beyond the bed
                 break
             k = start + int(low[0])
             if again[k - start]:
-                k = start + int(np.argmin(known[start : k + 1]))
-            over, under = known[k - 1] - 0.5 * level, known[k] - 0.5 * level
+                k = start + int(np.argmin(off[start : k + 1]))
+            over, under = off[k - 1] - 0.5 * level, off[k] - 0.5 * level
             share = over / (over - under) if k > start and under < 0.0 else 1.0
             fallen = along[k - 1] + (along[k] - along[k - 1]) * share
-            at = int(np.flatnonzero(near)[-1])
-            aside = np.array([[-direction[1], direction[0]]])
-            sides = [
-                float(self.falls(fine[at : at + 1], s * aside, np.array([0.5 * level]))[0])
-                for s in (1.0, -1.0)
-            ]
-            wide = 0.5 * sum(sides) if np.isfinite(sides).all() else min(min(sides), half)
+            aside = np.array([-direction[1], direction[0]])
+            sides = self.falls(fine[[at, at]], np.stack([aside, -aside]), np.full(2, 0.5 * level))
+            wide = 0.5 * float(sides.sum()) if np.isfinite(sides).all() else min(float(sides.min()), half)
             end = float(fallen) - min(wide, WIDE * half)
         if end <= 0.0:
             return line[:1]
         kept = along < end - 0.25 * pitch
-        tip = np.array([np.interp(end, along, axis) for axis in fine.T])
-        whole = space_evenly(np.concatenate([fine[kept], tip[None]]), pitch)
+        tip = place_along(np.array([end]), along, fine)
+        whole = space_evenly(np.concatenate([fine[kept], tip]), pitch)
         return line[:1] if whole is None else whole
 
 
 def space_evenly(points: Floats, step: float) -> Floats | None:
     """Return points along a line at even steps, `step` apart at most; none of a line without length."""
-    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    run = measure_run(points)
     if run[-1] < 1e-9:
         return None
-    at = np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step)) + 1))
-    return np.column_stack([np.interp(at, run, axis) for axis in points.T])
+    return place_along(np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step)) + 1)), run, points)
 
 
 def _straight(leg: Floats) -> tuple[Floats, Floats]:
@@ -285,20 +271,16 @@ def _turns(line: Floats, width: int, closed: bool) -> Floats:
     before, after = at - width, at + width
     before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
     one, two = line - line[before], line[after] - line
-    turn: Floats = np.abs(
-        np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], np.sum(one * two, axis=1))
-    )
-    return turn
+    sine = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    return np.asarray(np.abs(np.arctan2(sine, np.sum(one * two, axis=1))))
 
 
 def smooth(line: Floats, times: int, closed: bool) -> Floats:
-    """Return a line without its staircase; ends stay.
-
-    Each point goes towards the middle of those beside it and a little further back again, so that an arc does
-    not shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
-    """
+    """Return a line without its staircase; ends stay."""
     if len(line) < 4:
         return line
+    # A step towards the mean of the neighbors and a little further back again, so that an arc does not
+    # shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
     for share in TO_AND_FRO * times:
         pull = np.zeros_like(line)
         pull[1:-1] = 0.5 * (line[:-2] + line[2:]) - line[1:-1]
@@ -373,13 +355,13 @@ def find_ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least
     position = lattice.formed.position[pins]
     field = Field(lattice, own, height, 2.0 * (measure_half_width(among, on_bed) + 2.0) * lattice.pitch)
     half = field.half_widths(position[line])
-    found = find_chains(among, line, position, half, lattice.pitch, field.at) if len(line) > 1 else []
-    if not found:  # a single pin, or a ring of three
+    chains = find_chains(among, line, position, half, lattice.pitch, field.at) if len(line) > 1 else []
+    if not chains:  # a single pin, or a ring of three
         return (Ridge((), position[line], float(half.max())),)
     usual = float(np.median(half))
     pieces = [
         piece
-        for chain in found
+        for chain in chains
         for piece in _parted(chain, field, usual, least)
         if piece is chain or not any(piece.joined) or reaches_out(piece.points, usual, lattice.pitch)
     ]
@@ -417,7 +399,7 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
         return _parted(Chain(opened, False, (False, False), chain.nodes), field, half, least)
     before, after = np.maximum.accumulate(off), np.maximum.accumulate(off[::-1])[::-1]
     banks = np.minimum(before, after)
-    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    run = measure_run(points)
     for at in np.argsort(off / np.maximum(banks, 1e-12)).tolist():
         if off[at] >= SADDLE * banks[at]:
             return [chain]
@@ -425,9 +407,8 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
         if banks[at] - off[at] >= least and run[last] - run[first] <= NOTCH * half and 0 < at < len(off) - 1:
             first, last = find_stretch(off < SADDLE * banks[at], at)
             one = replace(chain, points=points[: max(first, 1)], joined=(chain.joined[0], False))
-            two = replace(
-                chain, points=points[min(last + 1, len(off) - 1) :], joined=(False, chain.joined[1])
-            )
+            rest = points[min(last + 1, len(off) - 1) :]
+            two = replace(chain, points=rest, joined=(False, chain.joined[1]))
             return [*_parted(one, field, half, least), *_parted(two, field, half, least)]
     return [chain]
 
@@ -435,17 +416,13 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
 def _meet(pieces: list[Chain], lines: list[Floats | None], field: Field) -> None:
     """Let lines that end at a junction end on another line there, in place."""
     for number, piece in enumerate(pieces):
-        for end in (0, -1):
+        for end, way in ((0, -1), (-1, 1)):
             mine = lines[number]
             if mine is None or piece.closed or not piece.joined[end]:
                 continue
-            others = [
-                line
-                for k, line in enumerate(lines)
-                if k != number and line is not None and pieces[k].nodes & piece.nodes
-            ]
-            turned = field.extend(mine[::-1] if end == 0 else mine, field.half_width(mine, False), others)
-            lines[number] = turned[::-1] if end == 0 else turned
+            met = [k for k, other in enumerate(pieces) if k != number and other.nodes & piece.nodes]
+            others = [line for k in met if (line := lines[k]) is not None]
+            lines[number] = field.extend(mine[::way], field.half_width(mine, False), others)[::way]
 
 
 def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
+from .crest_network import find_stretch, measure_run
 from .crests import Crest, Ridge, find_ridges
 from .formed import Lattice
 from .regions import Region, cut, divide, label_components
@@ -54,10 +55,7 @@ class FeaturePart:
 
 
 def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
-    """Return the parts of a ridge: itself, and the mounds on it.
-
-    `least`: a mound rises above the ridge by this at least, m.
-    """
+    """Return the parts of a ridge: itself, and the mounds on it that rise by `least`, m, or more."""
     crests, cores = [], []
     mounds: list[tuple[Floats, float]] = []
     for crest in ridge.crests:
@@ -72,7 +70,7 @@ def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
                 top = (first + last) // 2
             middle = crest.points[top, :2]
             away = float(np.hypot(*(crest.points[[first, last], :2] - middle).T).max())
-            if all(np.hypot(*(middle - known)) > max(away, radius) for known, radius in mounds):
+            if all(np.hypot(*(middle - other)) > max(away, radius) for other, radius in mounds):
                 mounds.append((middle, away))
         cores.append(crest.points[on_ridge, :2])
     if not mounds:
@@ -83,24 +81,19 @@ def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
 
 
 def measure_distances(places: Floats, every: tuple[FeaturePart, ...] | list[FeaturePart]) -> Floats:
-    """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k).
-
-    `places` (k, 2), m.
-    """
-    found = np.empty((len(every), len(places)))
+    """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k)."""
+    away = np.empty((len(every), len(places)))
     for number, part in enumerate(every):
         rows = max(1, CHUNK // len(part.core))
         for start in range(0, len(places), rows):
-            some = places[start : start + rows, None] - part.core
-            found[number, start : start + rows] = (
-                np.hypot(some[..., 0], some[..., 1]).min(axis=1) - part.reach
-            )
-    return found
+            x, y = np.moveaxis(places[start : start + rows, None] - part.core, -1, 0)
+            away[number, start : start + rows] = np.hypot(x, y).min(axis=1) - part.reach
+    return away
 
 
 def _strip_branches(crest: Crest, least: float) -> tuple[Crest, list[tuple[int, int]]]:
     """Return a crest without the mounds on it, and the first and last points of each of them."""
-    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(crest.points[:, :2], axis=0).T))])
+    run = measure_run(crest.points[:, :2])
     line = _line(run, crest.off, crest.closed)
     if line is None:
         return crest, []
@@ -111,11 +104,7 @@ def _strip_branches(crest: Crest, least: float) -> tuple[Crest, list[tuple[int, 
         top = int(np.argmax(np.where(untried, excess, -np.inf)))
         if excess[top] < max(RISES * line[top], least):
             break
-        first = last = top
-        while first > 0 and excess[first - 1] > FOOT * excess[top]:
-            first -= 1
-        while last < len(run) - 1 and excess[last + 1] > FOOT * excess[top]:
-            last += 1
+        first, last = find_stretch(excess > FOOT * excess[top], top)
         untried[first : last + 1] = False
         if max(run[last] - run[top], run[top] - run[first]) > COMPACT * crest.half:
             continue
@@ -159,8 +148,7 @@ def _line(run: Floats, off: Floats, closed: bool) -> Floats | None:
     if not allowed.any():
         return None
     best = int(np.argmin(np.where(allowed, keeps, np.inf)))
-    whole: Floats = height[i[best]] + slope[best] * (run - at[i[best]])
-    return whole
+    return np.asarray(height[i[best]] + slope[best] * (run - at[i[best]]))
 
 
 Indices = NDArray[np.int32]
@@ -260,18 +248,16 @@ class Feature:
 
 
 def find(grid: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
-    """Return the features of a skin: bosses, then creases, the largest of each first.
-
-    Points belong together that the skin's triangles join; so two bosses that only touch at
-    the threshold are two. What a saddle parts, and a mound that stands on a ridge, is a feature by itself.
-    """
+    """Return the features of a skin: bosses, then creases, the largest of each first."""
+    # Points belong together that the skin's triangles join: two bosses that only touch at the threshold are
+    # two. What a saddle parts, and a mound that stands on a ridge, is a feature by itself.
     finding = finding or Finding()
     lattice = Lattice.of(grid.formed)
-    found = []
+    features = []
     for kind, sign in (("boss", 1.0), ("crease", -1.0)):
-        some = sorted(_of_kind(grid, finding, lattice, kind, sign), key=lambda one: -one.volume)
-        found += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
-    return found
+        some = sorted(_of_kind(grid, finding, lattice, kind, sign), key=lambda feature: -feature.volume)
+        features += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
+    return features
 
 
 def _of_kind(
@@ -305,10 +291,7 @@ def _of_kind(
 def _shared_out(
     grid: SurfaceGrid, every: list[FeaturePart], pins: NDArray[np.int64], region: Region, smallest: int
 ) -> Iterator[tuple[FeaturePart, NDArray[np.int64], Region, Region]]:
-    """Give each part its pins, its piece of a region, and this apart from the others.
-
-    A part with too few pins goes to those beside it.
-    """
+    """Give each part with pins enough its pins, its piece of a region, and this apart from the others."""
     place = grid.formed.position[pins]
     while len(every) > 1:
         owner = np.argmin(measure_distances(place, every), axis=0)
@@ -331,8 +314,7 @@ def _shared_out(
 def _nearer(region: Region, every: list[FeaturePart]) -> Floats:
     """Return how much nearer the points of a region are to the last part than to the others, m, (k,)."""
     away = measure_distances(region.position, every)
-    nearer: Floats = away[:-1].min(axis=0) - away[-1]
-    return nearer
+    return np.asarray(away[:-1].min(axis=0) - away[-1])
 
 
 def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
@@ -344,7 +326,7 @@ def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
 
 
 def make_table(features: list[Feature]) -> list[tuple[str, ...]]:
-    """Return what a person reads: a head, and a row of texts a feature, in mm."""
+    """Return a table for a person: a head, and a row of texts a feature, in mm."""
     head = ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
     rows = [
         (
@@ -358,7 +340,6 @@ def make_table(features: list[Feature]) -> list[tuple[str, ...]]:
 
 def summarize(features: list[Feature]) -> str:
     """Return how many there are in a few words."""
-    counts = [(sum(one.kind == kind for one in features), kind) for kind in ("boss", "crease")]
-    return " and ".join(
-        f"{n} {kind}{'' if n == 1 else 'es' if kind == 'boss' else 's'}" for n, kind in counts
-    )
+    kinds = (("boss", "bosses"), ("crease", "creases"))
+    counts = [(sum(feature.kind == kind for feature in features), kind, plural) for kind, plural in kinds]
+    return " and ".join(f"{count} {kind if count == 1 else plural}" for count, kind, plural in counts)

@@ -53,11 +53,7 @@ class Formed:
     def of(
         cls, position: ArrayLike, height: ArrayLike, former: ArrayLike, force: ArrayLike, mode: ArrayLike
     ) -> Formed:
-        """Check and take the arrays.
-
-        `position` (n, 2), axes of the pins, row by row, m; `height` (n,), pin tops, m; `former` (n,), the
-        same before the surface was formed, m; `force` (n,), N; `mode` int (n,), codes of `modes.Mode`.
-        """
+        """Check the arrays; one number will do for `former`, `force` and `mode`."""
         rows, columns = find_grid_shape(position)
         place, top = check_heights(position, height, rows, columns)
         _, before = check_heights(place, np.broadcast_to(former, top.shape), rows, columns, "former")
@@ -86,13 +82,10 @@ class Formed:
         """Return the pin in the nearest row that is nearest to each of some places, m, shape (k, 2)."""
         across = self.position[self.columns, 1] - self.position[0, 1]
         along = self.position[1, 0] - self.position[0, 0]
-        row = np.clip(np.rint((place[:, 1] - self.position[0, 1]) / across), 0, self.rows - 1).astype(
-            np.int64
-        )
+        row = np.rint((place[:, 1] - self.position[0, 1]) / across).clip(0, self.rows - 1).astype(np.int64)
         first = self.position[row * self.columns, 0]
-        column = np.clip(np.rint((place[:, 0] - first) / along), 0, self.columns - 1).astype(np.int64)
-        pins: NDArray[np.int64] = row * self.columns + column
-        return pins
+        column = np.rint((place[:, 0] - first) / along).clip(0, self.columns - 1).astype(np.int64)
+        return np.asarray(row * self.columns + column)
 
     @property
     def raised(self) -> Floats:
@@ -101,12 +94,7 @@ class Formed:
 
 
 def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
-    """Return one row of a history as a formed surface.
-
-    `history`: `position`, `height`, `force` and `mode` as in ``history.npz``; `row`: negative rows count from
-    the last one; `former`: the row that tells what was before (an int), or one height of all pins, m (a
-    float). Raises OutputError when the history has no such row. Raises ParameterError as `Formed`.
-    """
+    """Return a row of a history as a formed surface; `former`: a row (int), or one height, m (float)."""
     count = len(history["height"])
     for name, wanted in (("row", row), ("former", former)):
         if isinstance(wanted, int) and not -count <= wanted < count:
@@ -151,10 +139,7 @@ class Lattice:
         return 0.5 * (self.formed.pitch + self.formed.row_spacing)
 
     def at(self, values: Floats, position: Floats) -> Floats:
-        """Return what has a value at each pin, (n,), at places (..., 2), m; NaN beyond the bed.
-
-        It is straight along each row, and then between two rows.
-        """
+        """Return values (n,) at places (..., 2), m: linear along rows, then across; NaN off the bed."""
         bed = self.formed
         first = bed.position[:: bed.columns]
         along = bed.position[1, 0] - bed.position[0, 0]
@@ -173,22 +158,18 @@ class Lattice:
         on_bed = (row >= -slack) & (row <= bed.rows - 1 + slack)
         on_bed &= (across >= -slack) & (across <= bed.columns - 1 + slack)
         share = np.clip(up, 0.0, 1.0)
-        found: Floats = np.where(on_bed, parts[0] * (1.0 - share) + parts[1] * share, np.nan)
-        return found
+        return np.where(on_bed, parts[0] * (1.0 - share) + parts[1] * share, np.nan)
 
 
 def measure_distance(
     lattice: Lattice, values: Floats, position: Floats, direction: Floats, level: Floats, most: float
 ) -> Floats:
-    """Return how far it is, m, from places (k, 2) along unit vectors to where values (n,) fall to levels.
-
-    Infinite where they stay above their level (k,), as far as the bed or `most`, m, reaches.
-    """
+    """Return distances (k,), m, along unit vectors to where values (n,) fall to levels; inf beyond `most`."""
     step = lattice.pitch / STEPS
     steps = np.arange(1, int(np.ceil(most / step)) + 1) * step
-    found = np.full(len(position), np.inf)
-    for start in range(0, len(position), max(1, CHUNK // len(steps))):
-        part = slice(start, start + max(1, CHUNK // len(steps)))
+    distance, rows = np.full(len(position), np.inf), max(1, CHUNK // len(steps))
+    for start in range(0, len(position), rows):
+        part = slice(start, start + rows)
         here = position[part, None] + steps[:, None] * direction[part, None]
         above = np.column_stack([lattice.at(values, position[part]), lattice.at(values, here)])
         above -= level[part, None]
@@ -200,8 +181,8 @@ def measure_distance(
             reached = np.where(first > 0, step * (first - 1 + over / (over - under)), 0.0)
         ended = np.isnan(above).argmax(axis=1)
         out = np.isnan(above).any(axis=1) & (ended < first)
-        found[part] = np.where(falls.any(axis=1) & ~out, reached, np.inf)
-    return found
+        distance[part] = np.where(falls.any(axis=1) & ~out, reached, np.inf)
+    return distance
 
 
 Indices = NDArray[np.int32]
@@ -225,7 +206,7 @@ class Body:
     faces : ndarray of int (f, 3)
         Counter-clockwise seen from outside.
     values : mapping of str to ndarray (v,)
-        What a vertex knows besides its place: nothing, or height, m, force, N, and code of the control mode.
+        Nothing, or height, m, force, N, and code of the control mode of each vertex.
     groups : tuple of str
         Names of groups of faces, such as features.
     group : ndarray of int (f,)

@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..model.layout import list_steps
 from .formed import Formed
-from .skin_mesh import BASE_THICKNESS, find_base_level
+from .skin_mesh import BASE_THICKNESS, find_base_level, take_corners
 
 Indices = NDArray[np.int32]
 Codes = NDArray[np.int64]
 
 #: Half the width of a bridge, in pitches along x and rows along y.
 BRIDGE = 0.05
-#: Who is beyond the edge of the bed.
-NOBODY = -1
 #: Heights above the base are taken to the nearest multiple of this, m: a wall lower than a file's float32
 #: can hold would have no area there.
 STEP = 1e-7
@@ -67,18 +65,13 @@ def make_parts(formed: Formed) -> Parts:
     order = np.argsort(sides)
     found = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
     twin = order[found]
-    return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, NOBODY))
+    return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, -1))
 
 
 def make_pins_solid(
     formed: Formed, base: float | None = None, base_thickness: float = BASE_THICKNESS
 ) -> tuple[Floats, Indices, Codes]:
-    """Return the stepped bed, closed.
-
-    `base`, `base_thickness`: as for `skin_mesh.make_solid`. Returns `vertices` (v, 3), m; first the middle of
-    each pin's top in their order, to 0.1 µm; `faces` int (f, 3), Counter-clockwise seen from outside; `pin`
-    int (f,), whose top, wall or underside a face is.
-    """
+    """Return vertices (v, 3), m, first the middles of tops, faces (f, 3) and their pins of the closed bed."""
     level = find_base_level(formed.height, base=base, base_thickness=base_thickness)
     steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
     height = level + steps * STEP
@@ -94,8 +87,8 @@ def make_pins_solid(
     below = np.column_stack([formed.position, np.full(n, level)])
     vertices = np.concatenate([middle, below, np.column_stack([made.corner[at], level + up * STEP])])
     ahead = own[_following(made.pin)]
-    top = np.stack([made.pin, own, ahead], axis=1).astype(np.int32)
-    bottom = np.stack([made.pin + n, ground[made.end], ground[made.start]], axis=1).astype(np.int32)
+    top = np.column_stack([made.pin, own, ahead]).astype(np.int32)
+    bottom = np.column_stack([made.pin + n, ground[made.end], ground[made.start]]).astype(np.int32)
     walls, whose = _walls(made, steps, own, ahead, ground)
     return vertices, np.concatenate([top, bottom, walls]), np.concatenate([made.pin, made.pin, whose])
 
@@ -109,11 +102,8 @@ def _following(pin: Codes) -> Codes:
 
 
 def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -> tuple[Indices, Codes]:
-    """Return the triangles of the walls a part has above its neighbors, and whose they are.
-
-    The vertices of a corner have numbers in the order of their heights, so that those between the
-    neighbor's height and one's own stand in line.
-    """
+    """Return the triangles of the walls a part has above its neighbors, and their pins."""
+    # The vertices of a corner are numbered in the order of their heights: a wall uses consecutive ones.
     other = np.where(made.twin >= 0, steps[made.pin[made.twin]], 0)
     side = np.flatnonzero(steps[made.pin] > other)
     twin = made.twin[side]
@@ -121,9 +111,9 @@ def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -
     left = np.where(twin >= 0, ahead[twin], ground[made.start[side]])
     right = np.where(twin >= 0, own[twin], ground[made.end[side]])
     i, step = _counted(own[side] - left)
-    one = np.stack([left[i] + step, right[i], left[i] + step + 1], axis=1).astype(np.int32)
+    one = np.column_stack([left[i] + step, right[i], left[i] + step + 1]).astype(np.int32)
     j, step = _counted(ahead[side] - right)
-    two = np.stack([right[j] + step, right[j] + step + 1, own[side][j]], axis=1).astype(np.int32)
+    two = np.column_stack([right[j] + step, right[j] + step + 1, own[side][j]]).astype(np.int32)
     return np.concatenate([one, two]), made.pin[side][np.concatenate([i, j])]
 
 
@@ -143,7 +133,7 @@ def _squares(formed: Formed) -> tuple[Floats, Codes]:
     y = place[0, 0, 1] + step_y * (np.arange(rows + 1) - 0.5)
     corner = np.stack(np.meshgrid(x, y), axis=-1)
     top = formed.height.reshape(rows, columns)
-    a, b, c, d = top[:-1, :-1], top[:-1, 1:], top[1:, 1:], top[1:, :-1]
+    a, b, c, d = take_corners(top)
     ac = np.minimum(a, c) > np.maximum(b, d)
     bd = np.minimum(b, d) > np.maximum(a, c)
     apart = np.zeros((rows + 1, columns + 1), bool)
@@ -156,18 +146,15 @@ def _squares(formed: Formed) -> tuple[Floats, Codes]:
     upper = np.where(apart, apart.size + np.cumsum(apart.ravel()).reshape(apart.shape) - 1, lower)
     corners = np.concatenate([(corner + away).reshape(-1, 2), (corner - away)[apart]])
     joined_ac, joined_bd = lean > 0.0, lean < 0.0
-    # What a, b, c and d have of the meeting, in the order of their loops.
-    of_a = lower, np.where(joined_ac, upper, lower)
-    of_b = np.where(joined_bd, upper, lower), lower
-    of_c = upper, np.where(joined_ac, lower, upper)
-    of_d = np.where(joined_bd, lower, upper), upper
-    loops = np.stack(
-        [
-            *(one[:-1, :-1] for one in of_c), *(one[:-1, 1:] for one in of_d),
-            *(one[1:, 1:] for one in of_a), *(one[1:, :-1] for one in of_b),
-        ],
-        axis=-1,
-    ).reshape(rows * columns, 8)  # fmt: skip
+    # Two corners a part has where four meet, by its place among them, in the order of its loop.
+    corners_at = (
+        (upper, np.where(joined_ac, lower, upper)),
+        (np.where(joined_bd, lower, upper), upper),
+        (lower, np.where(joined_ac, upper, lower)),
+        (np.where(joined_bd, upper, lower), lower),
+    )
+    loop = [take_corners(table)[place] for place, pair in enumerate(corners_at) for table in pair]
+    loops = np.stack(loop, axis=-1).reshape(rows * columns, 8)
     return corners, loops if step_x * step_y > 0.0 else loops[:, ::-1]
 
 

@@ -19,15 +19,10 @@ PARALLEL = 1e-200
 
 
 def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
-    """Return the ray through a place of a picture, in double precision throughout.
+    """Return origin and unit direction (3,) of the ray through a place of a picture, `screen` (2,), -1 to 1.
 
-    Blender's own function takes the difference of two places near the eye in single precision,
-    and is off by up to a pixel.
-
-    `lens` (4, 4), from the camera's space to the picture's, with perspective or without; `seen` (4, 4), from
-    the wanted space to the camera's, which looks along -z; `screen` (2,), the place: -1 to 1 from left to
-    right and from below to above. Returns `origin`, `direction` (3,), in the wanted space and its unit; the
-    direction has length 1.
+    `lens` (4, 4), from the camera's space to the picture's; `seen` (4, 4), from the wanted space to the
+    camera's, which looks along -z. Blender's own function has single precision: it is off by up to a pixel.
     """
     across = np.array([lens[0, 0], lens[1, 1]])
     if lens[3, 2]:
@@ -40,12 +35,7 @@ def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats
 
 
 def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:
-    """Return where a ray first meets the pins, taken as flat tops that leave no gaps.
-
-    `height` (n,), heights of the pin tops, m; `origin`, `direction` (3,), of the ray, in the bed's space, m;
-    the direction may have any length. Returns (3,), a point on a top, exact, or on the side of a pin, to a
-    quarter of a pitch; None when the ray passes by the bed or is no ray at all.
-    """
+    """Return where a ray meets flat tops (n,) without gaps, (3,), m: on a top exactly, or on a pin's side."""
     if not (np.isfinite(origin).all() and np.isfinite(direction).all() and direction.any()):
         return None
     direction = direction / np.abs(direction).max()
@@ -70,8 +60,7 @@ def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Flo
     if at == 0:
         return start
     onto = (tops[at] - origin[2]) / direction[2] if direction[2] else -math.inf
-    found: Floats = origin + onto * direction if times[at - 1] <= onto <= times[at] else start
-    return found
+    return np.asarray(origin + onto * direction if times[at - 1] <= onto <= times[at] else start)
 
 
 def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tuple[float, float]:
@@ -88,10 +77,7 @@ def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tup
 
 
 def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
-    """Return the mean height of the pins within a radius of a place, m; without any, that of the nearest.
-
-    `height` (n,), heights of the pin tops, m; `x`, `y`, `radius`, m.
-    """
+    """Return the mean height of the pins within a radius of a place, m; without any, that of the nearest."""
     cells = grid.disc(x, y, radius)
     if not cells.size:
         cells = grid.at(np.array([x]), np.array([y]))
@@ -99,13 +85,9 @@ def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: f
 
 
 def find_contact_outline(finger: Fingertip, turn: Floats, depth: float, count: int = 48) -> Floats:
-    """Return the outline of what of a finger is less than a depth above its lowest point.
+    """Return the outline of the fingertip (count, 2), m, a depth, m, above its lowest point, the origin.
 
-    It is where the finger touches a plane it is pressed into so deep.
-
-    `turn` (4,), its orientation, quaternion w, x, y, z; `depth`: m; beyond the middle of the finger its
-    widest section stays the outline; `count`: number of points. Returns (count, 2), Counter-clockwise, m; the
-    lowest point is the origin.
+    `turn` (4,): its orientation, quaternion w, x, y, z; above its middle the widest section is the outline.
     """
     rotation = make_matrices(np.asarray(turn, np.float64)[None])[0]
     axes = np.array([finger.length, finger.width, finger.height])

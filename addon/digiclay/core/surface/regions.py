@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
+from .skin_mesh import measure_areas
 
 Indices = NDArray[np.int32]
 
@@ -40,9 +41,7 @@ class Region:
     @property
     def _plan(self) -> Floats:
         """Area of each triangle in plan, m²."""
-        a, b, c = (self.position[self.faces[:, k]] for k in range(3))
-        area: Floats = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-        return area
+        return measure_areas(self.position, self.faces)
 
     @property
     def area(self) -> float:
@@ -57,10 +56,8 @@ class Region:
     def outline(self) -> Indices:
         """Return the edges that bound the region, shape (e, 2), its inside to their left."""
         edges = self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-        size = len(self.position)
-        back = edges[:, 1] * size + edges[:, 0]
-        alone = ~np.isin(edges[:, 0] * size + edges[:, 1], back)
-        return edges[alone].astype(np.int32)
+        there, back = edges @ [len(self.position), 1], edges @ [1, len(self.position)]
+        return edges[~np.isin(there, back)].astype(np.int32)
 
 
 def label_components(count: int, edges: Indices) -> Indices:
@@ -83,26 +80,20 @@ def cut(position: Floats, former: Floats, off: Floats, faces: Indices, threshold
 
 
 def divide(region: Region, nearer: Floats, gap: float = 0.0) -> tuple[Region | None, Region | None]:
-    """Return the parts of a region where a value at its points, (k,), is above `gap`, and below -`gap`.
-
-    Without a gap they are the region together; one may have nothing.
-    """
+    """Return the parts of a region where a value at its points, (k,), is above `gap`, and below -`gap`."""
     values = np.column_stack([region.position, region.former, region.off])
     # What is at 0 is on one side by a trifle, or triangles along the contour would be on none.
     nearer = np.where(nearer == 0.0, -np.finfo(float).tiny, nearer)
-    found: list[Region | None] = []
+    parts: list[Region | None] = []
     for side in (nearer, -nearer):
         some = region.faces[(side > gap)[region.faces].any(axis=1)]
         kept, pieces, _ = _clipped(values, some, side, gap)
-        found.append(Region(kept[:, :2], kept[:, 2], kept[:, 3], pieces) if len(some) else None)
-    return found[0], found[1]
+        parts.append(Region(kept[:, :2], kept[:, 2], kept[:, 3], pieces) if len(some) else None)
+    return parts[0], parts[1]
 
 
 def _clipped(values: Floats, faces: Indices, by: Floats, level: float) -> tuple[Floats, Indices, int]:
-    """Return what of some triangles lies where a value at their corners is above a level.
-
-    After the values at its points and its faces: how many of the points, the first, are corners.
-    """
+    """Return points and faces where a value is above a level, and how many of the points are corners."""
     inside = by > level
     count = inside[faces].sum(axis=1)
     pieces = [faces[count == 3].astype(np.int64)]
@@ -114,10 +105,10 @@ def _clipped(values: Floats, faces: Indices, by: Floats, level: float) -> tuple[
         odd = np.argmax(inside[some] == (wanted == 1), axis=1)
         a, b, c = (some[np.arange(len(some)), (odd + k) % 3] for k in range(3))
         if wanted == 1:
-            pieces.append(np.stack([a, m + a * m + b, m + a * m + c], axis=1))
+            pieces.append(np.column_stack([a, m + a * m + b, m + a * m + c]))
         else:
             ba, ca = m + b * m + a, m + c * m + a
-            pieces += [np.stack([ba, b, c], axis=1), np.stack([ba, c, ca], axis=1)]
+            pieces += [np.column_stack([ba, b, c]), np.column_stack([ba, c, ca])]
     names, numbers = np.unique(np.concatenate(pieces), return_inverse=True)
     whole = names[names < m]
     i, j = np.divmod(names[names >= m] - m, m)

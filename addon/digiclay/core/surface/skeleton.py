@@ -1,9 +1,11 @@
 """Skeleton of a feature: the pins that remain when it is thinned from its lowest pin upwards.
 
-A pin is taken off as long as that neither parts what is left nor opens a hole in it, the lowest first, on
-whatever side it stands; one at the end of a line stays. What is left is one pin wide, runs along the top,
-and is joined and closed as the feature itself is. A hollow that a person sees as the inside of a ring counts
-as a hole, even where its bottom belongs to the feature: it is opened first.
+A pin is removed, the lowest first, if that neither parts the rest nor opens a hole in it; the end of a line
+stays. The skeleton is one pin wide, runs along the top, and is joined and closed as the feature is. A hollow
+that a person sees as the inside of a ring counts as a hole, even where its bottom belongs to the feature.
+
+Everywhere `beside` int (k, 8 or 6) is the neighbors of a feature's pins, numbered from 0, -1 where there is
+none; `on_bed` bool (k, 8 or 6) is where the bed continues; `off` (k,) are heights over the ground, m.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Flags, Floats
+from ..model.layout import SQUARE
 
 Pins = NDArray[np.int64]
 #: A hollow is a hole when it is deeper than this share of the lowest way out of it.
@@ -26,11 +29,7 @@ AHEAD = 1.25
 
 
 def measure_half_width(beside: Pins, on_bed: Flags) -> int:
-    """Return how many rings of pins can be taken off a feature, one at least; arguments as `find_skeleton`.
-
-    `beside` int (k, 8 or 6), neighbors within the feature; -1 where there is none; `on_bed` bool (k, 8 or 6),
-    where the bed goes on.
-    """
+    """Return how many rings of pins can be removed from a feature, one at least."""
     inner, count = np.ones(len(beside), bool), 0
     while inner.any():
         # Where the bed ends the feature might go on.
@@ -42,11 +41,7 @@ def measure_half_width(beside: Pins, on_bed: Flags) -> int:
 
 
 def average_neighbors(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
-    """Return heights averaged with those of the neighbors, the ground's included, some times.
-
-    `beside` int (k, 8 or 6), neighbors within the feature; -1 where there is none; `on_bed` bool (k, 8 or 6),
-    where the bed goes on; `off` (k,), heights over the ground, m.
-    """
+    """Return heights averaged with those of the neighbors, the ground's included, some times."""
     count = on_bed.sum(axis=1)
     for _ in range(times):
         heights = np.where(beside >= 0, off[beside], 0.0)
@@ -55,12 +50,7 @@ def average_neighbors(beside: Pins, on_bed: Flags, off: Floats, times: int) -> F
 
 
 def find_skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
-    """Return the pins along the top of a feature.
-
-    `beside` int (k, 8 or 6), neighbors within the feature, whose pins are numbered from 0; -1 where there is
-    none; `on_bed` bool (k, 8 or 6), where the bed goes on, within the feature or outside it; `off` (k,), how
-    far each pin is off where it was, m, positive. Returns ascending; one at least.
-    """
+    """Return the pins along the top of a feature, ascending; one at least."""
     # A flat top gets its crest in the middle when it is rounded over its own half width.
     top = average_neighbors(beside, on_bed, off, measure_half_width(beside, on_bed))
     near = average_neighbors(beside, on_bed, off, 1)
@@ -69,7 +59,7 @@ def find_skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
 
 
 def _hollows(beside: Pins, on_bed: Flags, off: Floats) -> list[int]:
-    """Return the lowest pin of each hollow that is deep enough, found by filling them up."""
+    """Return the lowest pin of each hollow that is deep enough, by filling them up."""
     inside = np.all((beside >= 0) | ~on_bed, axis=1)
     lower = np.any((beside >= 0) & (off[beside] < off[:, None]), axis=1)
     if not np.any(inside & ~lower):
@@ -122,10 +112,7 @@ def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
         if not left[pin]:
             continue
         around = neighbors[pin]
-        code = 0
-        for bit, other in enumerate(around):
-            if left[other]:
-                code |= 1 << bit
+        code = sum(1 << bit for bit, other in enumerate(around) if left[other])
         if not simple[code]:
             continue
         high = ends[code] and height[pin] >= END * max(height[other] for other in around if left[other])
@@ -140,20 +127,17 @@ def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
 
 
 def _goes_on(neighbors: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
-    """Return whether a line two pins wide goes on from a pin with two neighbors: all beyond them lies ahead.
-
-    Beside a line, what is beyond them lies along it.
-    """
-    ways = len(around)
-    steps = _STEPS[ways]
-    two = [bit for bit in range(ways) if code >> bit & 1]
-    ahead = [0.5 * (steps[two[0]][axis] + steps[two[1]][axis]) for axis in (0, 1)]
-    near = ahead[0] ** 2 + ahead[1] ** 2
+    """Return whether a line two pins wide continues from a pin with two neighbors: all beyond lies ahead."""
+    steps = _STEPS[len(around)]
+    two = [bit for bit in range(len(around)) if code >> bit & 1]
+    ahead = 0.5 * (steps[two[0]] + steps[two[1]])
+    near = ahead.real**2 + ahead.imag**2
     for bit in two:
         for turn, other in enumerate(neighbors[around[bit]]):
-            step = [steps[bit][axis] + steps[turn][axis] for axis in (0, 1)]
-            beyond = abs(step[0]) + abs(step[1]) > 1e-9 and not any(other == around[k] for k in two)
-            if beyond and left[other] and step[0] * ahead[0] + step[1] * ahead[1] < AHEAD * near:
+            step = steps[bit] + steps[turn]
+            beyond = abs(step) > 1e-9 and not any(other == around[k] for k in two)
+            # Beside a line, what is beyond the two lies along it.
+            if beyond and left[other] and step.real * ahead.real + step.imag * ahead.imag < AHEAD * near:
                 return False
     return True
 
@@ -178,7 +162,8 @@ _ENDS = {
     ]
     for ways in (6, 8)
 }
+#: Steps to the neighbors, x + i y, in pitches.
 _STEPS = {
-    6: [(math.cos(k * math.pi / 3.0), math.sin(k * math.pi / 3.0)) for k in range(6)],
-    8: [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 0.0), (-1.0, -1.0), (0.0, -1.0), (1.0, -1.0)],
+    6: [complex(math.cos(k * math.pi / 3.0), math.sin(k * math.pi / 3.0)) for k in range(6)],
+    8: [complex(column, row) for row, column in SQUARE],
 }

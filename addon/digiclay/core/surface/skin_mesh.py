@@ -15,6 +15,8 @@ solid:
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -35,11 +37,7 @@ BAND = 1 << 16
 
 
 def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
-    """Return the rows and columns of pins that are ordered row by row.
-
-    `position` (n, 2), where the pins stand, m. Returns `rows`, `columns`. Raises ParameterError when the pins
-    do not fill whole rows.
-    """
+    """Return the rows and columns of pins at positions (n, 2), m, in order, or raise ParameterError."""
     place = _pins(position)
     if not len(place):
         raise ParameterError("Surface", "position", "must hold at least one pin", "none")
@@ -52,22 +50,16 @@ def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
 
 
 def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Indices:
-    """Return the triangles over the pin tops.
-
-    `position` (n, 2), where the pins stand, m; ordered row by row; `height` (n,), heights of the pin tops, m;
-    `rows`, `columns`: pins along y and x, two of each at least; n = rows * columns. Returns int (rows - 1) or
-    (columns - 1), indices of pins, counter-clockwise seen from above. Raises ParameterError: on a single row
-    or column, arrays that do not fit, numbers that are not finite, or pins out of order.
-    """
+    """Return the triangles (f, 3) over pin tops (n,) at positions (n, 2), m, counter-clockwise from above."""
     place, top = check_heights(position, height, rows, columns)
     index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-    clockwise = _plan_area(place, index[:2, :2].ravel()[None, :3])[0] < 0.0  # a mirrored bed
+    clockwise = measure_areas(place, index[:2, :2].ravel()[None, :3])[0] < 0.0  # a mirrored bed
     faces = np.empty((rows - 1, 2 * (columns - 1), 3), np.int32)
     band = max(1, BAND // columns)
     for row in range(0, rows - 1, band):
         some = _triangles(place, top, index[row : row + band + 1])
         some = some[:, ::-1] if clockwise else some
-        if not np.all(_plan_area(place, some) > 0.0):
+        if not np.all(measure_areas(place, some) > 0.0):
             raise ParameterError("Surface", "position", "must order the pins row by row", "pins out of order")
         faces[row : row + band] = some.reshape(-1, 2 * (columns - 1), 3)
     return faces.reshape(-1, 3)
@@ -76,12 +68,9 @@ def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -
 def _triangles(place: Floats, top: Floats, index: Indices) -> Indices:
     """Return the triangles between some rows of pins, two for every four of them."""
     # The corners of each cell, around it: a and c are the ends of one diagonal, b and d of the other.
-    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    a, b, c, d = (part.ravel() for part in take_corners(index))
     along_ac = _cut_along_ac(place, top, a, b, c, d)
-    first = np.stack([a, b, np.where(along_ac, c, d)], axis=1)
-    second = np.stack([np.where(along_ac, a, b), c, d], axis=1)
-    triangles: Indices = np.stack([first, second], axis=1).reshape(-1, 3)
-    return triangles
+    return np.column_stack([a, b, np.where(along_ac, c, d), np.where(along_ac, a, b), c, d]).reshape(-1, 3)
 
 
 def make_solid(
@@ -93,19 +82,7 @@ def make_solid(
     base: float | None = None,
     base_thickness: float = BASE_THICKNESS,
 ) -> tuple[Floats, Indices]:
-    """Return the closed solid between the skin and a flat base.
-
-    Its underside has the triangles of the skin, so the outline of both is the same and
-    the side walls stand upright. It keeps the bed's coordinates: the origin is the middle
-    of the bed's floor.
-
-    `position`, `height`, `rows`, `columns`: as for `make_skin`; `base`: height of the flat base, m; 0 is the
-    bed's floor. By default `base_thickness` below the lowest pin top; `base_thickness`: material under the
-    lowest pin top, m; not used when `base` is given. Returns `vertices` (2 n, 3), m; the first n are the pin
-    tops in their order, the others the points below them; `faces` int (rows - 1) or (columns - 1) or (rows +
-    columns - 2), Counter-clockwise seen from outside: first the skin, then the base, then the walls. Raises
-    ParameterError as `make_skin`; also when the base is not below every pin top.
-    """
+    """Return vertices (2 n, 3), m, tops first, and faces of the solid over a base: skin, base, walls."""
     place, top = check_heights(position, height, rows, columns)
     level = find_base_level(top, base=base, base_thickness=base_thickness)
     over = make_skin(place, top, rows, columns)
@@ -113,8 +90,8 @@ def make_solid(
     vertices = np.empty((2 * n, 3))
     vertices[:n, :2] = vertices[n:, :2] = place
     vertices[:n, 2], vertices[n:, 2] = top, level
-    start = _outline(rows, columns)
-    if _plan_area(place, np.array([[0, 1, columns]]))[0] < 0.0:
+    start = take_outline(np.arange(n, dtype=np.int32).reshape(rows, columns))
+    if measure_areas(place, np.array([[0, 1, columns]]))[0] < 0.0:
         start = start[::-1]
     end = np.roll(start, -1)
     walls = np.stack([end, start, start + n, end, start + n, end + n], axis=1).reshape(-1, 3)
@@ -127,11 +104,7 @@ def make_solid(
 def find_base_level(
     height: ArrayLike, *, base: float | None = None, base_thickness: float = BASE_THICKNESS
 ) -> float:
-    """Return the height of the flat base, m: `base`, or `base_thickness` below the lowest pin top.
-
-    `height`: pin tops, m; `base`: m; by default `base_thickness` counts; `base_thickness`, m. Raises
-    ParameterError when the base would not be below every pin top.
-    """
+    """Return the height of the flat base, m: `base`, or `base_thickness` below the lowest of the pin tops."""
     lowest = float(np.min(height))
     if base is None:
         if not (np.isfinite(base_thickness) and base_thickness > 0.0):
@@ -158,15 +131,10 @@ def _pins(position: ArrayLike) -> Floats:
 def check_heights(
     position: ArrayLike, height: ArrayLike, rows: int, columns: int, name: str = "height"
 ) -> tuple[Floats, Floats]:
-    """Return positions and one value a pin as arrays, or refuse what cannot carry a skin.
-
-    `position` (n, 2), axes of the pins, row by row, m; `height` (n,), one value a pin; `name`: what the
-    message calls the values. Raises ParameterError.
-    """
+    """Return positions (n, 2), m, and one value a pin as arrays, or refuse what cannot carry a skin."""
     if rows < 2 or columns < 2:
-        raise ParameterError(
-            "Surface", "", "must have 2 x 2 pins at least to carry a skin", f"{rows} x {columns}"
-        )
+        rule = "must have 2 x 2 pins at least to carry a skin"
+        raise ParameterError("Surface", "", rule, f"{rows} x {columns}")
     place, top = _pins(position), np.asarray(height, dtype=np.float64)
     if top.shape != (rows * columns,) or len(place) != rows * columns:
         rule = f"must have one value for each of the {rows} x {columns} pins"
@@ -188,18 +156,20 @@ def _cut_along_ac(place: Floats, top: Floats, *corners: Indices) -> NDArray[np.b
     ac, bd = (np.sum((place[i] - place[j]) ** 2, axis=1) for i, j in ((a, c), (b, d)))
     steep_ac, steep_bd = np.abs(top[a] - top[c]), np.abs(top[b] - top[d])
     by_height = (steep_ac < steep_bd) | ((steep_ac == steep_bd) & (top[a] + top[c] >= top[b] + top[d]))
-    chosen: NDArray[np.bool_] = np.where(np.abs(ac - bd) <= SAME_LENGTH * (ac + bd), by_height, ac < bd)
-    return chosen
+    return np.where(np.abs(ac - bd) <= SAME_LENGTH * (ac + bd), by_height, ac < bd)
 
 
-def _plan_area(place: Floats, faces: Indices) -> Floats:
+def measure_areas(place: Floats, faces: Indices) -> Floats:
     """Return the area of each triangle seen from above, m²; negative when it runs clockwise."""
     a, b, c = (place[faces[:, corner]] for corner in range(3))
-    area: Floats = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    return area
+    return np.asarray(0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]))
 
 
-def _outline(rows: int, columns: int) -> Indices:
-    """Return the outer pins: along the first row, up the last column, back, and down the first."""
-    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-    return np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
+def take_corners(table: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return the four corners, around it, of each cell between the rows and columns of a table."""
+    return table[:-1, :-1], table[:-1, 1:], table[1:, 1:], table[1:, :-1]
+
+
+def take_outline(table: Indices) -> Indices:
+    """Return the outer values: along the first row, up the last column, back, and down the first."""
+    return np.concatenate([table[0, :-1], table[:-1, -1], table[-1, :0:-1], table[:0:-1, 0]])

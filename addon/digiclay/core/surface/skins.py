@@ -13,7 +13,6 @@ and harmonic, as a soap film is at small slopes, between them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -33,14 +32,7 @@ ROUNDS = 1000
 
 
 def relax_membrane(formed: Formed, position: Floats, start: Floats, parts: int, cap: float) -> Floats:
-    """Return the heights of the skin, m, shape (rows, columns) of its points.
-
-    Finite elements on the triangles of the skin; the points on a pin's end keep its height.
-
-    `formed`: the pins; `position` (rows, columns, 2), the skin's points, m; `start` (rows, columns), heights
-    to begin with, m, those of the pins at the pins; `parts`: points a pitch; `cap`: radius of a pin's flat
-    end, m.
-    """
+    """Return the heights of a membrane, m, shape of its points: finite elements from the heights `start`."""
     flat = position.reshape(-1, 2)
     height, free = _laid(formed, position, start, parts, cap)
     faces = make_skin(flat, np.zeros(len(flat)), *start.shape)
@@ -125,44 +117,30 @@ SKINS: dict[str, str] = {
 
 
 def place_points(formed: Formed, parts: int) -> Floats:
-    """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points a pitch.
-
-    `parts`: points of the skin in a pitch.
-    """
-    grid = formed.position.reshape(formed.rows, formed.columns, 2)
-    across = _linear(grid, parts)
-    fine = _linear(np.swapaxes(across, 0, 1), parts)
-    return np.swapaxes(fine, 0, 1)
+    """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points a pitch."""
+    across = _linear(formed.position.reshape(formed.rows, formed.columns, 2), parts)
+    return np.swapaxes(_linear(np.swapaxes(across, 0, 1), parts), 0, 1)
 
 
 def interpolate_skin(formed: Formed, height: Floats, skin: str, parts: int, cap: float) -> Floats:
-    """Return the heights of a skin over its points, m, row by row.
-
-    `formed`: the pins; `height` (n,), their heights to cover, m; `skin`: a key of `SKINS`; `parts`: points a
-    pitch; `cap`: radius of a pin's flat end, m; of use to the membrane only.
-    """
+    """Return the heights, m, of the points of a skin of `SKINS` over pins of heights (n,), row by row."""
     if parts == 1:
         return height
     pins = height.reshape(formed.rows, formed.columns)
-    makers: dict[str, Callable[[], Floats]] = {
-        "bilinear": lambda: _straight(formed, pins, parts),
-        "smooth": lambda: _smooth(formed, pins, parts),
-        "membrane": lambda: relax_membrane(
-            formed, place_points(formed, parts), _straight(formed, pins, parts), parts, cap
-        ),
-    }
-    return makers[skin]().ravel()
+    if skin == "smooth":
+        return _smooth(formed, pins, parts).ravel()
+    straight = _straight(formed, pins, parts)
+    if skin == "bilinear":
+        return straight.ravel()
+    return relax_membrane(formed, place_points(formed, parts), straight, parts, cap).ravel()
 
 
 def find_nearest_pin(formed: Formed, parts: int) -> NDArray[np.int32]:
-    """Return the pin whose row and column each point of a skin is nearest to, row by row.
-
-    `parts`: points of the skin in a pitch.
-    """
-    row, column = (np.arange((count - 1) * parts + 1) for count in (formed.rows, formed.columns))
-    nearest = ((row + parts // 2) // parts)[:, None] * formed.columns + (column + parts // 2) // parts
-    pins: NDArray[np.int32] = nearest.ravel().astype(np.int32)
-    return pins
+    """Return the pin whose row and column each point of a skin is nearest to, row by row."""
+    row, column = (
+        (np.arange((count - 1) * parts + 1) + parts // 2) // parts for count in (formed.rows, formed.columns)
+    )
+    return (row[:, None] * formed.columns + column).ravel().astype(np.int32)
 
 
 def _linear(values: Floats, parts: int) -> Floats:
@@ -215,14 +193,11 @@ def _smooth(formed: Formed, pins: Floats, parts: int) -> Floats:
             step = slice(start, None, 2 if formed.shift else 1)
             at_rows[step] = interpolate_monotone(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
         fine[some] = interpolate_monotone(first[:, 0, 1], at_rows, point[some, 0, 1])
-    return _held(formed, pins, point[..., 0], fine, parts) if formed.shift else fine
+    return _bound(formed, pins, point[..., 0], fine, parts) if formed.shift else fine
 
 
-def _held(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) -> Floats:
-    """Return a skin that goes no further than the pins where it lies beyond the end of a shifted row.
-
-    There its rows are continued straight, so that a tilted bed has a plane skin; `x` is that of its points.
-    """
+def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) -> Floats:
+    """Return a skin kept between the pins beyond the end of a shifted row, which is continued straight."""
     row = np.minimum(np.arange(len(fine)) // parts, formed.rows - 2)
     along = formed.position.reshape(formed.rows, formed.columns, 2)[..., 0]
     way = np.sign(along[0, 1] - along[0, 0])
@@ -282,9 +257,8 @@ class SurfaceGrid:
         return index[:: self.parts, :: self.parts].ravel()
 
     def nearest(self, of_pins: NDArray[Any]) -> NDArray[Any]:
-        """Return at each point what is known of the nearest pin."""
-        near: NDArray[Any] = of_pins[find_nearest_pin(self.formed, self.parts)]
-        return near
+        """Return at each point the value of the nearest pin."""
+        return np.asarray(of_pins[find_nearest_pin(self.formed, self.parts)])
 
     def values(self) -> dict[str, NDArray[np.float64]]:
         """Return height, force and mode at each point: force straight between pins, mode of the nearest."""
@@ -295,18 +269,13 @@ class SurfaceGrid:
     def values_with_base(self, level: float) -> dict[str, NDArray[np.float64]]:
         """Return the same, and after it that of as many points of a base: no force, and no pin's mode."""
         base = {"height": level, "force": 0.0, "mode": float(NO_PIN)}
-        count = self.height.size
         return {
-            name: np.concatenate([value, np.full(count, base[name])]) for name, value in self.values().items()
+            name: np.append(value, np.full(value.size, base[name])) for name, value in self.values().items()
         }
 
 
 def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceGrid:
-    """Return the skin over formed pins.
-
-    `skin_name`: a key of `skins.SKINS`; `parts`: points a pitch; with 1 every skin is the triangles between
-    the pins; `cap`: radius of a pin's flat end, m; of use to the membrane only.
-    """
+    """Return a skin of `SKINS` with `parts` points a pitch; `cap`: radius of a pin's flat end, m."""
     position = place_points(formed, parts)
     rows, columns = position.shape[:2]
     now, before = (
