@@ -52,10 +52,10 @@ CLASSES: tuple[type, ...] = tuple(
 #: Entries in Blender's own menus: the menu, and the function that draws the entry.
 MENUS = (
     ("VIEW3D_MT_mesh_add", add_bed.entry),
+    ("VIEW3D_MT_mesh_add", open_scene.samples_entry),
     ("TOPBAR_MT_file_import", open_scene.import_entry),
     ("TOPBAR_MT_file_export", export_mesh.entry),
     ("VIEW3D_MT_editor_menus", session_loop.leave_entry),
-    *open_scene.MENUS,
 )
 
 

@@ -1,4 +1,4 @@
-"""Common parts of the operators: polls with a reason, reported errors, ends in order, file browser."""
+"""Common parts of the operators: polls with a reason, errors, ends in order, file browser, drawing."""
 
 # No postponed annotations in this package: Blender reads an operator's properties from them.
 import traceback
@@ -6,13 +6,18 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
+from ..compat import bpy
 from ..core.base.errors import DigiclayError, one_line
 from ..ui_text import localize
+from . import status
 from .poll_messages import edited
+
+#: Functions of `poll_messages`.
+Needs = tuple[Callable[[Any], str], ...]
 
 
 def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
-    """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator unsaid."""
+    """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator silently."""
 
     @wraps(step)
     def guarded(self: Any, context: Any, event: Any) -> set[str]:
@@ -32,25 +37,28 @@ def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
 
 
 class Polled:
-    """Mixin of an operator that Blender disables while `poll_message` returns a reason.
+    """Mixin of an operator that Blender disables, with the reason, while one of its `needs` is not met.
 
-    It needs Object Mode, unless `in_any_mode` is set; `end_in_order` surrounds its `invoke` and `modal`.
+    A need is a function of `poll_messages`. All need Object Mode, unless `in_any_mode` is set.
+    `end_in_order` surrounds `invoke` and `modal`.
     """
 
     report: Any
+    properties: Any
     poll_message_set: Any
+    needs: Needs = ()
     in_any_mode = False
 
-    def __init_subclass__(cls, **known: Any) -> None:
+    def __init_subclass__(cls, **options: Any) -> None:
         """Surround what Blender calls with an event."""
-        super().__init_subclass__(**known)
+        super().__init_subclass__(**options)
         for name in {"invoke", "modal"} & vars(cls).keys():
             setattr(cls, name, end_in_order(vars(cls)[name]))
 
     @classmethod
     def poll_message(cls, context: Any) -> str:
-        """Return what stands against running now, or an empty text."""
-        return ""
+        """Return the first reason against running now, or an empty text."""
+        return next(filter(None, (need(context) for need in cls.needs)), "")
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -61,7 +69,7 @@ class Polled:
         return not message
 
     def cancel(self, context: Any) -> None:
-        """Give back what the operator has taken of Blender; a modal one has something to give."""
+        """Give back what a modal operator has taken of Blender, which ends it, say to load a file."""
 
     def give_up(self, context: Any, words: str) -> None:
         """End after an error in the modal part, which the words tell."""
@@ -91,3 +99,39 @@ class FileAction(Action):
         """Open the file browser."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
+
+
+class Drawing(Polled):
+    """Mixin of a modal operator that draws in the view in which it was called."""
+
+    def draw_view(self, area: Any) -> None:
+        """Draw, in each region of each view; `area` is the one in which the operator was called."""
+        raise NotImplementedError
+
+    def begin(self, context: Any) -> set[str]:
+        """Become modal, and draw from now on."""
+        self.region = context.region
+        self.handler = bpy.types.SpaceView3D.draw_handler_add(
+            self.draw_view, (context.area,), "WINDOW", "POST_PIXEL"
+        )
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def end(self, context: Any, *result: str) -> set[str]:
+        """Give back status bar and view; return the result."""
+        status.clear()
+        if self.handler is not None:
+            bpy.types.SpaceView3D.draw_handler_remove(self.handler, "WINDOW")
+            self.handler = None
+        for area in context.screen.areas if context.screen else ():
+            area.tag_redraw()
+        return set(result)
+
+    def cancel(self, context: Any) -> None:
+        self.end(context)
+
+
+def millimeters(name: str, default: float, words: str, **limits: Any) -> Any:
+    """Declare a length with a default in m as a property in mm."""
+    limits = {"precision": 2, "step": 10} | limits
+    return bpy.props.FloatProperty(name=f"{name} (mm)", description=words, default=1e3 * default, **limits)

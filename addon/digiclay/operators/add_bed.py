@@ -1,6 +1,7 @@
 """Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip; Rebuild: a bed from its settings."""
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 from .. import bridge, preferences
@@ -11,23 +12,22 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
 from ..device import palettes, view
 from ..device.instant import Instant, find_ellipsoid
-from ..device.view import bed_of
 from ..live import bed_state, running
 from ..press.free_place import find_free_place
-from ..roles import BALL, FINGER
+from ..roles import BALL, FINGER, HOUSING, ROLE, bed_of, fingertip_of
 from ..settings import own_presets, properties
 from ..settings.declared import title
 from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
 from ..settings.groups import PRESET_WORDS, method_items
-from ..settings.shown_units import SHOWN, to_si
+from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action
-from .poll_messages import baked, edited, no_bed, session_runs
+from .action import Action, millimeters
+from .poll_messages import baked, edited, inside_edit, no_bed, session_runs
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
 MOST = 400
-#: Blender keeps no reference to the texts of a list that is made on demand: this one does.
+#: Blender stores no reference to the texts of a list that is made on demand: this one does.
 OFFERED: list[tuple[str, str, str]] = []
 
 
@@ -41,8 +41,7 @@ def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
 def take_bed(operator: Any, context: Any) -> None:
     """Set the plan of the chosen bed."""
     bed = BEDS[operator.bed]
-    operator.rows, operator.columns = bed.rows, bed.columns
-    operator.pitch = bed.pitch * 1e3
+    operator.rows, operator.columns, operator.pitch = bed.rows, bed.columns, bed.pitch * 1e3
 
 
 class Placed:
@@ -82,6 +81,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
     bl_idname = "mesh.digital_clay_add"
     bl_label = "Digital Clay"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
+    needs = (inside_edit,)
 
     bed: bpy.props.EnumProperty(
         name="Bed",
@@ -96,20 +96,14 @@ class AddBed(Placed, Action, bpy.types.Operator):
     columns: bpy.props.IntProperty(
         name="Columns", description="Number of pins in a row", default=DEFAULT.columns, min=1, max=MOST
     )
-    pitch: bpy.props.FloatProperty(
-        name="Pitch (mm)",
-        description="Distance between neighboring pins in a row, in mm",
-        default=DEFAULT.pitch * 1e3,
-        min=0.5,
-        soft_max=20.0,
-        max=1000.0,
-        precision=2,
-        step=10,
-    )
+    pitch: millimeters(
+        "Pitch", DEFAULT.pitch, "Distance between neighboring pins in a row, in mm",
+        min=0.5, soft_max=20.0, max=1000.0,
+    )  # fmt: skip
     arrangement: bpy.props.EnumProperty(
         name="Arrangement",
         description="Offset of neighboring rows",
-        items=[(name, title(name), known.meaning) for name, known in ARRANGEMENTS.items()],
+        items=[(name, title(name), kind.meaning) for name, kind in ARRANGEMENTS.items()],
         default=DEFAULT.arrangement,
     )
     method: bpy.props.EnumProperty(
@@ -124,23 +118,11 @@ class AddBed(Placed, Action, bpy.types.Operator):
     scale: bpy.props.FloatProperty(
         name="Scale (cm/mm)",
         description="Scale of the device: centimeters in Blender for a millimeter of the device",
-        default=1.0,
-        min=0.001,
-        soft_min=0.1,
-        soft_max=10.0,
-        max=1000.0,
-    )
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is an object: it cannot be added inside another object's edit mode."""
-        return edited(context, "Leave Edit Mode first: the device is an object of its own")
+        default=1.0, min=0.001, soft_min=0.1, soft_max=10.0, max=1000.0,
+    )  # fmt: skip
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Add it by hand, at first the bed to design on, and show all of it; the redo panel leaves the view.
-
-        `context` bpy.types.Context; `event` bpy.types.Event.
-        """
+        """Add the bed to design on unless another is chosen, and show all of it."""
         if not self.properties.is_property_set("bed"):
             self.bed = FIRST
         done = self.execute(context)
@@ -149,15 +131,11 @@ class AddBed(Placed, Action, bpy.types.Operator):
         return done
 
     def perform(self, context: Any) -> None:
-        """Build the device."""
         for name in ("rows", "columns", "pitch"):
             if not self.properties.is_property_set(name):  # called by a script
                 setattr(self, name, getattr(BEDS[self.bed], name) * (1e3 if name == "pitch" else 1))
         layout = Layout(
-            rows=self.rows,
-            columns=self.columns,
-            pitch=to_si(self.pitch, SHOWN["m"][1]),
-            arrangement=self.arrangement,
+            rows=self.rows, columns=self.columns, pitch=to_si(self.pitch, 3), arrangement=self.arrangement
         )
         bed = add(context, make_scene(self.preset, layout, self.method, BEDS[self.bed].share))
         bed.scale = (self.scale,) * 3
@@ -170,29 +148,21 @@ class Rebuild(Action, bpy.types.Operator):
     bl_idname = "digiclay.rebuild"
     bl_label = "Rebuild"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed, and no session on it."""
-        return (
-            no_bed(context)
-            or session_runs(context, "Stop the session first: its pins cannot be exchanged")
-            or baked(context, "Free the bake in the Takes panel first: it moves the pins there are now")
-            or edited(context, "Leave Edit Mode first")
-        )
+    needs = (
+        no_bed,
+        partial(session_runs, message="Stop the session first: its pins cannot be exchanged"),
+        partial(baked, message="Free the bake in the Takes panel first: it moves the pins there are now"),
+        partial(edited, message="Leave Edit Mode first"),
+    )
 
     def perform(self, context: Any) -> None:
-        """Make it anew."""
-        scene = rebuild(bed_of(context))
-        self.report(
-            {"INFO"}, localize("The bed has {} x {} pins now", scene.layout.rows, scene.layout.columns)
-        )
+        layout = rebuild(bed_of(context)).layout
+        self.report({"INFO"}, localize("The bed has {} x {} pins now", layout.rows, layout.columns))
 
 
 def add(context: Any, scene: Scene) -> Any:
     """Add the device of a scene, at rest, in the context's collection; return its bed."""
-    finger = find_ellipsoid(scene)
-    return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, finger))
+    return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene)))
 
 
 def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
@@ -214,10 +184,10 @@ def select_only(context: Any, bed: Any) -> None:
 
 
 def find_view(context: Any) -> tuple[Any, Any] | None:
-    """Return the 3D view somebody looks at, area and region: the context's, or the first of its window."""
+    """Return area and region of the 3D view in use: the context's, or the first of its window."""
     window = None if bpy.app.background else context.window
     areas = [context.area, *(window.screen.areas if window is not None else ())]
-    area = next((one for one in areas if one is not None and one.type == "VIEW_3D"), None)
+    area = next((area for area in areas if area is not None and area.type == "VIEW_3D"), None)
     return area and (area, next(region for region in area.regions if region.type == "WINDOW"))
 
 
@@ -226,7 +196,7 @@ def frame(context: Any, bed: Any) -> None:
     shown = find_view(context)
     if shown is None:
         return
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     parts = [part for part in (bed, tip, tip and tip[BALL]) if part is not None]
     for part in parts:
         part.select_set(True)
@@ -237,56 +207,50 @@ def frame(context: Any, bed: Any) -> None:
 
 
 def rebuild(bed: Any) -> Scene:
-    """Make a bed anew, at rest; its place, its fingertip and what else hangs on the object stay.
-
-    The state of a session is forgotten: it is of no use to other pins.
-
-    Returns what the bed now is. Raises ParameterError when the settings do not go together; the bed stays as
-    it is.
-    """
+    """Make a bed anew, at rest, by its settings; its place, fingertip and children stay."""
     scene = properties.read_scene(bed)
     instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
-    old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _node_modifiers(bed)]
+    old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _drawing(bed)]
     made = view.build(instant, bed.users_collection[0], lowest=0.0)
     bed.data = made.data
     # The modifier stays, and with it how the bed is colored; only what it draws is another.
-    for kept, new in zip(_node_modifiers(bed), _node_modifiers(made), strict=False):
-        kept.node_group = new.node_group
-    tip = view.fingertip_of(bed)
+    for old, new in zip(_drawing(bed), _drawing(made), strict=False):
+        old.node_group = new.node_group
+    tip = fingertip_of(bed)
     if tip is None:
-        bed[FINGER] = view.fingertip_of(made)
+        bed[FINGER] = fingertip_of(made)
         bed[FINGER].parent = bed
     else:
         bridge.resize_fingertip(tip, instant.finger)
     view.hold_parts(bed)
-    cases = [child for child in bed.children if child.get(view.ROLE) == view.HOUSING]
-    _remove_objects([*cases, *made.children_recursive, made])
+    cases = [child for child in bed.children if child.get(ROLE) == HOUSING]
+    _remove([*cases, *made.children_recursive, made])
     for tree in old_trees:
-        _discard_tree(tree)
+        _discard(tree)
     if not old_mesh.users:
         bpy.data.meshes.remove(old_mesh)
-    bed_state.clear(bed)
+    bed_state.clear(bed)  # the state of a session is of no use to other pins
     return scene
 
 
-def _node_modifiers(bed: Any) -> list[Any]:
+def _drawing(bed: Any) -> list[Any]:
     """Return the modifiers that draw a bed's pins."""
     return [modifier for modifier in bed.modifiers if modifier.type == "NODES" and modifier.node_group]
 
 
-def _discard_tree(tree: Any) -> None:
+def _discard(tree: Any) -> None:
     """Remove the nodes that drew pins, with the pins; a copy of the bed may still be drawn by them."""
     if tree.users:
         return
-    held = [getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs]
-    collections = {thing for thing in held if isinstance(thing, bpy.types.Collection)}
-    objects = {thing for thing in held if isinstance(thing, bpy.types.Object)}
+    inputs = [getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs]
+    collections = {thing for thing in inputs if isinstance(thing, bpy.types.Collection)}
+    objects = {thing for thing in inputs if isinstance(thing, bpy.types.Object)}
     objects.update(*(collection.objects for collection in collections))
     bpy.data.batch_remove([tree, *collections])
-    _remove_objects(objects)
+    _remove(objects)
 
 
-def _remove_objects(objects: Iterable[Any]) -> None:
+def _remove(objects: Iterable[Any]) -> None:
     """Remove objects, and the meshes only they have."""
     objects = list(objects)
     meshes = {thing.data for thing in objects if thing.type == "MESH"}

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Generator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,13 @@ from ..core.scene.assembly import assemble
 from ..core.session import snapshot
 from ..core.session.take import Take
 from ..device.instant import find_ellipsoid
-from ..device.view import bed_of
 from ..recorded import bake, takes
+from ..roles import bed_of
 from ..settings import properties
 from ..ui_text import localize
 from . import status
 from .action import Action
-from .poll_messages import no_bed, session_runs
+from .poll_messages import no_bake, no_bed, session_runs
 from .take_actions import ChosenTake
 
 #: Time between two looks at the user's keys, s, and the share of it that is worked.
@@ -26,10 +27,10 @@ TICK, SHARE = 0.05, 0.9
 
 
 class LongWork(Action):
-    """Mixin of an operator whose work is a generator of completed shares, from 0 to 1.
+    """Mixin of an operator with progress and Esc in a window, without them elsewhere.
 
-    The operator defines `work`, and changes Blender's data only in the last of its steps, so
-    that Esc leaves everything as it was.
+    Its `work` gives the completed share, from 0 to 1, after each step, and changes Blender's data only
+    in the last of its steps, so that Esc leaves everything as it was.
     """
 
     bl_label: str
@@ -55,7 +56,7 @@ class LongWork(Action):
     def modal(self, context: Any, event: Any) -> set[str]:
         """Work for a moment, unless the user has had enough."""
         if event.type == "ESC" and event.value == "PRESS":
-            self._end(context)
+            self.cancel(context)
             self.report({"INFO"}, localize("{}: stopped, nothing was changed", localize(self.bl_label)))
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -66,18 +67,13 @@ class LongWork(Action):
             while time.perf_counter() < until:
                 share = next(self._steps)
         except StopIteration:
-            self._end(context)
+            self.cancel(context)
             return {"FINISHED"}
         context.window_manager.progress_update(100.0 * share)
-        said = localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share)
-        status.show(context, said)
+        status.show(context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share))
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
-        """Stop when Blender takes the operator away, such as at the loading of a file."""
-        self._end(context)
-
-    def _end(self, context: Any) -> None:
         """Take back what shows the progress."""
         self._steps.close()
         context.window_manager.event_timer_remove(self._timer)
@@ -91,6 +87,7 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
     bl_idname = "digiclay.bake"
     bl_label = "Bake Session"
     bl_options = {"REGISTER", "UNDO"}
+    needs = no_bed, partial(session_runs, message="Stop the session on this bed first")
 
     source: bpy.props.EnumProperty(
         name="Source",
@@ -103,15 +100,8 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
     )
     first: bpy.props.IntProperty(name="First Frame", description="First frame of the session", default=1)
     last: bpy.props.IntProperty(
-        name="Last Frame",
-        description="Last frame of the session; a take has its own length",
-        default=250,
+        name="Last Frame", description="Last frame of the session; a take has its own length", default=250
     )
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed without a running session is needed."""
-        return no_bed(context) or session_runs(context, "Stop the session on this bed first")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Take the scene's frames where none are asked for, and begin."""
@@ -122,35 +112,33 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
         return super().invoke(context, event)
 
     def work(self, context: Any) -> Generator[float, None, None]:
-        """Read the finger's path, simulate it, and write the bake."""
+        """Read the fingertip's path, simulate it, and write the bake."""
         bed, scene = bed_of(context), context.scene
-        own = self.source == "TAKE"
-        if own:
+        recorded = self.source == "TAKE"
+        if recorded:
             take = takes.read(bed, self.take)
         else:
             made = properties.scene_of(bed)
             period = made.simulation.control_period
             poses = np.empty((0, 1, 7))
-            for read in bake.sample_path(scene, bed, self.first, self.last, period):
-                if isinstance(read, float):
-                    yield 0.3 * read
+            for step in bake.sample_path(scene, bed, self.first, self.last, period):
+                if isinstance(step, float):
+                    yield 0.3 * step
                 else:
-                    poses = read
+                    poses = step
             system = assemble(made)
-            # How a path ends is not known before it is simulated, and nobody asks.
+            # How the path ends is unknown before its simulation, and nothing asks for it.
             take = Take(made, snapshot.dump(system, begin(system)), poses, b"")
         rate = scene.render.fps / scene.render.fps_base
-        for step in bake.simulate_frames(take, rate):
-            if isinstance(step, float):
-                yield 0.3 + 0.7 * step
+        for part in bake.simulate_frames(take, rate):
+            if isinstance(part, float):
+                yield 0.3 + 0.7 * part
             else:
-                moments = step
-        finger = find_ellipsoid(take.scene)
-        bake.apply(bed, moments, self.first, finger, keyframe_finger=own)
+                moments = part
+        bake.apply(bed, moments, self.first, find_ellipsoid(take.scene), keyframe_finger=recorded)
         count = len(moments.height)
-        self.report(
-            {"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, self.first + count - 1)
-        )
+        last = self.first + count - 1
+        self.report({"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, last))
 
 
 class FreeBake(Action, bpy.types.Operator):
@@ -159,12 +147,7 @@ class FreeBake(Action, bpy.types.Operator):
     bl_idname = "digiclay.bake_free"
     bl_label = "Free Bake"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed with a bake is needed."""
-        return no_bed(context) or ("" if bake.is_baked(bed_of(context)) else "The bed has no bake")
+    needs = no_bed, no_bake
 
     def perform(self, context: Any) -> None:
-        """Free it."""
         bake.free(bed_of(context))

@@ -1,22 +1,21 @@
 """Operators on what is seen of a bed: pins picked for the overlay, and the live skin."""
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.session.recent_trace import PICKED
 from ..device import detail, form, view
-from ..device.view import bed_of
 from ..overlay import views
 from ..press import aim
+from ..roles import bed_of
 from ..ui_text import localize
 from . import status
 from .action import Action, Polled
 from .poll_messages import linked, no_bed, no_skin
 
-NO_BED = "Select a bed of pins first"
-#: Keys of the operator.
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
 
 
@@ -32,18 +31,25 @@ def pick_pins(bed: Any, pins: Iterable[int]) -> None:
     views.redraw()
 
 
+def _no_pins(context: Any) -> str:
+    return "" if view.picked_pins(bed_of(context)) else "No pins are picked"
+
+
+def _no_view(context: Any) -> str:
+    in_view = context.area is not None and context.area.type == "VIEW_3D"
+    return "" if in_view else "Pins are picked in a 3D view"
+
+
+NO_BED = partial(no_bed, message="Select a bed of pins first")
+
+
 class PickPins(Polled, bpy.types.Operator):
     """Click pins of the active bed to see their heights in the overlay"""
 
     bl_idname = "digiclay.pick_pins"
     bl_label = "Pick Pins"
     bl_options = {"UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """There must be a bed to pick pins of, in a view to click into."""
-        in_view = context.area is not None and context.area.type == "VIEW_3D"
-        return no_bed(context, NO_BED) or ("" if in_view else "Pins are picked in a 3D view")
+    needs = NO_BED, _no_view
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for clicks."""
@@ -53,33 +59,32 @@ class PickPins(Polled, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Pick or drop the pin under a click; what is no click goes on to the view."""
+        """Pick or drop the pin under a click; any other event is passed to the view."""
         status.show(context, localize(KEYS))
         if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
             status.clear()
             return {"FINISHED"} if self.changed else {"CANCELLED"}
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            return self._clicked(context, event)
+            return self._click(context, event)
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Any) -> None:
-        """Blender ends the operator, for instance to load a file."""
         status.clear()
 
-    def _clicked(self, context: Any, event: Any) -> set[str]:
-        """Pick or drop the pin under the mouse; a click beside the bed goes on to whatever lies there."""
+    def _click(self, context: Any, event: Any) -> set[str]:
+        """Pick or drop the pin under the mouse; a click beside the bed is passed to what lies there."""
         # The view it was started in may be gone by now: another workspace, another editor in its place.
         area, region = _under(context.window.screen, event)
         if region is None:
             return {"PASS_THROUGH"}
         with context.temp_override(area=area, region=region):
-            found = aim.find_target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
-        if found is None or found.bed != bed_of(context):
+            target = aim.find_target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
+        if target is None or target.bed != bed_of(context):
             return {"PASS_THROUGH"}
-        present = view.picked_pins(found.bed)
-        pins = [pin for pin in present if pin != found.pin]
+        present = view.picked_pins(target.bed)
+        pins = [pin for pin in present if pin != target.pin]
         try:
-            pick_pins(found.bed, pins if found.pin in present else [*pins, found.pin])
+            pick_pins(target.bed, pins if target.pin in present else [*pins, target.pin])
         except DigiclayError as error:
             self.report({"WARNING"}, str(error))
         else:
@@ -103,14 +108,9 @@ class ClearPins(Action, bpy.types.Operator):
     bl_idname = "digiclay.clear_pins"
     bl_label = "Clear"
     bl_options = {"UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """There must be picked pins."""
-        return no_bed(context, NO_BED) or ("" if view.picked_pins(bed_of(context)) else "No pins are picked")
+    needs = NO_BED, _no_pins
 
     def perform(self, context: Any) -> None:
-        """Drop them."""
         pick_pins(bed_of(context), ())
 
 
@@ -120,11 +120,7 @@ class ToggleSkin(Action, bpy.types.Operator):
     bl_idname = "digiclay.skin_toggle"
     bl_label = "Toggle Skin"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed of this file that has a skin is needed."""
-        return no_bed(context) or linked(context) or no_skin(context)
+    needs = no_bed, linked, no_skin
 
     def perform(self, context: Any) -> None:
         """Show pins where a skin is seen, else the skin; by the form there was before, if that does it."""

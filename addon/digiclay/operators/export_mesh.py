@@ -7,8 +7,8 @@ from ..compat import bpy
 from ..core.mesh_io.export_model import make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, find_forward
-from ..device.view import bed_of
 from ..exchange import formed_bed
+from ..roles import bed_of
 from ..ui_text import localize
 from .make_mesh import SurfaceOptions, chosen_bed, sentence
 
@@ -44,7 +44,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     file_format: bpy.props.EnumProperty(
         name="Format",
         description="Format of the file",
-        items=[(name, name.upper().replace("_", " "), sentence(said)) for name, said in FORMATS.items()],
+        items=[(name, name.upper().replace("_", " "), sentence(words)) for name, words in FORMATS.items()],
         default="stl",
     )
     unit: bpy.props.EnumProperty(
@@ -75,7 +75,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     def check(self, context: Any) -> bool:
         """Keep name and format equal: the last change sets the other."""
         if self.file_format == self.shown:
-            self.file_format = _told_by(self.filepath) or self.file_format
+            self.file_format = _format_of(self.filepath) or self.file_format
         self.shown = self.file_format
         forward = next(key for key, name in AXIS_NAMES.items() if name == self._axes()[1])
         wanted = str(self._file())
@@ -85,7 +85,6 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         return changed
 
     def draw(self, context: Any) -> None:
-        """Draw the options beside the file browser."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -104,7 +103,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     def perform(self, context: Any) -> None:
         """Write the file, or the files; without a format, the extension of the name determines it."""
         if not self.properties.is_property_set("file_format"):
-            self.file_format = _told_by(self.filepath) or self.file_format
+            self.file_format = _format_of(self.filepath) or self.file_format
         target = self._file()
         bed = chosen_bed(context)
         made = make_bodies(formed_bed.read_formed(bed), self.model(bed), self.finding())
@@ -113,10 +112,11 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
             ending = find_suffix(self.file_format)
             stem = target.name.removesuffix(ending)
             files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
-        for path, some in files:
-            write(some, path, self.unit, self.file_format, *self._axes())
-        told = localize("{} files beside {}", len(files), target) if len(files) > 1 else str(files[0][0])
-        self.report({"INFO"}, localize("Written: {}", told))
+        for path, bodies in files:
+            write(bodies, path, self.unit, self.file_format, *self._axes())
+        many = len(files) > 1
+        names = localize("{} files beside {}", len(files), target) if many else str(files[0][0])
+        self.report({"INFO"}, localize("Written: {}", names))
 
     def _axes(self) -> tuple[str, str]:
         """Return the upward and the forward axis of an OBJ; the latter gives way where both are the same."""
@@ -126,23 +126,17 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     def _file(self) -> Path:
         """Return the file with the ending of its format, in place of that of another format."""
         path = Path(bpy.path.abspath(self.filepath or "digital_clay"))
-        ending = find_suffix(self.file_format)
-        if path.name.lower().endswith(ending) and not (ending == ".stl" and _is_text(path)):
+        current = _format_of(path.name)
+        other = find_suffix(current) if current else ""
+        if current == self.file_format:
             return path
-        told = _told_by(path.name)
-        other = find_suffix(told) if told else ""
-        return path.with_name(path.name[: len(path.name) - len(other)] + ending)
+        return path.with_name(path.name[: len(path.name) - len(other)] + find_suffix(self.file_format))
 
 
-def _told_by(name: str) -> str:
-    """Return the format of a name's extension; empty without one."""
-    by_length = sorted(FORMATS, key=lambda one: len(find_suffix(one)), reverse=True)
-    return next((one for one in by_length if name.lower().endswith(find_suffix(one))), "")
-
-
-def _is_text(path: Path) -> bool:
-    """Return whether a name is that of an STL as text, which ends like that of a binary one."""
-    return path.name.lower().endswith(find_suffix("stl_ascii"))
+def _format_of(name: str) -> str:
+    """Return the format of a name's extension, the longest that fits; empty without one."""
+    fitting = [kind for kind in FORMATS if name.lower().endswith(find_suffix(kind))]
+    return max(fitting, key=lambda kind: len(find_suffix(kind)), default="")
 
 
 class ExportMenu(bpy.types.Menu):
@@ -152,16 +146,15 @@ class ExportMenu(bpy.types.Menu):
     bl_label = "Digital Clay"
 
     def draw(self, context: Any) -> None:
-        """Draw an entry for each."""
         self.layout.operator_context = "INVOKE_DEFAULT"
-        for words, icon, told in ENTRIES:
+        for words, icon, options in ENTRIES:
             entry = self.layout.operator(ExportMesh.bl_idname, text=words, icon=icon)
-            for name, value in {"skin": "bilinear", "separate": False, **told}.items():
+            for name, value in {"skin": "bilinear", "separate": False, **options}.items():
                 setattr(entry, name, value)
         self.layout.separator()
         self.layout.operator(ExportMesh.bl_idname, text="Other ...")
 
 
 def entry(menu: Any, context: Any) -> None:
-    """Draw the entry in File > Export. `menu` bpy.types.Menu; `context` bpy.types.Context."""
+    """Draw the entry in File > Export."""
     menu.layout.menu(ExportMenu.bl_idname, icon="MESH_GRID")

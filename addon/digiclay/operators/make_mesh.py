@@ -12,15 +12,20 @@ from ..core.base.quantity import list_quantities
 from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
 from ..core.surface.features import Finding, summarize
 from ..core.surface.skins import SKINS
-from ..device.view import bed_of
 from ..exchange import formed_bed
 from ..panels.shape_exchange import LISTED
+from ..roles import bed_of
+from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action
+from .action import Action, millimeters
 from .add_bed import select_only
-from .poll_messages import no_surface
+from .poll_messages import from_rest, no_surface
 
 MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
+#: Space between the bed and what is put beside it, in widths of the bed.
+GAP = 0.35
+#: Marks what was made here, so that what is made next is put elsewhere.
+MADE = "digiclay_made"
 
 
 def sentence(text: str) -> str:
@@ -28,39 +33,23 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-class SurfaceAction(Action):
-    """Mixin of an action on the surface of the active bed."""
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed with a surface is needed."""
-        return no_surface(context)
-
-
-class FindingOptions(SurfaceAction):
+class FindingOptions(Action):
     """Criteria of a feature."""
 
-    threshold: bpy.props.FloatProperty(
-        name="Threshold (mm)",
-        description=sentence(FINDING["threshold"].doc) + ", in mm",
-        default=Finding().threshold * 1e3,
-        min=0.001,
-        max=100.0,
-        precision=3,
-        step=10,
-    )
+    needs = (no_surface,)
+
+    threshold: millimeters(
+        "Threshold", Finding().threshold, sentence(FINDING["threshold"].doc) + ", in mm",
+        min=0.001, max=100.0, precision=3,
+    )  # fmt: skip
     smallest: bpy.props.IntProperty(
-        name="Smallest (pins)",
-        description=sentence(FINDING["smallest"].doc),
-        default=Finding().smallest,
-        min=1,
-        max=1_000_000,
-        soft_max=100,
-    )
+        name="Smallest (pins)", description=sentence(FINDING["smallest"].doc),
+        default=Finding().smallest, min=1, max=1_000_000, soft_max=100,
+    )  # fmt: skip
 
     def finding(self) -> Finding:
         """Return what counts as a feature."""
-        return Finding(threshold=float(f"{self.threshold:.7g}") * 1e-3, smallest=self.smallest)
+        return Finding(threshold=to_si(self.threshold, 3), smallest=self.smallest)
 
 
 class SurfaceOptions(FindingOptions):
@@ -69,42 +58,29 @@ class SurfaceOptions(FindingOptions):
     kind: bpy.props.EnumProperty(
         name="Mesh",
         description="Kind of mesh made of the formed surface",
-        items=[(name, sentence(name), sentence(said)) for name, said in KINDS.items()],
+        items=[(name, sentence(name), sentence(words)) for name, words in KINDS.items()],
         default=Model().kind,
     )
     skin: bpy.props.EnumProperty(
         name="Skin",
         description="Interpolation of the surface between the pins",
-        items=[(name, sentence(name), sentence(said)) for name, said in SKINS.items()],
+        items=[(name, sentence(name), sentence(words)) for name, words in SKINS.items()],
         default=Model().skin,
     )
     resolution: bpy.props.IntProperty(
-        name="Points a Pitch",
-        description=sentence(MODEL["resolution"].doc),
-        default=0,
-        min=0,
-        max=64,
-        soft_max=16,
-    )
-    base_thickness: bpy.props.FloatProperty(
-        name="Base (mm)",
-        description=sentence(MODEL["base_thickness"].doc) + ", in mm",
-        default=Model().base_thickness * 1e3,
-        min=0.01,
-        max=1000.0,
-        soft_max=50.0,
-        precision=2,
-        step=10,
-    )
+        name="Points a Pitch", description=sentence(MODEL["resolution"].doc),
+        default=0, min=0, max=64, soft_max=16,
+    )  # fmt: skip
+    base_thickness: millimeters(
+        "Base", Model().base_thickness, sentence(MODEL["base_thickness"].doc) + ", in mm",
+        min=0.01, max=1000.0, soft_max=50.0,
+    )  # fmt: skip
 
     def model(self, bed: Any) -> Model:
         """Return what is to be made of a bed."""
+        base = to_si(self.base_thickness, 3)
         return formed_bed.model(
-            bed,
-            kind=self.kind,
-            skin=self.skin,
-            resolution=self.resolution,
-            base_thickness=float(f"{self.base_thickness:.7g}") * 1e-3,
+            bed, kind=self.kind, skin=self.skin, resolution=self.resolution, base_thickness=base
         )
 
     def draw_surface(self, layout: Any) -> None:
@@ -123,73 +99,11 @@ class SurfaceOptions(FindingOptions):
 
 
 def chosen_bed(context: Any) -> Any:
-    """Return the bed to work on. Raises OutputError when it has gone since the operator was called."""
+    """Return the bed to work on, or refuse where it has gone since the operator was called."""
     bed = bed_of(context)
     if bed is None:
         raise OutputError("There is no bed any more: select one, or its fingertip.")
     return bed
-
-
-class FindFeatures(FindingOptions, bpy.types.Operator):
-    """Find the bosses and creases of the active bed and list them in the panel"""
-
-    bl_idname = "digiclay.find_features"
-    bl_label = "List Features"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def perform(self, context: Any) -> None:
-        """Find them."""
-        bed = chosen_bed(context)
-        found = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
-        lines = [summarize(found)]
-        for one in found:
-            extreme = f"{one.extreme * 1e3:.1f} mm {'high' if one.kind == 'boss' else 'deep'}"
-            crest = f", crest {one.crest_length * 1e3:.0f} mm" if one.crests else ""
-            lines.append(f"{one.name}: {extreme}{crest}, {one.form}")
-            lines.append(f"    {one.area * 1e6:.0f} mm², {one.volume * 1e9:.0f} mm³, {len(one.pins)} pins")
-        bed[LISTED] = "\n".join(lines)
-        self.report({"INFO"}, lines[0])
-
-
-class KeepSurface(SurfaceAction, bpy.types.Operator):
-    """Measure features from the current surface"""
-
-    bl_idname = "digiclay.keep_surface"
-    bl_label = "Measure from Here"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def perform(self, context: Any) -> None:
-        """Keep the surface."""
-        formed_bed.set_reference(chosen_bed(context))
-
-
-class ForgetSurface(SurfaceAction, bpy.types.Operator):
-    """Measure features from the bed at rest again"""
-
-    bl_idname = "digiclay.forget_surface"
-    bl_label = "Measure from Rest"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed whose surface was kept."""
-        return no_surface(context) or _from_rest(context)
-
-    def perform(self, context: Any) -> None:
-        """Forget the surface."""
-        formed_bed.clear_reference(chosen_bed(context))
-
-
-def _from_rest(context: Any) -> str:
-    """No surface was kept to measure features from."""
-    kept = formed_bed.has_reference(chosen_bed(context))
-    return "" if kept else "Features are measured from the bed at rest already"
-
-
-#: Space between the bed and what is put beside it, in widths of the bed.
-GAP = 0.35
-#: Marks what was made here, so that what is made next is put elsewhere.
-MADE = "digiclay_made"
 
 
 class MakeMesh(SurfaceOptions, bpy.types.Operator):
@@ -206,7 +120,6 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
     )
 
     def draw(self, context: Any) -> None:
-        """Draw the redo panel."""
         self.layout.use_property_split = True
         self.draw_surface(self.layout)
         self.layout.prop(self, "beside")
@@ -215,14 +128,13 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         """Make the objects, and select them."""
         bed = chosen_bed(context)
         formed = formed_bed.read_formed(bed)
-        made = make_bodies(formed, self.model(bed), self.finding())
+        bodies = make_bodies(formed, self.model(bed), self.finding())
         width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
-        smooth = self.kind != "pins"
         where = _beside(context, bed, width) if self.beside else bed.matrix_world.copy()
         things = []
-        for body in made:
+        for body in bodies:
             name = f"{bed.name} {body.name if self.kind == 'features' else self.kind}"
-            new = formed_bed.make_object(body, name, smooth=smooth)
+            new = formed_bed.make_object(body, name, smooth=self.kind != "pins")
             new[MADE] = True
             context.collection.objects.link(new)
             new.matrix_world = where
@@ -230,15 +142,13 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         select_only(context, things[0])
         for new in things[1:]:
             new.select_set(True)
-        groups = localize(" with vertex groups {}", ", ".join(made[0].groups)) if made[0].groups else ""
-        self.report({"INFO"}, localize("Made {}{}", ", ".join(new.name for new in things), groups))
+        groups = bodies[0].groups
+        words = localize(" with vertex groups {}", ", ".join(groups)) if groups else ""
+        self.report({"INFO"}, localize("Made {}{}", ", ".join(new.name for new in things), words))
 
 
 def _beside(context: Any, bed: Any, width: float) -> Any:
-    """Return the first place beside a bed, a matrix, that no mesh made before stands in.
-
-    `context` bpy.types.Context; `bed` bpy.types.Object; `width`: of its pins, in its own space.
-    """
+    """Return a matrix: the first place beside a bed, as wide as its pins, without a mesh made before."""
     step, half = (1.0 + GAP) * width, width / 2
     to_bed = np.array(bed.matrix_world.inverted_safe(), np.float64)
     place = 1
@@ -259,3 +169,48 @@ def _spans(context: Any, to_bed: Any, half: float) -> Iterator[tuple[float, floa
         x, y = (corners @ (to_bed @ np.array(thing.matrix_world, np.float64)).T)[:, :2].T
         if np.isfinite(x).all() and y.min() < half and y.max() > -half:
             yield float(x.min()), float(x.max())
+
+
+class FindFeatures(FindingOptions, bpy.types.Operator):
+    """Find the bosses and creases of the active bed and list them in the panel"""
+
+    bl_idname = "digiclay.find_features"
+    bl_label = "List Features"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def perform(self, context: Any) -> None:
+        bed = chosen_bed(context)
+        features = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
+        lines = [summarize(features)]
+        for feature in features:
+            extreme = f"{feature.extreme * 1e3:.1f} mm {'high' if feature.kind == 'boss' else 'deep'}"
+            crest = f", crest {feature.crest_length * 1e3:.0f} mm" if feature.crests else ""
+            area, volume = feature.area * 1e6, feature.volume * 1e9
+            lines.append(f"{feature.name}: {extreme}{crest}, {feature.form}")
+            lines.append(f"    {area:.0f} mm², {volume:.0f} mm³, {len(feature.pins)} pins")
+        bed[LISTED] = "\n".join(lines)
+        self.report({"INFO"}, lines[0])
+
+
+class KeepSurface(Action, bpy.types.Operator):
+    """Measure features from the current surface"""
+
+    bl_idname = "digiclay.keep_surface"
+    bl_label = "Measure from Here"
+    bl_options = {"REGISTER", "UNDO"}
+    needs = (no_surface,)
+
+    def perform(self, context: Any) -> None:
+        formed_bed.set_reference(chosen_bed(context))
+
+
+class ForgetSurface(Action, bpy.types.Operator):
+    """Measure features from the bed at rest again"""
+
+    bl_idname = "digiclay.forget_surface"
+    bl_label = "Measure from Rest"
+    bl_options = {"REGISTER", "UNDO"}
+    needs = no_surface, from_rest
+
+    def perform(self, context: Any) -> None:
+        formed_bed.clear_reference(chosen_bed(context))

@@ -12,15 +12,15 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
 from ..core.shapes.request import Shape
 from ..core.shapes.source_file import list_shapes
-from ..device import view
 from ..device.instant import find_ellipsoid, pick_pose, read
 from ..exchange import shape_show
 from ..recorded import takes
+from ..roles import fingertip_of
 from ..settings.declared import title
 from ..ui_text import localize
 from .action import Action, FileAction
 from .add_bed import Placed, add, add_shown
-from .poll_messages import edited
+from .poll_messages import inside_edit
 
 
 class ImportRun(Placed, FileAction, bpy.types.Operator):
@@ -33,28 +33,21 @@ class ImportRun(Placed, FileAction, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})
     filter_glob: bpy.props.StringProperty(default="*.npz", options={"HIDDEN"})
     row: bpy.props.IntProperty(
-        name="Row",
-        description="Recorded row to show: 0 is the first, -1 the last",
-        default=-1,
+        name="Row", description="Recorded row to show: 0 is the first, -1 the last", default=-1
     )
 
     def perform(self, context: Any) -> None:
         """Read the run and build the bed at the 3D cursor."""
         path = Path(bpy.path.abspath(self.filepath))
         instant, scene = read(path, self.row), load(path.with_name("scene.toml"))
-        bed = add_shown(context, scene, instant)
-        self.place(context, bed)
-
-
-def import_entry(menu: Any, context: Any) -> None:
-    """Draw the import_entry in File > Import. `menu` bpy.types.Menu; `context` bpy.types.Context."""
-    menu.layout.operator(ImportRun.bl_idname, text="Digital Clay run (.npz)")
+        self.place(context, add_shown(context, scene, instant))
 
 
 class AddSceneAction(Placed, Action):
-    """Mixin of operators that add a bed, as Add > Mesh > Digital Clay does."""
+    """Mixin of operators that add the bed of a scene, as Add > Mesh > Digital Clay does."""
 
     bl_options = {"REGISTER", "UNDO"}
+    needs = (inside_edit,)
 
     take: bpy.props.BoolProperty(
         name="Simulate as a Take",
@@ -62,19 +55,14 @@ class AddSceneAction(Placed, Action):
         default=True,
     )
 
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is an object: it cannot be added inside another object's edit mode."""
-        return edited(context, "Leave Edit Mode first: the device is an object of its own")
-
     def add_scene(self, context: Any, scene: Scene) -> None:
-        """Add the bed of a scene, its finger where its path begins. `context` bpy.types.Context."""
+        """Add the bed of a scene, its fingertip where its path begins."""
         scene = shape_show.embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
         bed.name = scene.name
         start = pick_pose(sample_poses(scene.trajectories(), takes.START)[0])
-        bridge.place_fingertip(view.fingertip_of(bed), start, find_ellipsoid(scene))
+        bridge.place_fingertip(fingertip_of(bed), start, find_ellipsoid(scene))
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
         if taken is not None:
             takes.add(bed, taken, scene.name)
@@ -96,12 +84,9 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser, unless a file was dropped."""
-        if self.filepath:
-            return self.execute(context)
-        return super().invoke(context, event)
+        return self.execute(context) if self.filepath else super().invoke(context, event)
 
     def perform(self, context: Any) -> None:
-        """Read the scene and build its bed at the 3D cursor."""
         self.add_scene(context, load(Path(bpy.path.abspath(self.filepath))))
 
 
@@ -120,15 +105,10 @@ class AddSample(AddSceneAction, bpy.types.Operator):
     )
 
     def perform(self, context: Any) -> None:
-        """Build the bed at the 3D cursor."""
         kind, _, name = self.sample.partition(":")
         if kind == "session":
             self.add_scene(context, load(find(name)))
-        else:
-            self._add_shape(context, name)
-
-    def _add_shape(self, context: Any, name: str) -> None:
-        """Add a bed that displays a shape."""
+            return
         bed = add(context, resolve({}, name))
         bed.name = title(name)
         context.view_layer.update()
@@ -137,20 +117,19 @@ class AddSample(AddSceneAction, bpy.types.Operator):
         self.place(context, bed)
 
 
-class Entries:
-    """Menu of samples."""
+class SampleMenu:
+    """Mixin of a menu of samples."""
 
     layout: Any
     kind = ""
 
     def draw(self, context: Any) -> None:
-        """Draw an entry for each."""
         for name in list_samples() if self.kind == "session" else list_shapes():
             entry = self.layout.operator(AddSample.bl_idname, text=title(name))
             entry.sample = f"{self.kind}:{name}"
 
 
-class SessionSamples(Entries, bpy.types.Menu):
+class SessionSamples(SampleMenu, bpy.types.Menu):
     """Sample sessions of Digital Clay"""
 
     bl_idname = "DIGICLAY_MT_session_samples"
@@ -158,7 +137,7 @@ class SessionSamples(Entries, bpy.types.Menu):
     kind = "session"
 
 
-class ShapeSamples(Entries, bpy.types.Menu):
+class ShapeSamples(SampleMenu, bpy.types.Menu):
     """Sample shapes of Digital Clay, displayed on a bed"""
 
     bl_idname = "DIGICLAY_MT_shape_samples"
@@ -173,7 +152,6 @@ class Samples(bpy.types.Menu):
     bl_label = "Digital Clay Samples"
 
     def draw(self, context: Any) -> None:
-        """Draw the two kinds, and the file dialog."""
         self.layout.menu(SessionSamples.bl_idname, icon="CON_TRACKTO")
         self.layout.menu(ShapeSamples.bl_idname, icon="RNDCURVE")
         self.layout.separator()
@@ -195,15 +173,12 @@ class SceneFiles(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def added(menu: Any, context: Any) -> None:
-    """Draw the submenu in Add > Mesh. `menu` bpy.types.Menu; `context` bpy.types.Context."""
+def samples_entry(menu: Any, context: Any) -> None:
+    """Draw the submenu in Add > Mesh."""
     menu.layout.menu(Samples.bl_idname, icon="MESH_GRID")
 
 
-def imported(menu: Any, context: Any) -> None:
-    """Draw the entry in File > Import. `menu` bpy.types.Menu; `context` bpy.types.Context."""
+def import_entry(menu: Any, context: Any) -> None:
+    """Draw the entries in File > Import."""
+    menu.layout.operator(ImportRun.bl_idname, text="Digital Clay run (.npz)")
     menu.layout.operator(OpenScene.bl_idname, text="Digital Clay scene (.toml)")
-
-
-#: Entries in Blender's own menus.
-MENUS = (("VIEW3D_MT_mesh_add", added), ("TOPBAR_MT_file_import", imported))

@@ -7,13 +7,13 @@ from .. import preferences
 from ..compat import bpy
 from ..core.scene.scene_source import load
 from ..core.scene.toml_table import PRESETS
-from ..device.view import bed_of
+from ..roles import bed_of
 from ..settings import own_folder, own_presets, properties
 from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
 from ..ui_text import localize
 from .action import Action
-from .poll_messages import no_bed
+from .poll_messages import no_bed, no_own_methods, no_own_preset
 
 
 class ApplyPreset(Action, bpy.types.Operator):
@@ -22,24 +22,17 @@ class ApplyPreset(Action, bpy.types.Operator):
     bl_idname = "digiclay.preset_apply"
     bl_label = "Apply Digital Clay Preset"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+    needs = (no_bed,)
 
     preset: bpy.props.StringProperty(name="Preset")
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:
-        """Return the description of the preset.
-
-        `context` bpy.types.Context; `chosen` bpy.types.OperatorProperties, the operator's settings.
-        """
+        """Return the description of the chosen preset."""
         return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
 
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed; a session that runs on it goes on with the new parameters."""
-        return no_bed(context)
-
     def perform(self, context: Any) -> None:
-        """Set the parameters."""
+        """Set the parameters; a session that runs on the bed goes on with them."""
         bed = bed_of(context)
         settings = bed.digiclay
         if self.preset in PRESETS:
@@ -55,17 +48,13 @@ class SavePreset(Action, bpy.types.Operator):
 
     bl_idname = "digiclay.preset_save"
     bl_label = "Save Digital Clay Preset"
+    needs = (no_bed,)
 
     name: bpy.props.StringProperty(
         name="Name",
         description="Name of the preset; a preset of that name is replaced",
         maxlen=own_presets.LONGEST,
     )
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed."""
-        return no_bed(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the dialog for the name."""
@@ -74,7 +63,6 @@ class SavePreset(Action, bpy.types.Operator):
         return result
 
     def perform(self, context: Any) -> None:
-        """Save it."""
         bed = bed_of(context)
         file = own_presets.save(self.name, replace(properties.read_scene(bed), name=self.name.strip()))
         bed.digiclay.own_preset = file.stem
@@ -86,14 +74,10 @@ class RemovePreset(Action, bpy.types.Operator):
 
     bl_idname = "digiclay.preset_remove"
     bl_label = "Remove Digital Clay Preset"
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A preset of the user's own must be the bed's: the core's cannot be removed."""
-        return no_bed(context) or _no_own_preset(context)
+    needs = no_bed, no_own_preset
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Make sure."""
+        """Ask for confirmation."""
         result: set[str] = context.window_manager.invoke_confirm(self, event)
         return result
 
@@ -105,28 +89,17 @@ class RemovePreset(Action, bpy.types.Operator):
         settings.own_preset = ""
 
 
-def _no_own_preset(context: Any) -> str:
-    """The bed's parameters are of no preset of the user's own."""
-    own = bed_of(context).digiclay.own_preset in own_presets.names()
-    return "" if own else "Apply a preset of your own first: those that come along cannot be removed"
-
-
 class ReloadMethods(Action, bpy.types.Operator):
     """Run the Python files of the folder of own control methods again; running sessions keep their method"""
 
     bl_idname = "digiclay.methods_reload"
     bl_label = "Reload Methods"
     in_any_mode = True
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """The preferences must allow code of the folder."""
-        return "" if preferences.get(context).run_own_methods else "Turn on Run Own Methods first"
+    needs = (no_own_methods,)
 
     def perform(self, context: Any) -> None:
-        """Run them."""
         preferences.take_methods(preferences.get(context), context)
-        found = own_folder.read_present()
-        for line in found.refused:
+        present = own_folder.read_present()
+        for line in present.refused:
             self.report({"WARNING"}, line)
-        self.report({"INFO"}, localize("{} control methods loaded", len(found.names)))
+        self.report({"INFO"}, localize("{} control methods loaded", len(present.names)))

@@ -1,4 +1,7 @@
-"""Size, depth and strength of the Press tool, by changed by the mouse as in Blender's radial control."""
+"""Size, depth and strength of the Press tool, changed by the mouse as in Blender's radial control.
+
+The mouse goes sideways, or a value is typed; outlines on the pins show it at true size.
+"""
 
 from typing import Any
 
@@ -8,49 +11,45 @@ from .. import bridge
 from ..compat import bpy
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
-from ..device import view
 from ..live.stroke import DEEPEST, SHALLOWEST, Brush
 from ..press import aim, brush, marks
+from ..roles import fingertip_of
 from ..settings import finger_size
 from ..ui_text import localize
 from . import status
-from .action import Action, Polled
+from .action import Action, Drawing
+from .poll_messages import no_finger, no_tool_in_view
 
-#: Factor of the mouse's way with Shift held.
+#: Factor of the mouse's way with Shift held down.
 PRECISE = 0.1
 #: Events that are Blender's: timers, on which sessions go on, and the ways to turn the view.
 PASSED = ("TIMER", "MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF")
+#: Change of the depth, m, and of the strength, for a pixel at a UI scale of 1.
+DEPTH_PIXEL, STRENGTH_PIXEL = 0.05e-3, 0.005
 KEYS = (
     "{}  |  Move sideways or type a value  |  Ctrl: steps, Shift: precise  |  "
     "Enter or click: confirm  |  Esc or right click: cancel"
 )
 
 
-class AdjustMixin(Polled):
+class AdjustMixin(Drawing):
     """Mixin of an operator that changes one number by the mouse or the keyboard.
 
-    A subclass reads, writes, parses and names its number, in SI.
+    A subclass reads, writes, parses and names its number, in SI, of a bed or of the settings of the tool.
     """
 
-    #: Range of the number, and the steps it takes with Ctrl held.
+    needs = no_tool_in_view, no_finger
+    #: Range of the number, and the steps it takes with Ctrl held down.
     low: float
     high: float
     snap: float
 
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """The Press tool is needed, and a bed with a fingertip."""
-        return no_tool(context)
-
     def read(self, bed: Any, settings: Any) -> float:
-        """Return the number now, from the bed or from the settings of the tool.
-
-        `bed` bpy.types.Object; `settings` bpy.types.PropertyGroup, of the tool.
-        """
+        """Return the number now."""
         raise NotImplementedError
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Set the number. `bed` bpy.types.Object; `settings` bpy.types.PropertyGroup, of the tool."""
+        """Set the number."""
         raise NotImplementedError
 
     def parse(self, text: str) -> float:
@@ -58,42 +57,31 @@ class AdjustMixin(Polled):
         return float(bpy.utils.units.to_value("METRIC", "LENGTH", text, str_ref_unit="mm"))
 
     def rate(self, context: Any, bed: Any) -> float:
-        """Return the change of the number for a pixel.
-
-        `context` bpy.types.Context; `bed` bpy.types.Object.
-        """
+        """Return the change of the number for a pixel."""
         raise NotImplementedError
 
-    def say(self, value: float) -> str:
+    def describe(self, value: float) -> str:
         """Return the number with its name and unit."""
         raise NotImplementedError
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
-        """Return outlines (k, 2) about the place pointed at that show the number, m.
-
-        `turn` sequence of float, quaternion wxyz; `depth`, `value`: m; the number.
-        """
+        """Return outlines (k, 2), m, about the place pointed at, of a fingertip; `turn`: quaternion wxyz."""
         raise NotImplementedError
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin at the place under the mouse; beside a bed, in the middle of the one it is about."""
-        xy = event.mouse_region_x, event.mouse_region_y
-        bed, center = find_place(context, xy)
-        self.uid, self.center = bed.session_uid, center
+        bed, self.center = _find_place(context, (event.mouse_region_x, event.mouse_region_y))
+        self.uid = bed.session_uid
         self.start = self.value = self.read(bed, brush.tool_settings(context))
-        self.before, self.text, self.snapped, self.region = event.mouse_x, "", False, context.region
-        self.handler = bpy.types.SpaceView3D.draw_handler_add(
-            self._draw, (context.area,), "WINDOW", "POST_PIXEL"
-        )
-        context.window_manager.modal_handler_add(self)
-        self._tell(context)
-        return {"RUNNING_MODAL"}
+        self.before, self.text, self.snapped = event.mouse_x, "", False
+        self._show(context)
+        return self.begin(context)
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Follow the mouse or the keyboard, until confirmed or cancelled."""
         bed = brush.find_bed(context, self.uid)
         if bed is None or not self.poll(context):
-            return self._end(context, {"CANCELLED", "PASS_THROUGH"})
+            return self.end(context, "CANCELLED", "PASS_THROUGH")
         if event.type.startswith(PASSED):
             return {"PASS_THROUGH"}
         self.snapped = event.ctrl
@@ -103,33 +91,24 @@ class AdjustMixin(Polled):
             value = self._shown()
             if value != self.start:
                 self.write(bed, brush.tool_settings(context), value)
-            return self._end(context, {"FINISHED" if value != self.start else "CANCELLED"})
+            return self.end(context, "FINISHED" if value != self.start else "CANCELLED")
         elif event.value == "PRESS" and event.type in ("ESC", "RIGHTMOUSE"):
-            return self._end(context, {"CANCELLED"})
-        elif event.value == "PRESS":
-            self._type(event)
-        self._tell(context)
+            return self.end(context, "CANCELLED")
+        elif event.value == "PRESS" and event.type == "BACK_SPACE":
+            self.text = self.text[:-1]
+        elif event.value == "PRESS" and event.ascii and event.ascii.isprintable():
+            self.text += event.ascii
+        self._show(context)
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context: Any) -> None:
-        """Blender ends the operator, for instance to load a file."""
-        self._end(context, set())
-
     def _move(self, context: Any, bed: Any, event: Any) -> None:
-        """Follow the mouse sideways; what is typed holds against it."""
+        """Follow the mouse sideways; a typed value has precedence."""
         way, self.before = event.mouse_x - self.before, event.mouse_x
         if not self.text:
             share = PRECISE if event.shift else 1.0
             with context.temp_override(region=self.region):
                 rate = self.rate(bpy.context, bed)
             self.value = min(max(self.value + way * share * rate, self.low), self.high)
-
-    def _type(self, event: Any) -> None:
-        """Take a typed letter."""
-        if event.type == "BACK_SPACE":
-            self.text = self.text[:-1]
-        elif event.ascii and event.ascii.isprintable():
-            self.text += event.ascii
 
     def _shown(self) -> float:
         """Return the number as it is shown, and would be set."""
@@ -142,82 +121,45 @@ class AdjustMixin(Polled):
             value = round(self.value / self.snap) * self.snap if self.snapped else self.value
         return min(max(value, self.low), self.high) if np.isfinite(value) else self.start
 
-    def _tell(self, context: Any) -> None:
+    def _show(self, context: Any) -> None:
         """Show the number in the status bar, and draw it."""
-        value = self._shown()
-        typed = f"   [{self.text}]" if self.text else ""
-        self.words = self.say(value) + typed
+        self.words = self.describe(self._shown()) + (f"   [{self.text}]" if self.text else "")
         status.show(context, localize(KEYS, self.words))
         for area in context.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
 
-    def _draw(self, area: Any) -> None:
+    def draw_view(self, area: Any) -> None:
         """Draw outline and number in the view the operator was called in."""
         context = bpy.context
         bed = brush.find_bed(context, self.uid)
-        tip = bed and view.fingertip_of(bed)
+        tip = bed and fingertip_of(bed)
         if tip is None or context.area != area or not self.poll(context):
             return
         from ..overlay.draw import cursor
 
         settings = brush.tool_settings(context)
         depth = 1e-3 * settings.depth if settings else DEEPEST
-        finger, turn = bridge.finger_of(tip), bridge.pose(tip)[3:]
-        rims = self.outlines(finger, turn, depth, self._shown())
+        rims = self.outlines(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, self._shown())
         places = [np.column_stack([rim, np.zeros(len(rim))]) + self.center for rim in rims]
         lines = [aim.project(context, bed, place) for place in places]
         middle = aim.project(context, bed, self.center[None])[0]
-        scale = context.preferences.system.ui_scale
-        shown = [np.concatenate([line, line[:1]]) for line in lines if np.isfinite(line).all()]
+        system = context.preferences.system
+        closed = [np.concatenate([line, line[:1]]) for line in lines if np.isfinite(line).all()]
         cursor(
-            marks.make_lines(shown, context.preferences.system.pixel_size),
-            marks.make_label(self.words, (middle[0], middle[1]), scale),
+            marks.make_lines(closed, system.pixel_size),
+            marks.make_label(self.words, (middle[0], middle[1]), system.ui_scale),
         )
 
-    def _end(self, context: Any, result: set[str]) -> set[str]:
-        """Give back status bar and view."""
-        status.clear()
-        if self.handler is not None:
-            bpy.types.SpaceView3D.draw_handler_remove(self.handler, "WINDOW")
-            self.handler = None
-        for area in context.screen.areas if context.screen else ():
-            area.tag_redraw()
-        return result
 
-
-def no_tool(context: Any) -> str:
-    """There is no view with the Press tool, or no bed for it."""
-    if context.area is None or context.area.type != "VIEW_3D" or brush.tool_settings(context) is None:
-        return "Select the Press tool in a 3D view"
-    return no_finger(context)
-
-
-def no_finger(context: Any) -> str:
-    """There is no bed whose fingertip could be scaled."""
-    bed = brush.bed_in_use(context)
-    if bed is None or view.fingertip_of(bed) is None:
-        return "Select a bed of Digital Clay, or its fingertip"
-    if bed.library is not None:
-        return "The bed is linked from another file: make it local first"
-    return bridge.find_scale_fault(bed)
-
-
-def find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:
-    """Return the bed under the mouse and the place there, m; or the bed in use and its middle.
-
-    `context` bpy.types.Context; `xy` (float, float), pixels in the region.
-    """
-    found = aim.find_target(context, xy)
-    if found is not None and view.fingertip_of(found.bed) is not None and found.bed.library is None:
-        return found.bed, found.point
+def _find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:
+    """Return the bed under a pixel of the region and the place there, m; or the bed in use and its middle."""
+    target = aim.find_target(context, xy)
+    if target is not None and fingertip_of(target.bed) is not None and target.bed.library is None:
+        return target.bed, target.point
     bed: Any = brush.bed_in_use(context)
     height = bridge.read_cells(bed.data)["height"]
     return bed, np.array([0.0, 0.0, float(height.mean())])
-
-
-#: Change of the depth, m, and of the strength, for a pixel at a UI scale of 1.
-DEPTH_PIXEL, STRENGTH_PIXEL = 0.05e-3, 0.005
 
 
 class AdjustSize(AdjustMixin, bpy.types.Operator):
@@ -244,12 +186,11 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
         pixels = float(np.hypot(along - middle, across - middle))
         return 2e-3 / pixels if np.isfinite(pixels) and pixels > 0.0 else 0.0
 
-    def say(self, value: float) -> str:
-        """Return the width in mm."""
+    def describe(self, value: float) -> str:
         return localize("Size {:.2f} mm", 1e3 * value)
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
-        """Return the widest section of the finger, and what of it touches."""
+        """Return the widest section of the fingertip, and what of it touches."""
         share = value / (2.0 * finger.width)
         scaled = Fingertip(finger.length * share, finger.width * share, finger.height * share)
         return [find_contact_outline(scaled, turn, np.inf), find_contact_outline(scaled, turn, depth)]
@@ -273,15 +214,13 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
         setattr(settings, brush.amount_name(Brush(settings.brush)), 1e3 * value)
 
     def rate(self, context: Any, bed: Any) -> float:
-        """Return m a pixel."""
         return DEPTH_PIXEL / float(context.preferences.system.ui_scale)
 
-    def say(self, value: float) -> str:
-        """Return the depth, or height, in mm."""
+    def describe(self, value: float) -> str:
         return f"{self.amount.title()} {1e3 * value:.2f} mm"
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
-        """Return what of the finger touches at the depth."""
+        """Return what of the fingertip touches at the depth."""
         return [find_contact_outline(finger, turn, value)]
 
 
@@ -294,11 +233,9 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
     low, high, snap = 0.01, 1.0, 0.1
 
     def read(self, bed: Any, settings: Any) -> float:
-        """Return the tool's strength."""
         return float(settings.strength)
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Set the tool's strength."""
         settings.strength = value
 
     def parse(self, text: str) -> float:
@@ -307,15 +244,13 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
         return value / 100.0 if "%" in text or value > 1.0 else value
 
     def rate(self, context: Any, bed: Any) -> float:
-        """Return the share a pixel."""
         return STRENGTH_PIXEL / float(context.preferences.system.ui_scale)
 
-    def say(self, value: float) -> str:
-        """Return the strength in per cent."""
+    def describe(self, value: float) -> str:
         return localize("Strength {:.0f} %", 100.0 * value)
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
-        """Return what of the finger touches at the whole depth, and at the share of it."""
+        """Return what of the fingertip touches at the whole depth, and at the share of it."""
         return [find_contact_outline(finger, turn, depth), find_contact_outline(finger, turn, depth * value)]
 
 
@@ -325,18 +260,12 @@ class ScaleSize(Action, bpy.types.Operator):
     bl_idname = "digiclay.press_scale"
     bl_label = "Scale Fingertip"
     bl_options = {"REGISTER", "UNDO"}
+    needs = (no_finger,)
 
     scalar: bpy.props.FloatProperty(
         name="Factor", description="Factor of the size", default=1.1, min=0.1, max=10.0
     )
 
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed with a fingertip is needed."""
-        return no_finger(context)
-
     def perform(self, context: Any) -> None:
-        """Scale it."""
         bed: Any = brush.bed_in_use(context)
-        settings = bed.digiclay
-        finger_size.set_size(settings, finger_size.read_size(settings) * self.scalar)
+        finger_size.set_size(bed.digiclay, finger_size.read_size(bed.digiclay) * self.scalar)

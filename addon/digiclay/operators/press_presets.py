@@ -11,7 +11,7 @@ from ..press.fingers import FINGERS
 from ..settings import finger_size
 from ..ui_text import localize
 from .action import Action, Polled
-from .press_adjust import no_finger, no_tool
+from .poll_messages import no_finger, no_tool_in_view
 
 
 class TakeFinger(Action, bpy.types.Operator):
@@ -20,6 +20,7 @@ class TakeFinger(Action, bpy.types.Operator):
     bl_idname = "digiclay.press_finger"
     bl_label = "Preset Finger"
     bl_options = {"REGISTER", "UNDO"}
+    needs = (no_finger,)
 
     kind: bpy.props.EnumProperty(
         name="Finger",
@@ -29,22 +30,13 @@ class TakeFinger(Action, bpy.types.Operator):
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:
-        """Return measures and source of a finger.
-
-        `context` bpy.types.Context; `chosen` bpy.types.OperatorProperties, the operator's settings.
-        """
+        """Return measures and source of the chosen finger."""
         kind = FINGERS[chosen.kind]
         axes = (kind.finger.length, kind.finger.width, kind.finger.height)
         measures = " × ".join(f"{2e3 * axis:g}" for axis in axes)
         return localize("{} mm: {}. The blister follows, the contact law stays", measures, kind.source)
 
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed with a fingertip is needed."""
-        return no_finger(context)
-
     def perform(self, context: Any) -> None:
-        """Give it the form."""
         bed: Any = brush.bed_in_use(context)
         finger_size.resize(bed.digiclay, FINGERS[self.kind].finger)
 
@@ -56,10 +48,8 @@ class FingerMenu(bpy.types.Menu):
     bl_label = "Finger"
 
     def draw(self, context: Any) -> None:
-        """Draw one entry a finger."""
         for name, kind in FINGERS.items():
-            entry = self.layout.operator(TakeFinger.bl_idname, text=kind.label)
-            entry.kind = name
+            self.layout.operator(TakeFinger.bl_idname, text=kind.label).kind = name
 
 
 class ApplyBrush(Action, bpy.types.Operator):
@@ -68,17 +58,12 @@ class ApplyBrush(Action, bpy.types.Operator):
     bl_idname = "digiclay.press_brush"
     bl_label = "Brush Preset"
     bl_options = {"UNDO", "INTERNAL"}
+    needs = no_tool_in_view, no_finger
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     menu_idname: bpy.props.StringProperty(default="DIGICLAY_MT_brushes", options={"SKIP_SAVE"})
 
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """The Press tool is needed, and a bed."""
-        return no_tool(context)
-
     def perform(self, context: Any) -> None:
-        """Apply it."""
         try:
             bpy.ops.script.execute_preset(filepath=self.filepath, menu_idname=self.menu_idname)
         except RuntimeError as error:  # what Blender says of the file
@@ -100,16 +85,12 @@ class SaveBrush(AddPresetBase, Polled, bpy.types.Operator):
 
     bl_idname = "digiclay.press_brush_save"
     bl_label = "Save Brush Preset"
+    needs = no_tool_in_view, no_finger
     preset_menu = BrushMenu.bl_idname
     preset_subdir = brush_presets.SUBFOLDER
     preset_defines = brush_presets.DEFINES
 
     @property
     def preset_values(self) -> list[str]:
-        """What is kept."""
+        """What the preset stores."""
         return brush_presets.preset_values(brush.tool_settings(bpy.context))
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """The Press tool is needed, and a bed."""
-        return no_tool(context)

@@ -1,4 +1,4 @@
-"""Operator of the Press tool: path of the mouse while the button is held, queued for the session."""
+"""Operator of the Press tool: path of the mouse while the button is down, queued for the session."""
 
 import time
 from dataclasses import replace
@@ -8,7 +8,6 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.control.methods import METHODS
-from ..device import view
 from ..live import loop, running, selection, tick
 from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw, pull
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
@@ -18,79 +17,60 @@ from ..press.release import begin_button, read_event
 from ..settings.declared import title
 from ..ui_text import localize
 from . import status
-from .action import Polled
+from .action import Polled, millimeters
+from .poll_messages import no_place
+
+#: How far a turn of the wheel takes the surface up, m.
+WHEEL = 0.25e-3
+MOVES = frozenset({"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"})
+WHEELS = {"WHEELUPMOUSE": WHEEL, "WHEELDOWNMOUSE": -WHEEL}
+KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the stroke back"
+KEYS_PLAIN = "{}  |  Esc or right click: take the stroke back"
+#: Reports where a brush cannot work.
+NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
+HIDDEN = "{} hides the bed here: press beside it, look from elsewhere, or hide it (H)"
+RECOVERS = "Smoothed pins will not stay so: the method {} brings all pins back"
+#: Result of a press on something else: Blender shows no reports of an operator that only passes.
+NOT_PRESSED = {"CANCELLED", "PASS_THROUGH"}
 
 
 class PressSettings:
-    """Mixin of the operator with its properties."""
+    """Settings of the tool: properties of the operator, which the header shows and presets store."""
 
     brush: bpy.props.EnumProperty(
-        name="Brush",
-        description="What a stroke does to the surface",
-        items=brush.BRUSH_ITEMS,
-        default="LOWER",
-        translation_context="Brush",
-    )
-    depth: bpy.props.FloatProperty(
-        name="Depth (mm)",
-        description="How far a stroke of Lower goes below the surface, in mm",
-        default=4.0,
-        min=0.1,
-        max=1e3 * DEEPEST,
-        soft_max=10.0,
-        precision=2,
-        step=25,
-    )
-    height: bpy.props.FloatProperty(
-        name="Height (mm)",
-        description="How far a stroke of Raise goes above the surface, in mm",
-        default=15.0,
-        min=0.1,
-        max=1e3 * DEEPEST,
-        soft_max=30.0,
-        precision=2,
-        step=100,
-    )
+        name="Brush", description="What a stroke does to the surface", items=brush.BRUSH_ITEMS,
+        default="LOWER", translation_context="Brush",
+    )  # fmt: skip
+    depth: millimeters(
+        "Depth", 4e-3, "How far a stroke of Lower goes below the surface, in mm",
+        min=0.1, max=1e3 * DEEPEST, soft_max=10.0, step=25,
+    )  # fmt: skip
+    height: millimeters(
+        "Height", 15e-3, "How far a stroke of Raise goes above the surface, in mm",
+        min=0.1, max=1e3 * DEEPEST, soft_max=30.0, step=100,
+    )  # fmt: skip
     strength: bpy.props.FloatProperty(
         name="Strength",
-        description=(
-            "Share of the depth, of the height, or of the way to the level that a stroke reaches, and "
-            "strength of Smooth; pen pressure scales it further"
-        ),
-        default=1.0,
-        min=0.01,
-        max=1.0,
-        subtype="FACTOR",
-        precision=2,
-    )
+        description="Share of the depth, of the height, or of the way to the level that a stroke reaches, "
+        "and strength of Smooth; pen pressure scales it further",
+        default=1.0, min=0.01, max=1.0, subtype="FACTOR", precision=2,
+    )  # fmt: skip
     symmetry: bpy.props.EnumProperty(
         name="Symmetry",
-        description=(
-            "Mirror images of a stroke about the middle of the bed. The device has one finger: "
-            "it forms them one after the other, as one undo step"
-        ),
+        description="Mirror images of a stroke about the middle of the bed. The device has one finger: "
+        "it forms them one after the other, as one undo step",
         items=brush.SYMMETRY_ITEMS,
         default="NONE",
     )
     path: bpy.props.EnumProperty(
-        name="Stroke",
-        description="Path of a stroke",
-        items=brush.PATH_ITEMS,
-        default="FREE",
+        name="Stroke", description="Path of a stroke", items=brush.PATH_ITEMS, default="FREE"
     )
-    stabilizer: bpy.props.FloatProperty(
-        name="Stabilizer (mm)",
-        description=(
-            "Length, in mm, by which a free stroke lags behind the mouse, so that it becomes smoother; "
-            "its end is reached. 0: none"
-        ),
-        default=0.0,
-        min=0.0,
-        max=50.0,
-        soft_max=15.0,
-        precision=1,
-        step=50,
-    )
+    stabilizer: millimeters(
+        "Stabilizer", 0.0,
+        "Length, in mm, by which a free stroke lags behind the mouse, so that it becomes smoother; "
+        "its end is reached. 0: none",
+        min=0.0, max=50.0, soft_max=15.0, precision=1, step=50,
+    )  # fmt: skip
     use_pressure: bpy.props.BoolProperty(
         name="Pen Pressure",
         description="Pen pressure scales depth, height and strength, up to their values",
@@ -109,20 +89,6 @@ class PressSettings:
     )
 
 
-#: How far a turn of the wheel takes the surface up, m.
-WHEEL = 0.25e-3
-MOVES = frozenset({"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"})
-WHEELS = {"WHEELUPMOUSE": WHEEL, "WHEELDOWNMOUSE": -WHEEL}
-KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the stroke back"
-KEYS_PLAIN = "{}  |  Esc or right click: take the stroke back"
-#: What is told where a brush cannot work.
-NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
-HIDDEN = "{} hides the bed here: press beside it, look from elsewhere, or hide it (H)"
-RECOVERS = "Smoothed pins will not stay so: the method {} brings all pins back"
-#: Result of a press on something else: Blender shows no reports of an operator that only passes.
-NOT_PRESSED = {"CANCELLED", "PASS_THROUGH"}
-
-
 class Press(PressSettings, Polled, bpy.types.Operator):
     """Press the fingertip into the pins under the mouse, and drag it"""
 
@@ -130,36 +96,28 @@ class Press(PressSettings, Polled, bpy.types.Operator):
     bl_label = "Press"
     # No undo step of its own: the session makes it when the finger has finished the stroke.
     bl_options = {"INTERNAL"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A view is needed, in object mode, with a bed in it."""
-        if context.area is None or context.area.type != "VIEW_3D" or context.mode != "OBJECT":
-            return "Pins are pressed in a 3D view, in Object Mode"
-        seen = any(view.is_bed(thing) for thing in context.visible_objects)
-        return "" if seen else "Add a bed first: Add > Mesh > Digital Clay"
+    needs = (no_place,)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points; beside the bed there is nothing to press."""
         if self.path != "FREE":
             return {"PASS_THROUGH"}  # to the operator of lines and rings
-        found = find_pressed(self, context, brush.find_press(context, event))
-        if found is None:
+        target = find_pressed(self, context, brush.find_press(context, event))
+        if target is None:
             return NOT_PRESSED
         # Shift and Ctrl change the brush for as long as this stroke lasts.
         self.kind = brush.choose_brush(self.brush, event)
-        session = open_session(self, context, found.bed, self.kind)
+        session = open_session(self, context, target.bed, self.kind)
         if session is None:
             return {"CANCELLED"}
         # The hand draws on the surface it has seen when it began, not on pins that give way under it.
-        self.uid, self.grid, self.surface = session.uid, found.grid, found.height.copy()
+        self.uid, self.grid, self.surface = session.uid, target.grid, target.height.copy()
         self.region, self.began = context.region, time.perf_counter()
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
         self.pressure, self.lean, self.ticked = 1.0, (0.0, 0.0), 0.0
         self.button = begin_button(event.value, (event.type_prev, event.value_prev))
-        self._feel(context, found.bed, event)
-        place = float(found.point[0]), float(found.point[1])
-        self.lagged = place
+        self._feel(context, target.bed, event)
+        self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         session, self.number = queue_stroke(
             session, *place, depth, SYMMETRIES[self.symmetry], self.kind, share, self.lean
@@ -167,11 +125,11 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         running.put(session)
         self.timer = loop.time_window(context)
         context.window_manager.modal_handler_add(self)
-        self._tell(context)
+        self._show(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Draw the stroke on; whatever is not for it goes on to Blender, to turn the view for instance."""
+        """Draw the stroke on; other events are passed to Blender, to turn the view for instance."""
         bed = brush.find_bed(bpy.context, self.uid)
         session = running.find(bed)
         stroke = session and find_stroke(session, self.number)
@@ -192,7 +150,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
             self._change(lambda stroke: replace(stroke, held=False))
-            # A press while it is held: another operator has had the release. That one is another stroke.
+            # A press while it is down: another operator has had the release. That one is another stroke.
             again = {"PASS_THROUGH"} if event.value == "PRESS" else set()
             return self._end({"FINISHED"} | again)
         else:
@@ -201,11 +159,10 @@ class Press(PressSettings, Polled, bpy.types.Operator):
                 self._change(lambda stroke: replace(stroke, known=self.ticked))
                 self.ticked = self._time()
             return {"PASS_THROUGH"}
-        self._tell(context)
+        self._show(context)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
-        """Blender ends the operator, for instance to load a file."""
         self._change(lambda stroke: replace(stroke, held=False))
         self._end(set())
 
@@ -265,10 +222,10 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         if settings is not None:
             setattr(settings, name, 1e3 * self.full)
 
-    def _tell(self, context: Any) -> None:
+    def _show(self, context: Any) -> None:
         """Show brush, depth or height, and keys in the status bar."""
-        said = brush.describe_stroke(self.kind, self.full, self.strength * self.pressure)
-        status.show(context, localize(KEYS if self.kind.has_amount else KEYS_PLAIN, said))
+        words = brush.describe_stroke(self.kind, self.full, self.strength * self.pressure)
+        status.show(context, localize(KEYS if self.kind.has_amount else KEYS_PLAIN, words))
 
     def _end(self, result: set[str]) -> set[str]:
         """Give back the status bar, and the timer."""
@@ -281,16 +238,21 @@ class Press(PressSettings, Polled, bpy.types.Operator):
 
 def find_pressed(operator: Any, context: Any, xy: tuple[float, float]) -> aim.Target | None:
     """Return the place on a bed under a pixel of the region; the operator reports what hides it."""
-    found, hider = aim.look_at(context, xy)
+    target, hider = aim.look_at(context, xy)
     if hider is not None:
         operator.report({"WARNING"}, localize(HIDDEN, hider.name))
-    return found if hider is None else None
+    return target if hider is None else None
 
 
 def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.Running | None:
     """Return the session of a bed for a stroke, started if there is none; or report why it cannot be."""
     try:
-        session = _ensure_session(context, bed)
+        if running.find(bed) is None:
+            context.view_layer.objects.active = bed
+            bpy.ops.digiclay.session("INVOKE_DEFAULT")
+        session = running.find(bed)
+        if session is None:
+            raise DigiclayError(f"The session of {bed.name} could not be started; its panel says why.")
     except (DigiclayError, RuntimeError) as error:
         operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return None
@@ -301,22 +263,7 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
     if kind is Brush.SMOOTH and session.scene.control and METHODS[session.scene.method].recovers:
         operator.report({"WARNING"}, localize(RECOVERS, localize(title(session.scene.method))))
     if session.paused:
-        operator.report(
-            {"WARNING"}, localize("The session is paused: the fingertip follows after it resumes")
-        )
+        words = localize("The session is paused: the fingertip follows after it resumes")
+        operator.report({"WARNING"}, words)
     selection.deselect(bed)
-    return session
-
-
-def _ensure_session(context: Any, bed: Any) -> running.Running:
-    """Return the session of a bed; one is started if there is none.
-
-    Raises DigiclayError, RuntimeError when it cannot be started, with the reason.
-    """
-    if running.find(bed) is None:
-        context.view_layer.objects.active = bed
-        bpy.ops.digiclay.session("INVOKE_DEFAULT")
-    session = running.find(bed)
-    if session is None:
-        raise DigiclayError(f"The session of {bed.name} could not be started; its panel says why.")
     return session

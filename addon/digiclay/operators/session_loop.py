@@ -5,21 +5,31 @@ would be lost in a crash. The operator therefore ends for a moment every so ofte
 """
 
 import time
+from functools import partial
 from typing import Any
 
 from .. import preferences
 from ..compat import bpy
-from ..device.view import bed_of
 from ..live import handlers, loop, running, selection, tick
 from ..overlay import views
 from ..press import tool
+from ..roles import bed_of
 from ..ui_text import localize
 from .action import Action, Polled
-from .poll_messages import baked, linked, no_bed, session_runs
+from .poll_messages import (
+    baked,
+    driven,
+    in_object_mode,
+    linked,
+    no_bed,
+    no_undriven,
+    no_window,
+    session_runs,
+)
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
-#: What is told of sessions whose window is gone.
+#: Message of sessions whose window is gone.
 CLOSED = "ended: its window was closed"
 
 
@@ -29,7 +39,7 @@ class LoopMixin(Polled):
     in_any_mode = True
 
     def drive(self, context: Any) -> set[str]:
-        """Begin to drive the loop that there is."""
+        """Begin to drive the loop."""
         loop.take_over()
         self.token, self.since = loop.token(), time.perf_counter()
         self.newer = _other_operators(context)
@@ -39,7 +49,7 @@ class LoopMixin(Polled):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Tick with the timer; leave every other event to whoever it is for."""
+        """Tick with the timer; pass every other event on."""
         if self.token != loop.token():
             return {"CANCELLED"}
         if _is_undo_key(context, event) and tick.withdraw_strokes(context):
@@ -73,7 +83,7 @@ class LoopMixin(Polled):
             handlers.end_all(CLOSED)
 
     def give_up(self, context: Any, words: str) -> None:
-        """End all sessions: nobody drives them any more."""
+        """End all sessions: nothing drives them any more."""
         handlers.end_all(localize("ended: {}", words))
 
     def tell(self, notes: list[tick.Note]) -> None:
@@ -89,14 +99,9 @@ class GoOn(LoopMixin, bpy.types.Operator):
     bl_idname = "digiclay.session_go_on"
     bl_label = "Go On"
     bl_options = {"INTERNAL"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """Sessions without an operator that drives them are needed."""
-        return "" if running.list_sessions() and context.window is not None else "No session runs"
+    needs = (no_undriven,)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Drive the loop again."""
         return self.drive(context)
 
 
@@ -107,14 +112,9 @@ class Escape(Action, bpy.types.Operator):
     bl_label = "Stop Sessions"
     bl_options = {"INTERNAL"}
     in_any_mode = True
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """At any other time Esc is for whoever else it is for."""
-        return "" if loop.is_aside() else "The session takes the key itself"
+    needs = (driven,)
 
     def perform(self, context: Any) -> None:
-        """Stop them, as Esc does at any other time."""
         _stop(context)
 
 
@@ -136,14 +136,12 @@ def _is_undo_key(context: Any, event: Any) -> bool:
     if event.value != "PRESS" or not any(session.strokes for session in running.list_sessions()):
         return False
     keymap = context.window_manager.keyconfigs.user.keymaps.get("Screen")
-    items = keymap.keymap_items if keymap else ()
-    return any(item.idname == "ed.undo" and item.active and _matches_key(item, event) for item in items)
-
-
-def _matches_key(item: Any, event: Any) -> bool:
-    """Return whether an event is the key of a keymap's item, with the keys held that it wants."""
-    return item.type == event.type and all(
-        bool(getattr(item, held)) == getattr(event, held) for held in ("ctrl", "shift", "alt", "oskey")
+    return any(
+        item.idname == "ed.undo"
+        and item.active
+        and item.type == event.type
+        and all(bool(getattr(item, key)) == getattr(event, key) for key in ("ctrl", "shift", "alt", "oskey"))
+        for item in (keymap.keymap_items if keymap else ())
     )
 
 
@@ -161,12 +159,9 @@ def _other_operators(context: Any) -> frozenset[int]:
 
 
 def _resume_later(token: int, window: Any) -> None:
-    """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile.
-
-    Until then the file has what is being recorded, in case Blender saves it.
-    """
+    """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile."""
     loop.step_aside()
-    handlers.write_recovery()
+    handlers.write_recovery()  # in case Blender saves the file in this moment
     pointer = window.as_pointer()
 
     def go_on() -> None:
@@ -174,11 +169,11 @@ def _resume_later(token: int, window: Any) -> None:
             return
         handlers.clear_recovery()
         windows = bpy.context.window_manager.windows
-        found = next((one for one in windows if one.as_pointer() == pointer), None)
-        if found is None:
+        same = next((window for window in windows if window.as_pointer() == pointer), None)
+        if same is None:
             handlers.end_all(CLOSED)
             return
-        with bpy.context.temp_override(window=found):
+        with bpy.context.temp_override(window=same):
             bpy.ops.digiclay.session_go_on("INVOKE_DEFAULT")
 
     bpy.app.timers.register(go_on, first_interval=MOMENT)
@@ -197,24 +192,16 @@ class LeaveMode(Action, bpy.types.Operator):
     bl_label = "Back to Object Mode"
     bl_options = {"REGISTER", "UNDO"}
     in_any_mode = True
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed, in another mode."""
-        return no_bed(context) or ("" if context.mode != "OBJECT" else "This is Object Mode already")
+    needs = no_bed, in_object_mode
 
     def perform(self, context: Any) -> None:
-        """Leave it."""
         leave_mode(context)
         if context.window is not None:
             tool.take_up(context)
 
 
 def leave_entry(menu: Any, context: Any) -> None:
-    """Offer the way back after the menus of a 3D view's header, as in the Sculpting workspace.
-
-    `menu` bpy.types.Menu; `context` bpy.types.Context.
-    """
+    """Offer the way back after the menus of a 3D view's header, as in the Sculpting workspace."""
     if not LeaveMode.poll_message(context):
         menu.layout.operator(LeaveMode.bl_idname, icon="LOOP_BACK")
 
@@ -224,21 +211,15 @@ class Session(LoopMixin, Action, bpy.types.Operator):
 
     bl_idname = "digiclay.session"
     bl_label = "Start Session"
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed, with no session yet, and a window; the mode is left for Object Mode."""
-        in_window = not bpy.app.background and context.window is not None
-        return (
-            no_bed(context)
-            or session_runs(context, "A session runs on this bed already: Esc stops it")
-            or linked(context)
-            or baked(context)
-            or ("" if in_window else "A live session needs a window; takes can be baked without")
-        )
+    needs = (
+        no_bed,
+        partial(session_runs, message="A session runs on this bed already: Esc stops it"),
+        linked,
+        baked,
+        no_window,
+    )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Start as `execute` does."""
         return self.execute(context)
 
     def perform(self, context: Any) -> set[str] | None:

@@ -14,10 +14,7 @@ _TOLD: dict[str, str] = {}
 
 
 def show(context: Any, words: str) -> None:
-    """Write words into the status bar, in place of those written before, in whichever workspace.
-
-    `context` bpy.types.Context.
-    """
+    """Write words into the status bar, in place of those written before, in whichever workspace."""
     name = context.workspace.name
     if _TOLD.get(name) == words:
         return

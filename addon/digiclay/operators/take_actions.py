@@ -1,4 +1,4 @@
-"""Actions on takes: record, keep, export, remove; recorded strokes are played."""
+"""Actions on takes: record, keep, export as a scene file, remove; recorded strokes are played."""
 
 from pathlib import Path
 from typing import Any
@@ -8,13 +8,13 @@ from ..core.base.errors import DigiclayError
 from ..core.files.run_folder import write_whole
 from ..core.scene.toml_table import format_scene
 from ..core.session.take import to_scene
-from ..device.view import bed_of
 from ..live import handlers, running, sculpting, tick
 from ..live.recorded_strokes import play_strokes, read_strokes
 from ..recorded import takes
+from ..roles import bed_of
 from ..ui_text import localize
 from .action import Action, FileAction
-from .poll_messages import baked, linked, no_bed, no_take, session_runs
+from .poll_messages import baked, cannot_record, linked, no_bed, no_recording, no_take, session_runs
 
 
 class ChosenTake:
@@ -33,19 +33,11 @@ class RecordTake(Action, bpy.types.Operator):
     bl_idname = "digiclay.take_record"
     bl_label = "Record Take"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A running session that does not record yet is needed."""
-        session = running.find(bed_of(context))
-        if session is None:
-            return "Start a session first"
-        return "A take is being recorded already" if session.recording is not None else ""
+    needs = (cannot_record,)
 
     def perform(self, context: Any) -> None:
-        """Begin to record."""
         session = running.find(bed_of(context))
-        assert session is not None  # so says the poll
+        assert session is not None  # by the poll
         running.put(sculpting.set_recording(session, True))
 
 
@@ -55,21 +47,15 @@ class KeepTake(Action, bpy.types.Operator):
     bl_idname = "digiclay.take_keep"
     bl_label = "Keep Take"
     bl_options = {"REGISTER", "UNDO"}
+    needs = (no_recording,)
 
     name: bpy.props.StringProperty(name="Name", description="Name of the take; empty: its number", maxlen=60)
 
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A session that records is needed."""
-        session = running.find(bed_of(context))
-        return "" if session is not None and session.recording is not None else "Record a take first"
-
     def perform(self, context: Any) -> set[str] | None:
-        """Keep it."""
         handlers.clear_recovery()
         bed = bed_of(context)
         session = running.find(bed)
-        assert session is not None  # so says the poll
+        assert session is not None  # by the poll
         take = takes.read_recording(session)
         running.put(sculpting.set_recording(session, False))
         if take is None:
@@ -86,14 +72,10 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
     bl_idname = "digiclay.take_export"
     bl_label = "Export Take"
     bl_options = {"REGISTER"}
+    needs = no_bed, no_take
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH")
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed with a take is needed."""
-        return no_bed(context) or no_take(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser, with the name of the take."""
@@ -105,7 +87,6 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
         return super().invoke(context, event)
 
     def perform(self, context: Any) -> None:
-        """Write it."""
         entry = self.chosen_take(context)
         take = takes.read(bed_of(context), entry.number)
         # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
@@ -120,14 +101,9 @@ class RemoveTake(ChosenTake, Action, bpy.types.Operator):
     bl_idname = "digiclay.take_remove"
     bl_label = "Remove Take"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed with a take is needed."""
-        return no_bed(context) or no_take(context)
+    needs = no_bed, no_take
 
     def perform(self, context: Any) -> None:
-        """Remove it."""
         takes.remove(bed_of(context), self.chosen_take(context).number)
 
 
@@ -137,14 +113,10 @@ class PlayStrokes(FileAction, bpy.types.Operator):
     bl_idname = "digiclay.play_strokes"
     bl_label = "Play Strokes"
     bl_options = {"REGISTER", "UNDO"}
+    needs = no_bed, session_runs, linked, baked
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH")
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed that a session could begin on."""
-        return no_bed(context) or session_runs(context) or linked(context) or baked(context)
 
     def perform(self, context: Any) -> None:
         """Play them in a session of their own; when one of them fails, the bed stays as it was."""

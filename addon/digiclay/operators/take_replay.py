@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,10 @@ from ..core.session.live_session import Clock, periods_due, simulate_path
 from ..core.session.take import MOST_PARTS, Take, refine
 from ..device import view
 from ..device.instant import find_ellipsoid, pick_pose
-from ..device.view import bed_of
 from ..live import bed_state, sculpting, tick
 from ..live.running import Running
 from ..recorded import takes
+from ..roles import bed_of, fingertip_of
 from ..settings import properties
 from ..ui_text import localize
 from . import status
@@ -39,20 +40,13 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     bl_idname = "digiclay.take_replay"
     bl_label = "Replay Take"
     bl_options = {"REGISTER", "UNDO"}
+    needs = no_bed, partial(session_runs, message="Stop the session on this bed first"), no_take
 
     parts: bpy.props.IntProperty(
         name="Finer Steps",
         description="Number of parts of each physics step: 1 replays the take bit for bit",
-        default=1,
-        min=1,
-        max=MOST_PARTS,
-    )
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed with a take and without a session is needed."""
-        runs = session_runs(context, "Stop the session on this bed first")
-        return no_bed(context) or runs or no_take(context)
+        default=1, min=1, max=MOST_PARTS,
+    )  # fmt: skip
 
     def perform(self, context: Any) -> None:
         """Play it without showing anything but its end."""
@@ -72,62 +66,64 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     def modal(self, context: Any, event: Any) -> set[str]:
         """Continue by the wall clock."""
         if event.type == "ESC" and event.value == "PRESS":
-            return self._left(context)
+            return self._restore(context)
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         bed = bed_of(context)
         if bed is None or bed.session_uid != self._uid:
-            return self._left(context)
-        if bridge.find_fault(bed.data):  # it goes on when it can be drawn again
+            return self._restore(context)
+        if bridge.find_fault(bed.data):  # it continues when it can be drawn again
             self._clock = self._clock.stopped()
             return {"PASS_THROUGH"}
         period = self._system.period
         count, self._clock = periods_due(
             self._clock, time.perf_counter(), period, preferences.get(context).most_periods
         )
-        for _ in range(min(count, self._took.periods - self._at)):
+        for _ in range(min(count, self._take.periods - self._at)):
             self._state = next(self._states)
             self._at += 1
-        if self._at == self._took.periods:
-            self._ended(context)
+        if self._at == self._take.periods:
+            self.cancel(context)
             return self._finish(context)
         view.show_state(bed, self._system, self._state)
         self._place(bed)
-        seconds, whole = self._at * period, self._took.duration
+        seconds, whole = self._at * period, self._take.duration
         status.show(context, localize("Replay: {:.1f} of {:.1f} s     Esc: stop", seconds, whole))
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Any) -> None:
-        """Stop when Blender takes the operator away, such as at the loading of a file."""
-        self._ended(context)
+        """Take back what the replay needs of Blender."""
+        self._states = iter(())
+        context.window_manager.event_timer_remove(self._timer)
+        status.clear()
 
     def give_up(self, context: Any, words: str) -> None:
         """Show the bed as it was before."""
-        self._left(context)
+        self._restore(context)
 
     def _begin(self, context: Any) -> None:
         """Read the take and put everything to its start."""
         bed = bed_of(context)
         self._uid = bed.session_uid
-        tip = view.fingertip_of(bed)
-        # Where the finger is now: it may have been moved since the last session.
+        tip = fingertip_of(bed)
+        # The fingertip's pose now: it may have been moved since the last session.
         self._stood = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
-        self._took: Take = takes.read(bed, self.take)
-        self._system = assemble(refine(self._took.scene, self.parts))
+        self._take: Take = takes.read(bed, self.take)
+        self._system = assemble(refine(self._take.scene, self.parts))
         if self._system.grid.count != len(bed.data.vertices):
             here, there = len(bed.data.vertices), self._system.grid.count
             raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
-        self._state = snapshot.load(self._system, self._took.start)
-        took = self._took
-        self._states = simulate_path(self._system, self._state, took.poses, took.smoothing)
+        self._state = snapshot.load(self._system, self._take.start)
+        take = self._take
+        self._states = simulate_path(self._system, self._state, take.poses, take.smoothing)
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:
-        """Put the fingertip to where the take has it; one that is animated goes its own way."""
-        tip = view.fingertip_of(bed)
+        """Put the fingertip to where the take has it; one that is animated follows its animation."""
+        tip = fingertip_of(bed)
         if tip is not None:
-            finger = find_ellipsoid(self._took.scene)
-            bridge.place_fingertip(tip, pick_pose(self._took.poses[self._at]), finger)
+            finger = find_ellipsoid(self._take.scene)
+            bridge.place_fingertip(tip, pick_pose(self._take.poses[self._at]), finger)
 
     def _finish(self, context: Any) -> set[str]:
         """Leave the bed in the final state of the take, and report the comparison."""
@@ -136,39 +132,29 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         self._place(bed)
         bed_state.write(bed, self._came_to(bed, state))
         view.show_state(bed, system, self._state)
-        seconds = f"{self._took.duration:.1f} s"
-        if state == self._took.end:
+        seconds = f"{self._take.duration:.1f} s"
+        if state == self._take.end:
             self.report({"INFO"}, localize("Replayed {}: it ends in the same state, bit for bit", seconds))
-        elif self.parts == 1:
-            self.report(
-                {"WARNING"},
-                localize("Replayed {}: it ends {:.3g} µm away, as another version may", seconds, self._off()),
-            )
+            return {"FINISHED"}
+        recorded = snapshot.load(self._system, self._take.end)
+        away = 1e6 * float(np.abs(self._state.row(0) - recorded.row(0)).max())
+        if self.parts == 1:
+            words = localize("Replayed {}: it ends {:.3g} µm away, as another version may", seconds, away)
+            self.report({"WARNING"}, words)
         else:
-            said = localize("steps {} times finer end {:.3g} µm away", self.parts, self._off())
-            self.report({"INFO"}, localize("Replayed {}: {}", seconds, said))
+            words = localize("steps {} times finer end {:.3g} µm away", self.parts, away)
+            self.report({"INFO"}, localize("Replayed {}: {}", seconds, words))
         return {"FINISHED"}
-
-    def _off(self) -> float:
-        """Return the largest difference of a height at the end from the take's, µm."""
-        ended = snapshot.load(self._system, self._took.end)
-        return 1e6 * float(np.abs(self._state.row(0) - ended.row(0)).max())
 
     def _came_to(self, bed: Any, state: bytes) -> Running:
         """Return the session that would go on from here."""
-        session, _ = sculpting.begin_session(
-            bed.session_uid,
-            bed.name,
-            self._took.scene,
-            pick_pose(self._took.poses[-1]),
-            state,
-            bed_state.read_tick(bed),
-        )
-        return session
+        take = self._take
+        uid, pose, tick_count = bed.session_uid, pick_pose(take.poses[-1]), bed_state.read_tick(bed)
+        return sculpting.begin_session(uid, bed.name, take.scene, pose, state, tick_count)[0]
 
-    def _left(self, context: Any) -> set[str]:
+    def _restore(self, context: Any) -> set[str]:
         """Show the bed as it was before."""
-        self._ended(context)
+        self.cancel(context)
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
         if bed is not None:
             try:
@@ -182,9 +168,3 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
                 self.report({"WARNING"}, str(error))
         self.report({"INFO"}, localize("Replay stopped: the bed is restored"))
         return {"CANCELLED"}
-
-    def _ended(self, context: Any) -> None:
-        """Take back what the replay needs of Blender."""
-        self._states = iter(())
-        context.window_manager.event_timer_remove(self._timer)
-        status.clear()
