@@ -9,15 +9,10 @@ from digiclay.cli import carry_out, run_as_program
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a benchmark; return its exit code, as `digiclay.cli.main` does.
-
-    What the benchmarks need is imported only here: numpy after its number of cores is set.
-
-    `argv`: the arguments; by default those of the process.
-    """
+    """Run a benchmark; return its exit code, as `digiclay.cli.main` does."""
 
     def parse() -> argparse.Namespace:
-        from .kinds import parser
+        from .kinds import parser  # imports numpy, whose number of cores is set before
 
         return parser().parse_args(argv)
 

@@ -1,9 +1,9 @@
-"""``python -m benchmarks ablation``: Method III with one of its parts left out at a time."""
+"""Benchmark ``ablation``: Method III with one of its parts left out at a time."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -16,14 +16,18 @@ from digiclay.core.control.finger_estimate import Estimate, FingerFilter
 from digiclay.core.control.flow_servo import FlowServo
 from digiclay.core.control.hybrid import HybridControl
 from digiclay.core.control.led_blister import LeadProfile
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.metrics.force import compute_rfd
+from digiclay.core.model.control_interface import Controller
 from digiclay.core.model.relaxation import Relaxation
+from digiclay.core.model.set_point import find_set_point
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
 from digiclay.core.studies.method_trials import PHASES, Trial, place_trial
 from digiclay.core.studies.speed_limits import place_way
 
-from .report import add_kind, kept, made_with, progress
-from .wrong_models import run_controller
+from .report import Report, Steps
 
 #: Trajectories, and the noise of the force sensors on them.
 TRIALS = (("session", "0"), ("session", "2 mN"), ("twisted", "0"), ("dead-stop", "0"), ("ridge-40", "0"))
@@ -66,12 +70,12 @@ class Unled(LeadProfile):
 
 @dataclass(frozen=True, eq=False)
 class BareFilter(FingerFilter):
-    """Filter that keeps nothing of what it leaves of single undersides."""
+    """Filter without the residuals of single undersides."""
 
     def correct(self, *arguments: Any) -> tuple[Estimate, Floats]:
         """Return the corrected estimate, and no residuals."""
-        found, left = super().correct(*arguments)
-        return found, np.zeros_like(left)
+        estimate, residuals = super().correct(*arguments)
+        return estimate, np.zeros_like(residuals)
 
 
 def _like(kind: type[Any], part: Any, **changes: Any) -> Any:
@@ -79,37 +83,39 @@ def _like(kind: type[Any], part: Any, **changes: Any) -> Any:
     return kind(**{item.name: getattr(part, item.name) for item in fields(part)}, **changes)
 
 
-def _without_relaxation(known: HybridControl) -> HybridControl:
-    touch = known.pulp.touch
+def _without_relaxation(control: HybridControl) -> HybridControl:
+    touch = control.pulp.touch
     # As many filters as before, without weight: a controller's rows are the device's.
     assert isinstance(touch.pulp, Relaxation)
     stiff = replace(touch.pulp, weights=(1.0, *(0.0 for _ in touch.pulp.times)))
-    return replace(known, pulp=replace(known.pulp, touch=replace(touch, pulp=stiff)))
+    return replace(control, pulp=replace(control.pulp, touch=replace(touch, pulp=stiff)))
 
 
-def _without_prediction(known: HybridControl) -> HybridControl:
-    return replace(known, servo=_like(StillServo, replace(known.servo, ahead=0.0), aimed=known.servo.span))
+def _without_prediction(control: HybridControl) -> HybridControl:
+    return replace(
+        control, servo=_like(StillServo, replace(control.servo, ahead=0.0), aimed=control.servo.span)
+    )
 
 
-def _without_commands_in_flight(known: HybridControl) -> HybridControl:
-    return replace(known, servo=replace(known.servo, left=(0.0,) * len(known.servo.left)))
+def _without_commands_in_flight(control: HybridControl) -> HybridControl:
+    return replace(control, servo=replace(control.servo, left=(0.0,) * len(control.servo.left)))
 
 
-def _without_load(known: HybridControl) -> HybridControl:
-    return replace(known, servo=_like(UnloadedServo, known.servo))
+def _without_load(control: HybridControl) -> HybridControl:
+    return replace(control, servo=_like(UnloadedServo, control.servo))
 
 
-def _without_lead(known: HybridControl) -> HybridControl:
-    return replace(known, profile=_like(Unled, known.profile))
+def _without_lead(control: HybridControl) -> HybridControl:
+    return replace(control, profile=_like(Unled, control.profile))
 
 
-def _without_residuals(known: HybridControl) -> HybridControl:
-    return replace(known, finger=_like(BareFilter, known.finger))
+def _without_residuals(control: HybridControl) -> HybridControl:
+    return replace(control, finger=_like(BareFilter, control.finger))
 
 
-def _without_threshold(known: HybridControl) -> HybridControl:
-    least = known.parameters.felt_force
-    return replace(known, felt=least, pulp=replace(known.pulp, floor=least))
+def _without_threshold(control: HybridControl) -> HybridControl:
+    least = control.parameters.felt_force
+    return replace(control, felt=least, pulp=replace(control.pulp, floor=least))
 
 
 #: Parts that are left out by another value of a parameter.
@@ -135,50 +141,26 @@ PUT_TOGETHER: dict[str, Callable[[HybridControl], HybridControl]] = {
 }
 
 
-def add(kinds: Any) -> None:
-    """Add the benchmark."""
-    examples = "  python -m benchmarks ablation\n  python -m benchmarks ablation --part skirt\n"
-    parser = add_kind(kinds, "ablation", "Method III with one part left out at a time", examples)
-    parser.add_argument("--part", metavar="P", help=f"one of {', '.join([*PARAMETERS, *PUT_TOGETHER])}")
-    parser.set_defaults(carry_out=carry_out)
-
-
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Run every trial without each part, and print the table."""
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Run every trial without each part."""
     parts = [*PARAMETERS, *PUT_TOGETHER]
     if arguments.part is not None:
         if arguments.part not in parts:
             raise ParameterError("--part", "", f"must be one of {', '.join(parts)}", repr(arguments.part))
         parts = list(dict.fromkeys(("nothing", arguments.part)))
     trials = FEW if arguments.quick else TRIALS
-    rows: list[tuple[str, str, str, dict[str, float | None]]] = []
-    with progress(arguments, "trials", len(parts) * len(trials)) as bar:
-        for part in parts:
-            for trajectory, noise in trials:
-                rows.append((part, trajectory, noise, run_without(part, trajectory, noise)))
-                bar(part)
-    lines = [
-        made_with(),
-        "",
-        "RFD, N, of the ridge drag alone, else in contact; losses, lift-offs included, and largest force, N.",
-        "",
-    ]
+    jobs = [(part, *trial) for part in parts for trial in trials]
+    figures = {job: run_without(*job) for job in steps.through(jobs, lambda job: job[0])}
     head = ["left out", *(f"{name}, {noise}" if noise != "0" else name for name, noise in trials)]
-    cells = [[part, *(_write(found) for own, *_, found in rows if own == part)] for part in parts]
-    lines += list(table(head, cells))
-    text = "\n".join(lines)
-    print(text)
+    cells = [[part, *(_write(figures[part, *trial]) for trial in trials)] for part in parts]
+    title = "RFD, N, of the ridge drag alone, else in contact; losses with lift-offs, and largest force."
     names = ("left_out", "trajectory", "force_noise", "rfd_N", "losses", "largest_force_N")
-    kept(arguments.out, "ablation", text, names, [[*row[:3], *row[3].values()] for row in rows])
-    return 0
+    rows = [[*job, *values.values()] for job, values in figures.items()]
+    return Report(["", title, "", *table(head, cells)], names, rows)
 
 
 def run_without(part: str, trajectory: str, noise: str) -> dict[str, float | None]:
-    """Return the figures of a trial without a part of Method III.
-
-    `part`: in `PARAMETERS` or `PUT_TOGETHER`; `trajectory`: see `method_trials.GROUPS`; `noise`: standard
-    deviation of the force sensors.
-    """
+    """Return the figures of a trial without a part of Method III; `trajectory`: of `method_trials.GROUPS`."""
     settings = [Setting("control.method", "hybrid"), Setting("sensors.force_noise", noise)]
     settings += [Setting(f"control.{name}", value) for name, value in PARAMETERS.get(part, {}).items()]
     scene, phase = load(find("ridge_mound_valley"), settings), None
@@ -188,11 +170,32 @@ def run_without(part: str, trajectory: str, noise: str) -> dict[str, float | Non
         scene, _ = place_trial(scene, Trial(trajectory, trajectory))
     controller = assemble(scene).controller
     assert isinstance(controller, HybridControl)
-    own = PUT_TOGETHER[part](controller) if part in PUT_TOGETHER else controller
-    return run_controller(scene, own, phase)
+    if part in PUT_TOGETHER:
+        controller = PUT_TOGETHER[part](controller)
+    return run_controller(scene, controller, phase)
 
 
-def _write(found: Mapping[str, float | None]) -> str:
+def run_controller(
+    scene: Scene, controller: Controller, phase: Sequence[float] | None = None
+) -> dict[str, float | None]:
+    """Return RFD, losses and largest force of a session with a controller in place of the scene's.
+
+    `phase`: start and end of the part over whose rows the RFD is taken, s; by default rows in contact.
+    """
+    system = replace(assemble(scene), controller=controller)
+    forces, losses = [], 0
+    for state in periods(system, scene.trajectories(), begin(system), scene.periods):
+        forces.append(float(state.active.all.force.sum()))
+        losses = state.memory.losses
+    total = np.array(forces)
+    wanted = find_set_point(scene.set_point, total)
+    moments = np.arange(1, total.size + 1) * system.period
+    rows = None if phase is None else (moments >= phase[0]) & (moments <= phase[1])
+    rfd = compute_rfd(moments, total, wanted, rows)
+    return {"rfd": rfd, "losses": float(losses), "max_total_force": float(total.max())}
+
+
+def _write(figures: Mapping[str, float | None]) -> str:
     """Write a cell of the table."""
-    rfd, losses, force = (found[name] or 0.0 for name in ("rfd", "losses", "max_total_force"))
+    rfd, losses, force = (figures[name] or 0.0 for name in ("rfd", "losses", "max_total_force"))
     return f"{rfd:.4f} ({losses:g}, {force:.2f})"

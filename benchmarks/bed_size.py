@@ -1,4 +1,4 @@
-"""``python -m benchmarks scale``: the same fingertip path on beds from 625 pins to a million."""
+"""Benchmark ``scale``: the same fingertip path on beds from 625 pins to a million."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,12 +20,11 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.plots.figure import empty
 
-from .plots import STYLE, write
-from .report import add_kind, kept, made_with, progress
+from .report import BLUE, RED, STYLE, Report, Steps, cells, list_records
 
 #: Pins along a side of the beds.
 SIDES = (25, 101, 317, 1001)
-#: The finger presses in the middle, rises and is dragged, over one and the same pins of every bed.
+#: The fingertip presses in the middle, rises and is dragged, over the same pins of every bed: s; x, z in mm.
 PATH = ((0.0, 0.0, 42.0), (0.3, 0.0, 36.5), (0.8, 6.0, 40.0), (1.3, 12.0, 44.0), (1.6, 12.0, 60.0))
 DURATION = 1.6
 
@@ -42,7 +40,7 @@ class Size:
     period : float
         A control period, the median, s.
     mean : float
-        CPU time of a control period, the mean, s: the finger's poses are worked out for 128 at once.
+        CPU time of a control period, the mean, s: the fingertip's poses are computed for 128 at once.
     gathered : float
         Cells that take part, on average.
     """
@@ -57,21 +55,14 @@ class Size:
 
 def scene(side: int) -> Scene:
     """Return a bed of side x side pins; an odd side has a pin in the middle."""
-    return resolve(
-        {
-            "layout": {"rows": side, "columns": side},
-            "recorder": "absent",
-            "simulation": {"duration": DURATION},
-            "trajectory": {
-                "waypoints": [{"time": t, "position": [x * 1e-3, 0.0, z * 1e-3]} for t, x, z in PATH]
-            },
-        },
-        f"{side * side} pins",
-    )
+    waypoints = [{"time": t, "position": [x * 1e-3, 0.0, z * 1e-3]} for t, x, z in PATH]
+    parts = {"simulation": {"duration": DURATION}, "trajectory": {"waypoints": waypoints}}
+    layout = {"rows": side, "columns": side}
+    return resolve({"layout": layout, "recorder": "absent", **parts}, f"{side * side} pins")
 
 
 def bytes_of(*values: Any) -> int:
-    """Return the bytes of all different arrays in some dataclasses, and in what these hold."""
+    """Return the bytes of all different arrays in dataclasses and sequences, and within their members."""
     arrays: dict[int, int] = {}
     waiting, seen = list(values), set()
     while waiting:
@@ -90,95 +81,67 @@ def bytes_of(*values: Any) -> int:
 
 def gathered_cells(side: int) -> list[int]:
     """Return how many cells take part in each control period."""
-    known = scene(side)
-    system = assemble(known)
-    run = periods(system, known.trajectories(), begin(system), known.periods)
+    bed = scene(side)
+    system = assemble(bed)
+    run = periods(system, bed.trajectories(), begin(system), bed.periods)
     return [state.active.cells.size for state in run]
 
 
-def measured(side: int, repeats: int) -> Size:
-    """Build a bed and run the session on it; the median of the repeats counts.
-
-    `side`: pins along each side.
-    """
-    built, spent, cells, means = [], [], [], []
-    known = scene(side)
+def _time_bed(side: int, repeats: int) -> Size:
+    """Build a bed of `side` x `side` pins and run the session on it; the median of the repeats counts."""
+    built, spent, gathered, means = [], [], [], []
+    bed = scene(side)
     bytes_a_pin = 0.0
     for _ in range(repeats):
         started = time.perf_counter()
-        system: System = assemble(known)
+        system: System = assemble(bed)
         start: State = begin(system)
         built.append(time.perf_counter() - started)
         used, moments = time.process_time(), [time.perf_counter()]
-        for state in periods(system, known.trajectories(), start, known.periods):
+        for state in periods(system, bed.trajectories(), start, bed.periods):
             moments.append(time.perf_counter())
-            cells.append(state.active.cells.size)
-        means.append((time.process_time() - used) / known.periods)
+            gathered.append(state.active.cells.size)
+        means.append((time.process_time() - used) / bed.periods)
         spent += [b - a for a, b in pairwise(moments)]
         bytes_a_pin = bytes_of(system, state) / (side * side)
-    return Size(
-        side * side,
-        statistics.median(built),
-        statistics.median(spent),
-        statistics.median(means),
-        statistics.fmean(cells),
-        bytes_a_pin,
-    )
+    build, period, mean = (statistics.median(times) for times in (built, spent, means))
+    return Size(side * side, build, period, mean, statistics.fmean(gathered), bytes_a_pin)
 
 
-def add(kinds: Any) -> None:
-    """Add the benchmark."""
-    examples = "  python -m benchmarks scale\n  python -m benchmarks scale --quick --out results\n"
-    parser = add_kind(kinds, "scale", "a control period from 625 pins to a million", examples)
-    parser.set_defaults(carry_out=carry_out)
-
-
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Measure every size, and print the table."""
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Measure every size."""
     sides, repeats = (SIDES[:3], 1) if arguments.quick else (SIDES, 5)
-    with progress(arguments, "scale", len(sides)) as bar:
-        sizes = []
-        for side in sides:
-            sizes.append(measured(side, repeats))
-            bar(f"{side * side} pins")
-    text = "\n".join(_text(sizes))
-    print(text)
-    head = [field.name for field in fields(Size)]
-    kept(arguments.out, "scale", text, head, [[getattr(one, name) for name in head] for one in sizes])
-    if arguments.out:
-        _draw(sizes, arguments.out / "scale.png")
-    return 0
+    sizes = [_time_bed(side, repeats) for side in steps.through(sides, lambda side: f"{side * side} pins")]
+    return Report(_list_lines(sizes), *list_records(sizes), lambda: _draw(sizes))
 
 
-def _draw(sizes: Sequence[Size], out: Path) -> Path:
-    """Draw a control period's cost over the number of pins, and return the path."""
+def _draw(sizes: Sequence[Size]) -> Any:
+    """Draw a control period's cost over the number of pins."""
     with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
         panel = figure.subplots()
-        pins = [one.pins for one in sizes]
+        pins = [size.pins for size in sizes]
         for values, label, color, marker in (
-            ([one.period * 1e6 for one in sizes], "median", "#0072B2", "o"),
-            ([one.mean * 1e6 for one in sizes], "mean, with the finger's poses", "#D55E00", "s"),
+            ([size.period * 1e6 for size in sizes], "median", BLUE, "o"),
+            ([size.mean * 1e6 for size in sizes], "mean, with the fingertip's poses", RED, "s"),
         ):
             panel.semilogx(pins, values, "-", color=color, marker=marker, label=label)
-        panel.set_ylim(0.0, 1.2e6 * max(one.mean for one in sizes))
-        panel.set_xlabel("pins of the bed")
-        panel.set_ylabel("a control period, µs")
-        panel.set_title("The same finger on larger beds")
+        panel.set(
+            ylim=(0.0, 1.2e6 * max(size.mean for size in sizes)), title="The same fingertip, larger beds"
+        )
+        panel.set(xlabel="pins of the bed", ylabel="a control period, µs")
         panel.legend(loc="lower right")
-        return write(figure, out)
+        return figure
 
 
-def _text(sizes: list[Size]) -> Iterator[str]:
+def _list_lines(sizes: list[Size]) -> Iterator[str]:
     """Give the lines of the report."""
-    yield made_with()
-    yield "\nThe same finger, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
+    yield "\nThe same fingertip, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
     head = ("pins", "taking part", "period, µs", "to smallest", "CPU mean, µs", "built in, ms", "bytes a pin")
     rows = [
-        [
-            str(one.pins), f"{one.gathered:.1f}", f"{one.period * 1e6:.0f}",
-            f"{one.period / sizes[0].period:.2f}",
-            f"{one.mean * 1e6:.0f}", f"{one.built * 1e3:.3g}", f"{one.bytes_a_pin:.1f}",
-        ]
+        cells(
+            "d .1f .0f .2f .0f .3g .1f", one.pins, one.gathered, one.period * 1e6,
+            one.period / sizes[0].period, one.mean * 1e6, one.built * 1e3, one.bytes_a_pin,
+        )
         for one in sizes
     ]  # fmt: skip
     yield from table(head, rows, left=0)

@@ -1,4 +1,4 @@
-"""``python -m benchmarks commits``: processor time of a control period at two commits, by turns."""
+"""Benchmark ``commits``: processor time of a control period at two commits, by turns."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import sys
 import tarfile
 import tempfile
 from pathlib import Path
-from typing import Any
 
+from digiclay.commands.progress import table
 from digiclay.core.base.errors import DigiclayError
 
-from .report import add_kind, kept, made_with, progress, table
+from .report import Report, Steps, cells
 
 ROOT = Path(__file__).parents[1]
 #: Cases and their settings of the session.
@@ -46,48 +46,28 @@ def measure(settings):
 
 print(json.dumps([measure(settings) for settings in json.loads(sys.argv[1])]))
 """
-EXAMPLES = """\
-  python -m benchmarks commits v0.1.0             the last release beside HEAD
-  python -m benchmarks commits v0.1.0 main --turns 9
-"""
 #: Longest run of one commit, s.
 LONGEST = 600.0
 
 
-def add(kinds: Any) -> None:
-    """Add this benchmark to the parser."""
-    parser = add_kind(kinds, "commits", "time of a control period at two commits", EXAMPLES)
-    parser.add_argument("old", help="commit, branch or tag")
-    parser.add_argument("new", nargs="?", default="HEAD", help="another one, by default HEAD")
-    parser.add_argument("--turns", type=int, default=5, metavar="N", help="runs of each commit, default 5")
-    parser.set_defaults(carry_out=carry_out)
-
-
-def carry_out(arguments: argparse.Namespace) -> None:
-    """Time both commits by turns, and print the ratios turn by turn."""
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Time both commits by turns."""
     turns, count = (2, 200) if arguments.quick else (max(arguments.turns, 1), 1000)
     names = (arguments.old, arguments.new)
-    with tempfile.TemporaryDirectory() as scratch, progress(arguments, "commits", 2 * turns) as bar:
+    with tempfile.TemporaryDirectory() as scratch:
         trees = [extract(name, Path(scratch) / str(number)) for number, name in enumerate(names)]
-        rounds = []
-        for _ in range(turns):
-            times = []
-            for name, tree in zip(names, trees, strict=True):
-                times.append(run(tree, name, count))
-                bar(name)
-            rounds.append(times)
+        jobs = steps.through([*zip(trees, names, strict=True)] * turns, lambda job: str(job[1]))
+        times = [[1e6 * time for time in run(tree, name, count)] for tree, name in jobs]
     head = ["case", f"{names[0]} (µs)", f"{names[1]} (µs)", "ratio", "least", "largest"]
     rows = []
-    for number, case in enumerate(CASES):
-        old, new = ([1e6 * turn[which][number] for turn in rounds] for which in (0, 1))
+    for case, old, new in zip(
+        CASES, zip(*times[::2], strict=True), zip(*times[1::2], strict=True), strict=True
+    ):
         ratios = [after / before for before, after in zip(old, new, strict=True)]
-        figures = (statistics.median(old), statistics.median(new))
-        spread = (statistics.median(ratios), min(ratios), max(ratios))
-        rows.append([case, *(f"{one:.1f}" for one in figures), *(f"{one:.2f}" for one in spread)])
-    title = f"processor time of a control period, medians of {turns} turns; {made_with()}"
-    text = "\n".join([title, "", *table(head, rows)])
-    print(text)
-    kept(arguments.out, "commits", text, head, rows)
+        figures = statistics.median(old), statistics.median(new), statistics.median(ratios)
+        rows.append(cells("s .1f .1f .2f .2f .2f", case, *figures, min(ratios), max(ratios)))
+    title = f"processor time of a control period, medians of {turns} turns"
+    return Report(["", title, "", *table(head, rows)], head, rows)
 
 
 def extract(commit: str, folder: Path) -> Path:

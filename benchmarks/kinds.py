@@ -1,48 +1,151 @@
-"""Parser of all benchmarks."""
+"""The benchmarks in one table, their parser, and what runs them."""
 
 from __future__ import annotations
 
 import argparse
+import io
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
-from digiclay.commands.arguments import Help
+from digiclay.commands.arguments import Help, add_command, add_scene
 from digiclay.commands.parser import Parser
+from digiclay.commands.stop import refuse_unwritable, refuse_without, refuse_without_blender
+from digiclay.core.base.errors import OutputError
+from digiclay.settings.beds import BEDS
 
-from . import (
-    ablation,
-    bed_size,
-    cluster_cost,
-    commit_pair,
-    made,
-    mesh_export,
-    method_figures,
-    precision,
-    runs_together,
-    serve_times,
-    session_parts,
-    stiff,
-    terms,
-    ticks,
-    viewport,
-)
+from .report import Report, Steps, write_report
 
+Options = Callable[[argparse.ArgumentParser], object]
+
+#: Recorded strokes of the made things.
+STROKES = Path(__file__).parent / "strokes"
+#: Packages that benchmarks need, and the extra that has them.
+EXTRAS = {"distributed": "cluster", "websockets": "serve"}
 EXAMPLES = """\
 examples:
-  python -m benchmarks session        time of a control period, part by part
-  python -m benchmarks stiff          errors in stiff and extreme cases
-  python -m benchmarks precision      error over run time, beside SciPy
-  python -m benchmarks terms tap      cost and effect of each part of the model
-  python -m benchmarks scale          a control period from 625 pins to a million
-  python -m benchmarks stack          sessions a second, alone and in a batch
-  python -m benchmarks cluster        overhead of a Dask cluster, one worker against two
-  python -m benchmarks export         mesh files of beds from 625 pins to a million
-  python -m benchmarks viewport       a tick of a live session in Blender
-  python -m benchmarks ticks          how the time of a tick is distributed
-  python -m benchmarks serve          deadlines of a session for other programs at 1 kHz
-  python -m benchmarks methods        force deviation of Methods I and III over paths and drags
-  python -m benchmarks ablation       Method III with one of its parts left out at a time
-  python -m benchmarks commits main   a control period at another commit and at this one
-  python -m benchmarks made           things formed by recorded strokes, beside what was intended
+  python -m benchmarks session
+  python -m benchmarks terms tap --quick
+  python -m benchmarks scale --out results
 """
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """Benchmark of the table.
+
+    Attributes
+    ----------
+    measures : tuple of str
+        Module and function ``(arguments, steps) -> Report | None``; imported when the benchmark runs.
+    examples : tuple of str
+        Arguments.
+    needs : str
+        Package without which it cannot run.
+    quick, out : bool
+        Whether it has these options.
+    """
+
+    measures: tuple[str, ...]
+    help: str
+    examples: tuple[str, ...] = ("", "--quick --out results")
+    options: Options = lambda parser: None
+    needs: str = ""
+    quick: bool = True
+    out: bool = True
+
+
+def _add_session(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser, default="ridge_mound_valley")
+    parser.add_argument(
+        "--repeats", metavar="N", type=_read_repeats, default=3,
+        help="number of runs, of which the median counts; default: 3",
+    )  # fmt: skip
+    parser.add_argument("--calls", action="store_true", help="count numpy's calls")
+
+
+def _read_repeats(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 1000:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to 1000 (got {text!r})")
+    return int(text)
+
+
+def _flag(name: str, help: str) -> Options:
+    return lambda parser: parser.add_argument(name, action="store_true", help=help)
+
+
+def _add_made(parser: argparse.ArgumentParser) -> None:
+    names = ", ".join(sorted(path.stem for path in STROKES.glob("*.toml")))
+    parser.add_argument("things", nargs="*", metavar="THING", help=names)
+    parser.add_argument("--bed", choices=BEDS, help="default: the bed of the strokes' file")
+    parser.add_argument("--pictures", metavar="FOLDER", type=Path, help="also draw them, formed and intended")
+
+
+def _add_commits(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("old", help="commit, branch or tag")
+    parser.add_argument("new", nargs="?", default="HEAD", help="another one, by default HEAD")
+    parser.add_argument("--turns", type=int, default=5, metavar="N", help="runs of each commit, default 5")
+
+
+BENCHMARKS = {
+    "session": Benchmark(
+        ("session_parts.measure",), "time of one session and of its parts, on one core",
+        ("", "--scene tap --repeats 9", "--calls"), _add_session, quick=False, out=False,
+    ),
+    "stiff": Benchmark(
+        ("stiff.measure",), "errors of the steppers in stiff and extreme cases", ("", "--full --out results"),
+        _flag("--full", "also the adaptive stepper, which takes longer than all others"),
+    ),
+    "precision": Benchmark(
+        ("precision.measure", "precision.measure_whole_bed"),
+        "error against run time, beside SciPy's solvers",
+        ("--quick", "--out results", "--whole-bed --out results"),
+        _flag("--whole-bed", "also peers that integrate all cells, on the paper's bed (11 minutes more)"),
+    ),
+    "terms": Benchmark(
+        ("terms.measure",), "cost and effect of each part of the model",
+        ("tap", "ridge_mound_valley --out results"), add_scene,
+    ),
+    "scale": Benchmark(("bed_size.measure",), "a control period from 625 pins to a million"),
+    "export": Benchmark(("mesh_export.measure",), "writing a bed as a mesh, from 625 pins to a million"),
+    "viewport": Benchmark(
+        ("viewport_cost.measure",), "a tick of a live session in Blender, part by part (needs bpy)",
+        needs="bpy",
+    ),
+    "ticks": Benchmark(
+        ("tick_times.measure",), "how the time of a tick of a live session is distributed (needs bpy)",
+        needs="bpy",
+    ),
+    "stack": Benchmark(
+        ("runs_together.measure",), "sessions a second, one at a time and many in one call",
+        options=partial(add_scene, default="ridge_mound_valley"),
+    ),
+    "made": Benchmark(
+        ("made.measure",), "things formed by recorded strokes, beside the intended relief (needs bpy)",
+        ("", "letter_a --bed paper", "leaf face --pictures made"), _add_made, needs="bpy",
+    ),
+    "cluster": Benchmark(
+        ("cluster_cost.measure",), "overhead of a Dask cluster, one worker and two", needs="distributed"
+    ),
+    "serve": Benchmark(
+        ("serve_times.measure",), "deadlines of digiclay serve at 1 kHz, with a client", needs="websockets"
+    ),
+    "methods": Benchmark(
+        ("method_figures.measure",), "force deviation of Methods I and III over paths and drags"
+    ),
+    "ablation": Benchmark(
+        ("ablation.measure",), "Method III with one part left out at a time", ("", "--part skirt"),
+        lambda parser: parser.add_argument("--part", metavar="P", help="a row of the table, such as skirt"),
+    ),
+    "commits": Benchmark(
+        ("commit_pair.measure",), "time of a control period at two commits",
+        ("v0.1.0", "v0.1.0 main --turns 9"), _add_commits,
+    ),
+}  # fmt: skip
 
 
 def parser() -> argparse.ArgumentParser:
@@ -55,9 +158,47 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
-    for kind in (
-        session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together, made,
-        cluster_cost, serve_times, method_figures, ablation, commit_pair,
-    ):  # fmt: skip
-        kind.add(kinds)
+    for name, benchmark in BENCHMARKS.items():
+        examples = "\n".join(
+            f"  python -m benchmarks {name} {words}".rstrip() for words in benchmark.examples
+        )
+        command = add_command(kinds, name, benchmark.help, f"examples:\n{examples}\n")
+        benchmark.options(command)
+        if benchmark.quick:
+            command.add_argument("--quick", action="store_true", help="fewer and shorter runs")
+        command.add_argument("--quiet", action="store_true", help="no progress")
+        if benchmark.out:
+            command.add_argument(
+                "--out", metavar="DIR", type=_read_folder, help="also write the results into this folder"
+            )
+        command.set_defaults(carry_out=partial(run, name), quick=False, out=None)
     return top
+
+
+def _read_folder(text: str) -> Path:
+    """Read the name of a folder to write into; what would fail after the work is refused before it."""
+    try:
+        refuse_unwritable(Path(text))
+    except OutputError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+    return Path(text)
+
+
+def run(name: str, arguments: argparse.Namespace) -> int:
+    """Run a benchmark, print its reports, and write them with ``--out``."""
+    benchmark = BENCHMARKS[name]
+    if benchmark.needs == "bpy":
+        refuse_without_blender()
+    elif benchmark.needs:
+        extra = EXTRAS[benchmark.needs]
+        refuse_without(benchmark.needs, f"python -m benchmarks {name}", f"pip install digiclay[{extra}]")
+    for place in benchmark.measures:
+        module, _, function = place.partition(".")
+        measure: Any = getattr(import_module(f"{__package__}.{module}"), function)
+        with Steps(io.StringIO() if arguments.quiet else sys.stderr, name) as steps:
+            report: Report | None = measure(arguments, steps)
+        if report is not None:
+            print(report.text())
+            if arguments.out is not None:
+                write_report(report, arguments.out, report.name or name)
+    return 0

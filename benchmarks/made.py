@@ -1,4 +1,4 @@
-"""``python -m benchmarks made``: things formed by recorded strokes, beside what was intended."""
+"""Benchmark ``made``: things formed by recorded strokes, beside what was intended."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.progress import table
-from digiclay.commands.stop import refuse_unwritable, refuse_without_blender
+from digiclay.commands.stop import refuse_unwritable
 from digiclay.compat import scratch
 from digiclay.core.base.arrays import Floats
-from digiclay.core.base.errors import OutputError
+from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.schema import Scene
@@ -30,7 +30,8 @@ from digiclay.pictures.still import add_picture_scene, apply_style, render_pictu
 from digiclay.settings.devices import BEDS, make_scene
 from numpy.typing import NDArray
 
-from .report import add_kind, kept, made_with, progress
+from .kinds import STROKES
+from .report import Report, Steps, cells
 
 Relief = Callable[[Floats, Floats], Floats]
 Corners = Sequence[tuple[float, float]]
@@ -48,7 +49,7 @@ RING, TUBE = 45.0, 8.0
 BOWL, RIM = (44.0, 12.0), (48.0, 5.0, 10.0)
 #: Leaf between two arcs from tip to tip, each so far from the midrib at most; half the breadth of its lines.
 TIPS, BULGE, LINE = ((0.0, -55.0), (0.0, 60.0)), 34.0, 6.0
-#: Heights of outline and midrib, and of the veins; the midrib goes on as a stalk to here.
+#: Heights of outline and midrib, and of the veins; the midrib continues as a stalk to here.
 OUTLINE_HEIGHT, VEIN_HEIGHT, STALK = 5.0, 3.0, -70.0
 #: Beginnings and ends of the veins on the right.
 VEINS = (((0.0, -30.0), (24.0, -5.0)), ((0.0, -5.0), (24.0, 20.0)), ((0.0, 20.0), (18.0, 40.0)))
@@ -129,8 +130,7 @@ RELIEFS: dict[str, Relief] = {
 }  # fmt: skip
 
 
-#: Folder of the recorded strokes; and the things, each with a file there and an intended relief.
-STROKES = Path(__file__).parent / "strokes"
+#: The things: each has recorded strokes and an intended relief.
 THINGS = tuple(RELIEFS)
 
 
@@ -181,14 +181,14 @@ class Made:
 
 
 def make(name: str, bed: str | None = None) -> Made:
-    """Play the recorded strokes of a thing on a bed at rest.
+    """Play the recorded strokes of one of `THINGS` on a bed of `BEDS` at rest; by default that of the file.
 
-    `name`: one of `THINGS`; `bed`: one of `BEDS`; that of the file when left out. Places and sizes are scaled
-    with its width. Raises DigiclayError when the file cannot be read, or a stroke not be formed.
+    Places and sizes are scaled with the bed's width. Raises DigiclayError when the file cannot be read, or a
+    stroke not be formed.
     """
     recorded = read_strokes(STROKES / f"{name}.toml")
-    own, other = BEDS[recorded.bed], BEDS[bed or recorded.bed]
-    share = other.columns * other.pitch / (own.columns * own.pitch)
+    drawn, other = BEDS[recorded.bed], BEDS[bed or recorded.bed]
+    share = other.columns * other.pitch / (drawn.columns * drawn.pitch)
     layout = Layout(rows=other.rows, columns=other.columns, pitch=other.pitch)
     scene = make_scene("paper", layout, "virtual_master", other.share)
     above = np.array([0.0, 0.0, scene.actuator.rest_height + CLEARANCE, *LEVEL])
@@ -223,9 +223,9 @@ LETTERS, INSET, INK = 20, (16, 12), (26, 31, 38)
 
 
 def draw_made(made: Made, out: Path) -> Path:
-    """Draw a thing as it was formed and as it was intended, and return the picture's path.
+    """Draw a thing as it was formed and as it was intended, as a JPEG; return its path.
 
-    `out`: the JPEG. Raises OutputError when it cannot be written, or Pillow is missing.
+    Raises OutputError when it cannot be written, or Pillow is missing.
     """
     words = (
         f"{made.title}: formed on the bed {made.bed}, correlation {made.correlation:.3f}",
@@ -241,10 +241,9 @@ def draw_made(made: Made, out: Path) -> Path:
 
 
 def draw_relief(scene: Scene, relief: NDArray[Any], lowest: float, out: Path) -> Path:
-    """Draw the skin over a bed's pins, without fingertip.
+    """Draw the skin over a bed's pins as a PNG, without fingertip.
 
-    `relief` (n,), heights of the pins above rest, m; `lowest`: lowest place of a pin's top in the pictures to
-    be compared, above rest, m; `out`: the PNG.
+    `relief` (n,), `lowest`: heights of the pins, and the lowest of the compared pictures, above rest, m.
     """
     looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
     rest = Instant.at_rest(scene.layout, scene.actuator)
@@ -274,10 +273,10 @@ def join(files: Sequence[Path], words: Sequence[str], out: Path) -> Path:
         raise OutputError("Pictures of made things need Pillow: pip install digiclay[images].") from None
     whole = Image.new("RGB", (WIDTH * len(files), HEIGHT))
     pen = ImageDraw.Draw(whole)
-    for number, (file, said) in enumerate(zip(files, words, strict=True)):
+    for number, (file, caption) in enumerate(zip(files, words, strict=True)):
         whole.paste(Image.open(file).convert("RGB"), (number * WIDTH, 0))
         place = number * WIDTH + INSET[0], INSET[1]
-        pen.text(place, said, INK, ImageFont.load_default(LETTERS))
+        pen.text(place, caption, INK, ImageFont.load_default(LETTERS))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         whole.save(out, quality=90)
@@ -286,74 +285,35 @@ def join(files: Sequence[Path], words: Sequence[str], out: Path) -> Path:
     return out
 
 
-EXAMPLES = """\
-  python -m benchmarks made
-  python -m benchmarks made letter_a --bed paper
-  python -m benchmarks made leaf face --pictures made
-"""
 HEAD = ("thing", "bed", "strokes", "simulated", "correlation", "slope", "rms", "rms of relief", "CPU")
 
 
-def add(kinds: Any) -> None:
-    """Add the benchmark."""
-    parser = add_kind(
-        kinds, "made", "things formed by recorded strokes, beside the intended relief", EXAMPLES
-    )
-    parser.add_argument("things", nargs="*", metavar="THING", type=_thing, help=", ".join(RELIEFS))
-    parser.add_argument("--bed", choices=BEDS, help="default: the bed of the strokes' file")
-    parser.add_argument(
-        "--pictures", metavar="FOLDER", type=Path, help="also draw them, formed and intended (needs bpy)"
-    )
-    parser.set_defaults(carry_out=carry_out)
-
-
-def _thing(text: str) -> str:
-    """Read the name of a thing."""
-    if text not in RELIEFS:
-        raise argparse.ArgumentTypeError(f"must be one of {', '.join(RELIEFS)} (got {text!r})")
-    return text
-
-
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Make the things, print the table, and draw them."""
-    from .made import make
-
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Make the things, and draw them with ``--pictures``."""
+    for name in arguments.things:
+        if name not in RELIEFS:
+            raise ParameterError("THING", "", f"must be one of {', '.join(RELIEFS)}", repr(name))
     if arguments.pictures is not None:
-        refuse_without_blender()
         refuse_unwritable(arguments.pictures)
     names = arguments.things or list(RELIEFS)[: 1 if arguments.quick else None]
-    found = []
-    with progress(arguments, "things", len(names)) as bar:
-        for name in names:
-            found.append(make(name, arguments.bed))
-            if arguments.pictures is not None:
-                _draw(found[-1], arguments.pictures)
-            bar(name)
-    text = "\n".join([made_with(), "", *table(HEAD, [_row(made) for made in found])])
-    print(text)
-    kept(arguments.out, "made", text, HEAD, [_figures(made) for made in found])
-    return 0
-
-
-def _draw(made: Made, folder: Path) -> None:
-    """Draw a thing; on another bed than that of its file it is another picture."""
-    from .made import draw_made
-
-    suffix = "" if made.bed == made.own_bed else f"_{made.bed}"
-    draw_made(made, folder / f"made_{made.name}{suffix}.jpg")
-
-
-def _figures(made: Made) -> Sequence[Any]:
-    """Return the values of a row, SI."""
-    return (
-        made.name, made.bed, made.strokes, made.simulated, made.correlation, made.slope, made.error,
-        float(made.intended.std()), made.spent,
-    )  # fmt: skip
-
-
-def _row(made: Made) -> list[str]:
-    """Return a row of the table."""
-    _, _, strokes, simulated, correlation, slope, error, relief, spent = _figures(made)
-    lengths = [f"{1e3 * length:.2f} mm" for length in (error, relief)]
-    ratios = [f"{correlation:.3f}", f"{slope:.2f}"]
-    return [made.title, made.bed, str(strokes), f"{simulated:.1f} s", *ratios, *lengths, f"{spent:.1f} s"]
+    things = []
+    for name in steps.through(names):
+        made = make(name, arguments.bed)
+        things.append(made)
+        if arguments.pictures is not None:
+            other = "" if made.bed == made.own_bed else f"_{made.bed}"
+            draw_made(made, arguments.pictures / f"made_{name}{other}.jpg")
+    figures = [
+        (
+            made.name, made.bed, made.strokes, made.simulated, made.correlation, made.slope, made.error,
+            float(made.intended.std()), made.spent,
+        )
+        for made in things
+    ]  # fmt: skip
+    rows = [
+        [made.title, *cells("s d", made.bed, made.strokes), f"{made.simulated:.1f} s",
+         *cells(".3f .2f", made.correlation, made.slope), f"{1e3 * made.error:.2f} mm",
+         f"{1e3 * made.intended.std():.2f} mm", f"{made.spent:.1f} s"]
+        for made in things
+    ]  # fmt: skip
+    return Report(["", *table(HEAD, rows)], HEAD, figures)

@@ -1,4 +1,4 @@
-"""``python -m benchmarks export``: time and memory of mesh files of up to a million pins."""
+"""Benchmark ``export``: time and memory of mesh files of up to a million pins."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ import tempfile
 import time
 import tracemalloc
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from digiclay.commands.progress import table
@@ -19,12 +18,16 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import Formed
 
-from .report import add_kind, kept, made_with, progress
+from .report import Report, Steps, cells, list_records
 
 #: Pins along a side of the beds.
 SIDES = (25, 100, 316, 1000)
-#: Every format of the solid, and the other kinds in one.
+#: Kind and format: every format of the solid, and the other kinds in one.
 WHAT = (*(("solid", name) for name in FORMATS), ("surface", "stl"), ("pins", "stl"), ("features", "stl"))
+HEAD = (
+    "mesh", "format", "pins", "triangles", "made in, s", "written in, s", "file, MB", "memory, MB",
+    "bytes a pin",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -33,14 +36,12 @@ class Export:
 
     Attributes
     ----------
-    made : float
-        Time to make the mesh, s.
-    written : float
-        Time to write the file, s.
+    made, written : float
+        Time to make the mesh and to write the file, s.
     size : float
         Of the file, MB.
     peak : float
-        Memory numpy and Python held at most besides the bed itself, MB, in a run of its own.
+        Largest memory of numpy and Python besides the bed itself, MB, in a run of its own.
     """
 
     pins: int
@@ -61,22 +62,18 @@ def formed(side: int) -> Formed:
 
 
 def measured(side: int, kind: str, file: str) -> Export:
-    """Export a bed once for the time, and once more for the memory.
-
-    `side`: pins along each side; `kind`: of the mesh: solid, surface, pins or features; `file`: format, one
-    of `FORMATS`.
-    """
+    """Export a bed once for the time, and once more for the memory; `file`: format, one of `FORMATS`."""
     bed = formed(side)
     finding = Finding() if kind == "features" else None
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"bed{find_suffix(file)}"
         started = time.perf_counter()
-        made = make_bodies(bed, Model(kind=kind), finding)
-        moment = time.perf_counter()
-        write(made, path, kind=file)
+        bodies = make_bodies(bed, Model(kind=kind), finding)
+        made = time.perf_counter()
+        write(bodies, path, kind=file)
         done = time.perf_counter()
-        triangles = sum(len(body.faces) for body in made)
-        del made
+        triangles = sum(len(body.faces) for body in bodies)
+        del bodies
         tracemalloc.start()
         try:
             write(make_bodies(bed, Model(kind=kind), finding), path, kind=file)
@@ -84,53 +81,25 @@ def measured(side: int, kind: str, file: str) -> Export:
         finally:
             tracemalloc.stop()
         size = path.stat().st_size
-    return Export(side * side, kind, file, triangles, moment - started, done - moment, size / 1e6, peak / 1e6)
+    return Export(side * side, kind, file, triangles, made - started, done - made, size / 1e6, peak / 1e6)
 
 
-def add(kinds: Any) -> None:
-    """Add the benchmark."""
-    examples = "  python -m benchmarks export\n  python -m benchmarks export --quick --out results\n"
-    parser = add_kind(kinds, "export", "writing a bed as a mesh, from 625 pins to a million", examples)
-    parser.set_defaults(carry_out=carry_out)
-
-
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Measure every size, and print the table."""
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Measure every size: all kinds and formats of the smallest and the largest bed."""
     sides = SIDES[:2] if arguments.quick else SIDES
-    # Beds in between show how it grows; all formats are measured at the ends.
     jobs = [(side, *what) for side in sides for what in (WHAT if side in (sides[0], sides[-1]) else WHAT[:1])]
-    with progress(arguments, "export", len(jobs)) as bar:
-        found = []
-        for job in jobs:
-            found.append(measured(*job))
-            bar(f"{job[0]} x {job[0]} pins, {job[1]}, {job[2]}")
-    text = "\n".join(_text(found))
-    print(text)
-    head = [field.name for field in fields(Export)]
-    kept(arguments.out, "export", text, head, [[getattr(one, name) for name in head] for one in found])
-    return 0
+    exports = [measured(*job) for job in steps.through(jobs)]
+    return Report(_list_lines(exports), *list_records(exports))
 
 
-def _text(found: list[Export]) -> Iterator[str]:
+def _list_lines(exports: list[Export]) -> Iterator[str]:
     """Give the lines of the report."""
-    yield made_with()
     yield "\nA bed of waves, written to a temporary folder; memory besides the bed itself\n"
-    head = (
-        "mesh",
-        "format",
-        "pins",
-        "triangles",
-        "made in, s",
-        "written in, s",
-        "file, MB",
-        "memory, MB",
-        "bytes a pin",
-    )
     rows = [
-        [
-            one.kind, one.file, str(one.pins), str(one.triangles), f"{one.made:.3g}", f"{one.written:.3g}",
-            f"{one.size:.3g}", f"{one.peak:.3g}", f"{one.peak * 1e6 / one.pins:.0f}",
-        ]
-        for one in found
+        cells(
+            "s s d d .3g .3g .3g .3g .0f", one.kind, one.file, one.pins, one.triangles, one.made, one.written,
+            one.size, one.peak, one.peak * 1e6 / one.pins,
+        )
+        for one in exports
     ]  # fmt: skip
-    yield from table(head, rows, left=2)
+    yield from table(HEAD, rows, left=2)

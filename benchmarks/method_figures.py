@@ -1,4 +1,4 @@
-"""``python -m benchmarks methods``: force deviation of Methods I and III over paths and drags."""
+"""Benchmark ``methods``: force deviation of Methods I and III over paths and drags."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from digiclay.commands.progress import table
+from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
@@ -22,13 +23,12 @@ from digiclay.core.studies.speed_limits import Drag, place_way
 from digiclay.core.studies.trial_paths import drag_row, lift_off, with_path
 from digiclay.plots.figure import empty
 
-from .plots import STYLE, write
-from .report import add_kind, kept, made_with, progress
-from .wrong_models import list_models, run_mismatched
+from .ablation import run_controller
+from .report import BLUE, RED, STYLE, Report, Steps
 
 SESSION = "ridge_mound_valley"
 #: Methods with a set point of the total force, and their colors and marks: Okabe and Ito's.
-SHOWN = {"virtual_master": ("Method I", "#0072B2", "o"), "hybrid": ("Method III", "#D55E00", "D")}
+SHOWN = {"virtual_master": ("Method I", BLUE, "o"), "hybrid": ("Method III", RED, "D")}
 #: Random drags with --quick and without.
 QUICK, FULL = 2, 20
 #: Sessions that are timed, by turns.
@@ -59,52 +59,80 @@ PARTS: dict[str, dict[str, str]] = {
     "without level margin": {"level_margin": "0"},
     "without turn and size": {"turn": "0", "size_drift": "0"},
 }
-
-#: No parameter that differs.
-NOTHING: Mapping[str, str] = {}
+#: What the rows of Method III alone are.
+TITLES = (
+    "Method III at speeds that Method I does not follow",
+    "Method III made for another device, or with sensors",
+    "Method III with a part left out: ridge drag at 40 mm/s",
+    "Turned and tilted fingertip: drag between two rows of pins at 15 mm/s",
+)
 
 Figures = Mapping[str, float | None]
 Row = tuple[str, str, Figures]
 
 
-def add(kinds: Any) -> None:
-    """Add the benchmark."""
-    examples = "  python -m benchmarks methods\n  python -m benchmarks methods --quick --out results\n"
-    parser = add_kind(kinds, "methods", "force deviation of Methods I and III over paths and drags", examples)
-    parser.set_defaults(carry_out=carry_out)
+def _scale(scene: Scene, part: str, **factors: float) -> Scene:
+    """Return a scene with some numbers of a part of its fingertip times a factor."""
+    section = scene.section(part)
+    changed = {name: getattr(section, name) * by for name, by in factors.items()}
+    return scene.with_sections(**{part: replace(section, **changed)})
 
 
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Run every trial, and print the tables."""
+def list_models(true: Scene) -> dict[str, Scene]:
+    """Return scenes that differ from the true one, for controllers made for them."""
+    sizes = ("length", "width", "height")
+    # The laminar flow goes with the fourth power of the diameter.
+    valves = {
+        f"valve × {share}": replace(
+            true, valve=replace(true.valve, orifice_diameter=true.valve.orifice_diameter * share**0.25)
+        )
+        for share in (0.7, 1.3, 3)
+    }
+    return {
+        **valves,
+        "pulp stiffness × 0.5": _scale(true, "contact", stiffness=0.5),
+        "pulp stiffness × 2": _scale(true, "contact", stiffness=2.0),
+        "exponent × 0.7": _scale(true, "contact", exponent=0.7),
+        "exponent × 1.4": _scale(true, "contact", exponent=1.4),
+        "fingertip × 0.75": _scale(true, "fingertip", **dict.fromkeys(sizes, 0.75)),
+        "fingertip × 1.3": _scale(true, "fingertip", **dict.fromkeys(sizes, 1.3)),
+        "length × 1.5": _scale(true, "fingertip", length=1.5),
+        "width × 0.6": _scale(true, "fingertip", width=0.6),
+    }
+
+
+def run_mismatched(true: Scene, model: Scene) -> dict[str, float | None]:
+    """Return the figures of a session whose controller is made for another device, `model`."""
+    controller = assemble(model).controller
+    assert controller is not None  # scenes of the benchmark have one
+    return run_controller(true, controller)
+
+
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Run every trial."""
     groups = tuple(group for group in GROUPS if group not in LIMITS)
     trials = list_trials(groups, QUICK if arguments.quick else FULL)
-    total = len(SHOWN) * len(trials) + len(FAST) + 13 + len(PARTS)
-    total += len(SHOWN) * len(TILTS) * (1 if arguments.quick else len(ANGLES))
-    with progress(arguments, "trials", total) as bar:
-        rows = list(_run_trials(trials, bar))
-        fast = [
-            (name, "hybrid", _run(bar, name, _follow, _scene("hybrid", orifice=bore), way, speed))
-            for name, way, bore, speed in FAST
-        ]
-        wrong = list(_run_models(bar))
-        parts = [
-            (name, "hybrid", _run(bar, name, _follow, _scene("hybrid", known), Drag(), PARTS_SPEED))
-            for name, known in PARTS.items()
-        ]
-        turned = list(_run_turns((90,) if arguments.quick else ANGLES, bar))
+    steps.total = len(SHOWN) * len(trials) + len(FAST) + 13 + len(PARTS)
+    steps.total += len(SHOWN) * len(TILTS) * (1 if arguments.quick else len(ANGLES))
+    rows = list(_run_trials(trials, steps))
+    fast = [
+        (name, "hybrid", _run(steps, name, _follow, _scene("hybrid", orifice=bore), way, speed))
+        for name, way, bore, speed in FAST
+    ]
+    wrong = list(_run_models(steps))
+    parts = [
+        (name, "hybrid", _run(steps, name, _follow, _scene("hybrid", control), Drag(), PARTS_SPEED))
+        for name, control in PARTS.items()
+    ]
+    turned = list(_run_turns((90,) if arguments.quick else ANGLES, steps))
     cost = _compare_cost(2 if arguments.quick else TURNS)
-    text = "\n".join(_text(rows, fast, wrong, parts, turned, cost))
-    print(text)
-    head = ("trial", "method", *WRITTEN.values())
     every = [*rows, *fast, *wrong, *parts, *turned]
-    figures = [[name, method, *map(found.get, WRITTEN)] for name, method, found in every]
-    kept(arguments.out, "methods", text, head, figures)
-    if arguments.out is not None:
-        _draw(rows, arguments.out / "methods.png")
-    return 0
+    figures = [[name, method, *map(values.get, WRITTEN)] for name, method, values in every]
+    lines = list(_list_lines(rows, (fast, wrong, parts, turned), cost))
+    return Report(lines, ("trial", "method", *WRITTEN.values()), figures, lambda: _draw(rows))
 
 
-def _scene(method: str, control: Mapping[str, str] = NOTHING, orifice: float = 0.5e-3) -> Scene:
+def _scene(method: str, control: Mapping[str, str] = MappingProxyType({}), orifice: float = 0.5e-3) -> Scene:
     """Return the paper's session with a method."""
     settings = [Setting("control.method", method), Setting("valve.orifice_diameter", str(orifice))]
     settings += [Setting(f"control.{name}", value) for name, value in control.items()]
@@ -177,64 +205,47 @@ def _compare_cost(turns: int) -> dict[str, float]:
     return {method: statistics.median(times) for method, times in spent.items()}
 
 
-def _text(
-    rows: list[Row],
-    fast: list[Row],
-    wrong: list[Row],
-    parts: list[Row],
-    turned: list[Row],
-    cost: dict[str, float],
-) -> Iterator[str]:
-    """Give the lines of the report."""
-    yield made_with()
-    names = list(dict.fromkeys(name for name, _, _ in rows))
-    by = {(name, method): found for name, method, found in rows}
+def _list_lines(rows: list[Row], others: tuple[list[Row], ...], cost: dict[str, float]) -> Iterator[str]:
+    """Give the lines of the report; `others`: rows of Method III by `TITLES`."""
     yield "\nRFD, N, of a whole session, or of a drag where a speed is given. Lost: but for lift-offs.\n"
+    by = {(name, method): figures for name, method, figures in rows}
     lines = []
-    for name in names:
-        one, three = by[name, "virtual_master"], by[name, "hybrid"]
-        lines.append([name, *_numbers(one), *_numbers(three), f"{_divide(three, one):.2f}"])
+    for name in dict.fromkeys(name for name, _, _ in rows):
+        first, third = by[name, "virtual_master"], by[name, "hybrid"]
+        ratio = (third["rfd"] or math.nan) / (first["rfd"] or math.nan)
+        lines.append([name, *_list_cells(first), *_list_cells(third), f"{ratio:.2f}"])
     columns = ("RFD", "lag mm", "max lag", "max N", "lost")
     yield from table(("", *(f"I {c}" for c in columns), *(f"III {c}" for c in columns), "III / I"), lines)
-    for title, some in (
-        ("Method III at speeds that Method I does not follow", fast),
-        ("Method III made for another device, or with sensors", wrong),
-        ("Method III with a part left out: ridge drag at 40 mm/s", parts),
-        ("Turned and tilted fingertip: drag between two rows of pins at 15 mm/s", turned),
-    ):
+    for title, some in zip(TITLES, others, strict=True):
         yield f"\n{title}\n"
-        yield from table(("", *columns), [[name, *_numbers(found)] for name, _, found in some])
+        yield from table(("", *columns), [[name, *_list_cells(figures)] for name, _, figures in some])
     ratio = cost["hybrid"] / cost["virtual_master"]
     listed = ", ".join(f"{SHOWN[method][0]} {1e6 * spent:.0f} µs" for method, spent in cost.items())
     yield f"\nProcessor time a control period, medians by turns: {listed}; ratio {ratio:.2f}"
 
 
-def _numbers(found: Figures) -> list[str]:
+def _list_cells(figures: Figures) -> list[str]:
     """Return the cells of a table."""
-    lags = [found.get("lag_mean"), found.get("lag_max")]
-    numbers = [found["rfd"], *(None if lag is None else 1e3 * lag for lag in lags), found["max_total_force"]]
-    cells = ["" if number is None else f"{number:.4f}" for number in numbers]
-    return [*cells, f"{found['losses'] or 0.0:g}"]
+    lags = [figures.get("lag_mean"), figures.get("lag_max")]
+    numbers = [
+        figures["rfd"],
+        *(None if lag is None else 1e3 * lag for lag in lags),
+        figures["max_total_force"],
+    ]
+    listed = ["" if number is None else f"{number:.4f}" for number in numbers]
+    return [*listed, f"{figures['losses'] or 0.0:g}"]
 
 
-def _divide(one: Figures, other: Figures) -> float:
-    """Return the ratio of two RFDs."""
-    return (one["rfd"] or math.nan) / (other["rfd"] or math.nan)
-
-
-def _draw(rows: list[Row], out: Path) -> None:
+def _draw(rows: list[Row]) -> Any:
     """Draw the RFD of all trials, one line a trial."""
     names = list(dict.fromkeys(name for name, _, _ in rows))[::-1]
     with empty(7.2, 0.8 + 0.22 * len(names), STYLE, layout="constrained") as figure:
         panel = figure.subplots()
         for method, (label, color, mark) in SHOWN.items():
-            found = {name: outcome["rfd"] or math.nan for name, own, outcome in rows if own == method}
-            panel.plot(
-                [1e3 * found[name] for name in names], range(len(names)), mark, color=color, label=label
-            )
+            rfd = {name: figures["rfd"] or math.nan for name, run, figures in rows if run == method}
+            panel.plot([1e3 * rfd[name] for name in names], range(len(names)), mark, color=color, label=label)
         panel.set_yticks(range(len(names)), names)
-        panel.set_xscale("log")
-        panel.set_xlabel("reference force deviation, mN")
+        panel.set(xscale="log", xlabel="reference force deviation, mN")
         panel.grid(axis="x", which="both", alpha=0.3)
         panel.legend(loc="lower right")
-        write(figure, out)
+        return figure

@@ -17,12 +17,10 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from numpy.typing import NDArray
 
-from .work_precision import Work
-
 #: Control period of all problems, s.
 PERIOD = 5e-3
-#: Rows and columns; waypoints (s; x, y, z in mm) and how they are joined; a command that is held all along,
-#: or None: what Method I commands is recorded.
+#: Rows and columns; waypoints (s; x, y, z in mm) and how they are joined; the command of all periods,
+#: or None: the commands of Method I are recorded.
 PROBLEMS: dict[str, tuple[int, tuple[tuple[float, float, float, float], ...], str, float | None]] = {
     "one cell, load step": (
         1, ((0.0, 0.0, 0.0, 40.3), (0.101, 0.0, 0.0, 40.3), (0.103, 0.0, 0.0, 39.0), (0.5, 0.0, 0.0, 39.0)),
@@ -51,6 +49,20 @@ PROBLEMS: dict[str, tuple[int, tuple[tuple[float, float, float, float], ...], st
 STAGES = {"bernoulli": 1, "richardson": 3, "euler": 1, "heun": 2, "runge_kutta_4": 4}
 
 
+@dataclass(frozen=True)
+class Work:
+    """A point of the work-precision plot: SI units; `evaluations` of the rates of all cells."""
+
+    problem: str
+    method: str
+    setting: float
+    height_error: float
+    force_error: float
+    seconds: float
+    evaluations: int
+    peer: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A problem.
@@ -58,9 +70,9 @@ class Problem:
     Attributes
     ----------
     commands : ndarray (t, n)
-        Held for a control period each.
+        Constant within a control period.
     sets : list of (ndarray of int (m,), int)
-        Which cells take part in each period; how many of them, the first, the finger may touch.
+        Which cells take part in each period; how many of them, the first, the fingertip may touch.
     """
 
     name: str
@@ -70,18 +82,33 @@ class Problem:
 
     @property
     def taking_part(self) -> float:
-        """Cells that take part in a period, the mean."""
+        """Mean number of cells that take part in a period."""
         return float(np.mean([cells.size for cells, _ in self.sets]))
+
+    @property
+    def dead_time(self) -> float:
+        """Dead time of the valves, s."""
+        return self.scene.delay.dead_time if self.scene.delay else 0.0
+
+    def solve(self, stepper: str, step: float) -> Solution:
+        """Integrate by one of our steppers; `step`, s."""
+        return solved(self.with_stepper(stepper, step), self.commands)
+
+    def with_stepper(self, stepper: str, step: float) -> Scene:
+        """Return the scene with a stepper and its step, s."""
+        return replace(
+            self.scene, simulation=replace(self.scene.simulation, stepper=stepper, physics_step=step)
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Solution:
     """Heights, (t, n), m, and total force, (t,), N, at the end of each control period."""
 
     heights: Floats
     forces: Floats
 
-    def against(self, exact: Measured) -> tuple[float, float]:
+    def compare(self, exact: Solution) -> tuple[float, float]:
         """Return the largest errors of a height, m, and of the total force, N."""
         height, force = self.heights - exact.heights, self.forces - exact.forces
         return float(np.abs(height).max()), float(np.abs(force).max())
@@ -95,16 +122,12 @@ def live(
     *,
     side: int | None = None,
 ) -> Scene:
-    """Return a problem's scene under Method I, on its own bed or one of `side` rows and columns.
-
-    `name`: key of `PROBLEMS`; `period`, `step`: control period and physics step, s; `side`: rows and columns
-    of the bed; by default the problem's own.
-    """
-    own, waypoints, joined, held = PROBLEMS[name]
+    """Return a problem's scene under Method I, on its bed or one of `side` rows and columns; times in s."""
+    rows, waypoints, joined, command = PROBLEMS[name]
     table: dict[str, Any] = {
-        "layout": {"rows": side or own, "columns": side or own},
+        "layout": {"rows": side or rows, "columns": side or rows},
         "recorder": "absent",
-        "control": {} if held is None else "absent",
+        "control": {} if command is None else "absent",
         "simulation": {"control_period": period, "physics_step": step, "stepper": stepper},
         "trajectory": {
             "interpolation": joined,
@@ -115,70 +138,51 @@ def live(
 
 
 def problem(name: str, *, side: int | None = None) -> Problem:
-    """Record a problem's commands, on its own bed or another, and work out which cells take part.
-
-    `name`: key of `PROBLEMS`; `side`: rows and columns of the bed; by default the problem's own.
-    """
-    scene, held = live(name, side=side), PROBLEMS[name][3]
+    """Record a problem's commands and which cells take part, on its own bed or one of `side` rows."""
+    scene, command = live(name, side=side), PROBLEMS[name][3]
     system = assemble(scene)
-    if held is None:
+    if command is None:
         run = periods(system, scene.trajectories(), begin(system), scene.periods)
         commands = np.array([state.row(system.rows.command) for state in run])
     else:
-        commands = np.full((scene.periods, scene.cells), held)
+        commands = np.full((scene.periods, scene.cells), command)
     system = replaying(scene, commands)
     run = periods(system, scene.trajectories(), begin(system), scene.periods)
     return Problem(name, scene, commands, [(one.active.cells, one.active.near) for one in run])
 
 
 def replaying(scene: Scene, commands: Floats) -> System:
-    """Return a scene's system that plays commands. `commands` (t, n), held for a control period each."""
+    """Return a scene's system that plays commands, (t, n), one row a control period."""
     system = assemble(scene)
     return replace(system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0))
 
 
-def _at(known: Problem, stepper: str, step: float) -> Scene:
-    """Return the problem's scene with a stepper and step."""
-    simulation = replace(known.scene.simulation, stepper=stepper, physics_step=step)
-    return replace(known.scene, simulation=simulation)
-
-
-def solved(scene: Scene, commands: Floats) -> Measured:
-    """Integrate under recorded commands. `commands` (t, n), held for a control period each."""
+def solved(scene: Scene, commands: Floats) -> Solution:
+    """Integrate under recorded commands, (t, n)."""
     system = replaying(scene, commands)
     run = periods(system, scene.trajectories(), begin(system), scene.periods)
     rows = [(state.row(0), state.row(system.rows.force).sum()) for state in run]
-    return Measured(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+    return Solution(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
 
 
-def timed(scene: Scene, commands: Floats, repeats: int) -> float:
-    """Return the CPU time of a run of which nothing is kept, s: the median.
-
-    `commands` (t, n), held for a control period each.
-    """
-    spent = []
-    for _ in range(repeats):
-        system, trajectories = replaying(scene, commands), scene.trajectories()
-        start = begin(system)
-        started = time.process_time()
-        for _ in periods(system, trajectories, start, scene.periods):
-            pass
-        spent.append(time.process_time() - started)
-    return float(np.median(spent))
+def _time(scene: Scene, commands: Floats) -> float:
+    """Return the CPU time of a run of which nothing is kept, s."""
+    system, trajectories = replaying(scene, commands), scene.trajectories()
+    start = begin(system)
+    started = time.process_time()
+    for _ in periods(system, trajectories, start, scene.periods):
+        pass
+    return time.process_time() - started
 
 
-def ours(
-    known: Problem, exact: Measured, stepper: str, steps: tuple[float, ...], repeats: int
+def run_stepper(
+    task: Problem, exact: Solution, stepper: str, steps: tuple[float, ...], repeats: int
 ) -> Iterator[Work]:
-    """Give the points of one of our steppers, one a step.
-
-    `exact`: its exact solution; `steps`: physics steps, s; `repeats`: timed runs; the median counts.
-    """
+    """Give the points of one of our steppers, one a step, s; the median time of the repeats counts."""
     for step in steps:
-        scene = _at(known, stepper, step)
+        scene = task.with_stepper(stepper, step)
         with np.errstate(all="ignore"):
-            found = solved(scene, known.commands)
-            took = timed(scene, known.commands, repeats)
-        height, force = found.against(exact)
+            errors = solved(scene, task.commands).compare(exact)
+            took = float(np.median([_time(scene, task.commands) for _ in range(repeats)]))
         count = scene.periods * round(PERIOD / step) * STAGES[stepper]
-        yield Work(known.name, stepper, step, height, force, took, count, False)
+        yield Work(task.name, stepper, step, *errors, took, count, False)

@@ -1,4 +1,4 @@
-"""``python -m benchmarks serve``: deadlines of a session for other programs, with a client that moves it."""
+"""Benchmark ``serve``: deadlines of a session for other programs, with a client that moves the fingertip."""
 
 from __future__ import annotations
 
@@ -16,14 +16,12 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.progress import table
-from digiclay.commands.stop import refuse_without
 from digiclay.core.base.errors import OutputError
 from digiclay.core.model.trajectory import sample_poses
 from digiclay.core.scene.scene_source import find, load
-from numpy.typing import NDArray
+from digiclay.plots.figure import empty
 
-from .plots import STYLE, write
-from .report import add_kind, kept, made_with
+from .report import BLUE, RED, STYLE, Report, Steps
 
 #: The session of the paper, its control periods a second, and when its fingertip comes down, s.
 SCENE, RATE, DOWN = "ridge_mound_valley", 1000, 5.0
@@ -42,25 +40,13 @@ ENDS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0, 10.0, 50.0, np.inf)
 POSE, HEAD = struct.Struct("<2sBBI7d"), struct.Struct("<2sBBIQI")
 
 
-def add(kinds: Any) -> None:
-    """Add the benchmark."""
-    examples = "  python -m benchmarks serve\n  python -m benchmarks serve --out results\n"
-    parser = add_kind(kinds, "serve", "deadlines of digiclay serve at 1 kHz, with a client", examples)
-    parser.set_defaults(carry_out=carry_out)
-
-
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Serve for a while, and print the tables."""
-    refuse_without("websockets", "python -m benchmarks serve", "pip install digiclay[serve]")
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Serve for a while."""
     figures, frames = _serve(QUICK if arguments.quick else FULL)
-    text = "\n".join(_text(figures, frames))
-    print(text)
     head = ("what", *(f"{share}_s" for share in SHARES))
     rows = [[name, *(figures[name][share] for share in SHARES)] for name in LINES]
-    kept(arguments.out, "serve", text, head, rows)
-    if arguments.out is not None:
-        draw_deadlines(figures, arguments.out / "serve.png")
-    return 0
+    lines = _list_lines(figures, frames)
+    return Report(lines, head, rows, lambda: _draw(figures), packages=("websockets",))
 
 
 def _serve(seconds: float) -> tuple[dict[str, Any], int]:
@@ -73,9 +59,10 @@ def _serve(seconds: float) -> tuple[dict[str, Any], int]:
         command += ["--out", str(Path(folder) / "recorded")]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
-            said = "".join(process.stdout.readline() for _ in range(3))
-            found = re.search(r"ws://127\.0\.0\.1:(\d+)", said)
-            frames = _move(int(found[1]), token) if found else 0
+            address = re.search(
+                r"ws://127\.0\.0\.1:(\d+)", "".join(process.stdout.readline() for _ in range(3))
+            )
+            frames = _move(int(address[1]), token) if address else 0
             process.stdout.read()
         if process.returncode or not frames:
             raise OutputError("digiclay serve has ended early: see above.")
@@ -108,10 +95,7 @@ def _move(port: int, token: str) -> int:
 
 
 def sum_bins(bins: Sequence[tuple[float, int]], ends: Sequence[float]) -> list[int]:
-    """Return how many times lie below each end, and not below the one before.
-
-    `bins` (float, int), lower ends of narrow bins, s, and their counts; `ends`: ms, ascending.
-    """
+    """Return how many times lie between one end and the next, ms; `bins`: lower end, s, and count."""
     starts = np.array([start for start, _ in bins]) * 1e3
     counts = np.array([count for _, count in bins])
     # A narrow bin belongs where its lower end is; rounding must not move it.
@@ -119,41 +103,29 @@ def sum_bins(bins: Sequence[tuple[float, int]], ends: Sequence[float]) -> list[i
     return [int(counts[place == index].sum()) for index in range(len(ends))]
 
 
-def _text(figures: Mapping[str, Any], frames: int) -> Iterator[str]:
+def _list_lines(figures: Mapping[str, Any], frames: int) -> Iterator[str]:
     """Give the lines of the report."""
-    yield made_with("websockets")
     yield f"\ndigiclay serve {SCENE} --rate {RATE}: 625 pins, a pose from a client after every frame; ms\n"
     rows = [[LINES[name], *(f"{1e3 * figures[name][share]:.2f}" for share in SHARES)] for name in LINES]
     yield from table(("", *SHARES), rows)
     periods, missed = figures["periods"], figures["missed"]
     yield f"\n{periods} periods; past their deadline of 1 ms: {missed} ({100.0 * missed / periods:.2f} %),"
     yield f"of them left out: {figures['left_out']}; the client received {frames} frames\n"
-    counts = sum_bins(figures["elapsed"]["bins"], ENDS)
-    spent = sum_bins(figures["processor"]["bins"], ENDS)
+    counts = (map(str, sum_bins(figures[name]["bins"], ENDS)) for name in ("elapsed", "processor"))
     names = [f"below {end:g} ms" if np.isfinite(end) else "longer" for end in ENDS]
-    yield from table(
-        ("", "elapsed", "processor"),
-        [[name, str(count), str(own)] for name, count, own in zip(names, counts, spent, strict=True)],
-    )
+    yield from table(("", "elapsed", "processor"), list(zip(names, *counts, strict=True)))
 
 
-def draw_deadlines(figures: Mapping[str, Any], out: Path) -> Path:
-    """Draw the histograms of elapsed and processor time; return the picture's path.
-
-    `figures`: report of the server; `out`: the PNG.
-    """
-    from digiclay.plots.figure import empty
-
+def _draw(figures: Mapping[str, Any]) -> Any:
+    """Draw the histograms of elapsed and processor time."""
     with empty(7.2, 4.2, STYLE, layout="constrained") as figure:
         panels = figure.subplots(2, 1, sharex=True)
-        edges: NDArray[np.float64] = np.geomspace(0.1, 100.0, 91)
+        edges = np.geomspace(0.1, 100.0, 91)
         for panel, name in zip(panels, ("elapsed", "processor"), strict=True):
             bins = np.array(figures[name]["bins"])
-            panel.hist(1e3 * bins[:, 0], edges, weights=bins[:, 1], color="#0072B2", log=True)
-            panel.axvline(1e3 * figures["period"], color="#D55E00", linestyle="--", label="deadline")
-            panel.set_title(LINES[name])
-            panel.set_ylabel("periods")
+            panel.hist(1e3 * bins[:, 0], edges, weights=bins[:, 1], color=BLUE, log=True)
+            panel.axvline(1e3 * figures["period"], color=RED, linestyle="--", label="deadline")
+            panel.set(title=LINES[name], ylabel="periods")
             panel.legend(loc="upper right")
-        panels[-1].set_xscale("log")
-        panels[-1].set_xlabel("ms")
-        return write(figure, out)
+        panels[-1].set(xscale="log", xlabel="ms")
+        return figure

@@ -1,96 +1,387 @@
-"""``python -m benchmarks stiff``: case x stepper x step -> error, or the reason it stopped."""
+"""Benchmark ``stiff``: case x stepper x step -> error, or the reason it stopped."""
 
 from __future__ import annotations
 
 import argparse
+import copy
+import statistics
 import time
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 from digiclay.commands.progress import table
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
-from digiclay.core.scene.schema import STEPPERS
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.system import System
+from digiclay.core.model.fingertip import compute_forms, compute_underside, require_one
+from digiclay.core.model.physics import find_speeds
+from digiclay.core.model.trajectory import Trajectory
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import STEPPERS, Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.accuracy import SHARE, reference_settings
 
-from .report import add_kind, kept, made_with, progress
-from .stiff_runs import (
-    CASES,
-    FINE,
-    PERIOD,
-    ROUGH,
-    STEPS,
-    Case,
-    Outcome,
-    calls_of,
-    commands_of,
-    largest_force,
-    live,
-    outcome,
-    reference,
-    replayed,
-    strict,
+from .numpy_calls import period_calls
+from .problems import replaying
+from .report import Report, Steps, cells
+
+Table = Mapping[str, Any]
+
+#: Commands are recorded at this control period and held through it, s: all steps divide it, so that
+#: every run is the same problem.
+HOLD = 0.1
+#: Simulated time, s.
+DURATION = 0.5
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case.
+
+    Attributes
+    ----------
+    changes : mapping
+        Sections of a scene file.
+    path : tuple of (float, float, float)
+        Waypoints: time, s; x, m; height over the bed at rest, m.
+    why : str
+        What makes it ill-conditioned: a rounding error of its data already moves its solution, or the
+        path is no function of time that a step could resolve. Empty where the error must fall with the step.
+    straight : bool
+        The waypoints are joined by straight lines.
+    borrowed, factor : bool, float
+        The recorded commands are those of the easy case, because this case's own controller sees no need
+        to act; and what they are multiplied with.
+    """
+
+    changes: Table = field(default_factory=dict)
+    path: tuple[tuple[float, float, float], ...] = (
+        (0.0, 0.0, 0.5e-3), (0.15, 0.0, -2.5e-3), (0.25, 1e-3, -2.5e-3), (0.4, 3e-3, 1.5e-3),
+        (0.5, 3e-3, 3e-3),
+    )  # fmt: skip
+    why: str = ""
+    straight: bool = False
+    borrowed: bool = False
+    factor: float = 1.0
+
+
+#: A press with a finger that then rises, dragged a little; everything at its default.
+EASY = "easy"
+#: Everything at once.
+ALL = "all together"
+SHALLOW = ((0.0, 0.0, 0.5e-3), (0.15, 0.0, -0.4e-3), (0.25, 1e-3, -0.4e-3), (0.4, 3e-3, 1.5e-3))
+DEEP = ((0.0, 0.0, 1e-3), (0.12, 0.0, 1e-3), (0.16, 0.0, -15e-3), (0.3, 1e-3, -15e-3), (0.5, 3e-3, 3e-3))
+JUMP = ((0.0, 0.0, 48e-3), (0.1995, 0.0, 48e-3), (0.2, 0.0, -2e-3), (0.35, 0.0, -2e-3), (0.5, 3e-3, 3e-3))
+THROUGH = ((0.0, 0.0, 2e-3), (0.1995, 0.0, 2e-3), (0.2, 0.0, -60e-3), (0.35, 0.0, -60e-3), (0.5, 3e-3, 3e-3))
+#: Jumps of 100 mm to and fro within 1, 5, 20 and 50 ms, at a depth of 4 mm; and when they begin and end, s.
+JUMPS = (0.0, 0.05, 0.051, 0.15, 0.155, 0.25, 0.27, 0.35, 0.4, 0.5)
+FROM_AFAR = (1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0)
+BIG_GAINS = {"position_gain": 5e6, "force_gain": 5e4}
+
+#: Beds, and a blister that fits on them.
+BED = {
+    "layout": {"rows": 5, "columns": 5},
+    "blister": {"radius": 6e-3, "edge_radius": 8e-3, "flat_radius": 3e-3},
+}
+ONE_PIN = {
+    "layout": {"rows": 1, "columns": 1},
+    "blister": {"radius": 1.4e-3, "edge_radius": 2e-3, "flat_radius": 1e-3},
+}
+
+
+def _jumping(across: float, up: float, *, away_first: bool) -> Case:
+    """Return a case whose finger jumps by so much, m, out of a press or into one."""
+    path = tuple(
+        (time, across * (far if away_first else 1.0 - far), up * (far if away_first else 1.0 - far) - 4e-3)
+        for time, far in zip(JUMPS, FROM_AFAR, strict=True)
+    )
+    return Case(path=path, why="jumps within a step, and e^(m x) = 3000", straight=True)
+
+
+CASES: dict[str, Case] = {
+    EASY: Case(),
+    "m x 10": Case({"contact": {"exponent": 2e4}}, path=SHALLOW),
+    "m x 10, pressed as deep": Case({"contact": {"exponent": 2e4}}, why="e^(m x) = 1e21"),
+    "press to e^(m x) = 1e12": Case(path=DEEP, why="forces are differences of 1e9 N", straight=True),
+    "tau_v 0.1 ms": Case({"valve_lag": {"time_constant": 1e-4}}),
+    "tau_v 0 (absent)": Case({"valve_lag": "absent"}),
+    "viscosity x 1000": Case({"fluid": {"viscosity": 1.6e-3}}, borrowed=True),
+    "viscosity / 1000": Case({"fluid": {"viscosity": 1.6e-9}}),
+    "bore 0.2 mm": Case({"actuator": {"bore": 0.2e-3}}),
+    "gains x 1e4": Case({"control": BIG_GAINS}),
+    "relaxation rate 1e6 1/s": Case({"relaxation": {"times": [1e-6, 70e-3, 1.4]}}),
+    "b x 1e4": Case({"contact": {"stiffness": 2.5e6}}),
+    "orifice 2 mm": Case({"valve": {"orifice_diameter": 2e-3}}),
+    "c0 = 0": Case({"relaxation": {"weights": [0.0, 0.62, 0.20, 0.10]}}),
+    "dead time 0.23 s": Case({"delay": {"dead_time": 0.23}}),
+    "finger jumps 50 mm": Case(path=JUMP, why="the jump lasts half a step of 1 ms", straight=True),
+    "finger through the bed": Case(
+        path=THROUGH, why="e^(m x) = 1e52, within half a step of 1 ms", straight=True
+    ),
+    "jumps sideways, in first": _jumping(0.1, 0.0, away_first=True),
+    "jumps sideways, out first": _jumping(0.1, 0.0, away_first=False),
+    "jumps down first": _jumping(0.0, 0.1, away_first=True),
+    "jumps up first": _jumping(0.0, 0.1, away_first=False),
+    "openings of 1e-9": Case(
+        {"control": {"position_gain": 1e-6, "force_gain": 1e-8}}, borrowed=True, factor=1e-8
+    ),
+    "all at the upper end stop": Case({"actuator": {"rest_height": 100e-3}}),
+    "all at the lower end stop": Case({"actuator": {"rest_height": 0.0}}, borrowed=True),
+    "one pin": Case(ONE_PIN),
+}
+CASES[ALL] = Case(
+    {
+        **ONE_PIN,
+        "contact": {"exponent": 2e4, "stiffness": 2.5e6},
+        "valve_lag": {"time_constant": 1e-4},
+        "fluid": {"viscosity": 1.6e-9},
+        "actuator": {"bore": 0.2e-3, "rest_height": 100e-3},
+        "control": BIG_GAINS,
+        "relaxation": {"times": [1e-6, 70e-3, 1.4], "weights": [0.0, 0.62, 0.20, 0.10]},
+        "valve": {"orifice_diameter": 2e-3},
+        "delay": {"dead_time": 0.23},
+    },
+    path=THROUGH,
+    why="all of the above",
+    straight=True,
 )
 
 
-def add(kinds: Any) -> None:
-    """Add the benchmark."""
-    examples = "  python -m benchmarks stiff\n  python -m benchmarks stiff --full --out results\n"
-    parser = add_kind(kinds, "stiff", "errors of the steppers in stiff and extreme cases", examples)
-    parser.add_argument(
-        "--full", action="store_true", help="also the adaptive stepper, which takes longer than all others"
-    )
-    parser.set_defaults(carry_out=carry_out)
+def scene(case: Case, stepper: str, step: float, period: float) -> Scene:
+    """Return the scene of a case, without recorder: 5 x 5 pins; physics step and control period, s."""
+    sections: dict[str, Any] = {**BED, **copy.deepcopy(dict(case.changes))}
+    rest = sections.get("actuator", {}).get("rest_height", 40e-3)
+    sections["recorder"] = "absent"
+    sections["simulation"] = {
+        "stepper": stepper, "physics_step": step, "control_period": period, "duration": DURATION,
+    }  # fmt: skip
+    sections["trajectory"] = {
+        "interpolation": "linear" if case.straight else "smooth",
+        "waypoints": [{"time": t, "position": [x, 0.0, rest + z]} for t, x, z in case.path],
+    }
+    return resolve(sections, "stiff")
 
 
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Run the table and print it."""
-    steppers = _steppers(quick=arguments.quick, full=arguments.full)
+Integrate = Callable[[str, float, float], Floats]
+
+STEPS = (1e-3, 5e-3, 20e-3, 50e-3)
+#: Control period of the shorter steps, s; that of the longer ones is the step.
+PERIOD = 5e-3
+#: Physics step of the reference, by Richardson extrapolation, s.
+FINE, ROUGH = 0.2e-3, 0.5e-3
+#: Steppers that hold every pin within what its valve and the finger can do, by construction.
+BOUNDED = ("bernoulli", "richardson", "adaptive")
+#: From this height error on, m, a run's own estimate has to show that it is wrong.
+WRONG = 1e-4
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of a run.
+
+    Attributes
+    ----------
+    error : float
+        Largest height error, m; NaN when it stopped.
+    estimate : float
+        The run's own estimate of its error (see `core.session.accuracy`), m; NaN where it was not asked for.
+    stopped : str
+        Reason; empty if it did not stop.
+    """
+
+    error: float
+    estimate: float = float("nan")
+    stopped: str = ""
+
+    @property
+    def silent(self) -> bool:
+        """Whether the run is wrong and its estimate does not show it."""
+        return self.error > WRONG and not self.estimate >= 0.5 * self.error
+
+    @property
+    def cell(self) -> str:
+        """The cell of the table."""
+        return self.stopped or f"{self.error * 1e6:.3g}" + ("!" if self.silent else "")
+
+
+@contextmanager
+def strict() -> Iterator[None]:
+    """Make errors of every warning, of overflow, of invalid numbers and of division by zero.
+
+    Underflow is let through: an opening eighty time constants after its command is rightly 0.
+    """
+    with warnings.catch_warnings(), np.errstate(all="raise", under="ignore"):
+        warnings.simplefilter("error")
+        yield
+
+
+def allowed_range(height: Floats, force: Floats, stroke: float) -> str:
+    """Return what is wrong with heights, (n,), m, and forces, (n,), N; nothing: an empty text."""
+    if not (np.isfinite(height).all() and np.isfinite(force).all()):
+        return "not finite"
+    if height.min() < 0.0 or height.max() > stroke:
+        return "height outside the stroke"
+    return "negative force" if force.min() < 0.0 else ""
+
+
+def _run(system: System, trajectories: Sequence[Trajectory], count: int) -> tuple[Floats, Floats, float]:
+    """Return heights and commands, (t, n), and the largest force, N; AssertionError at a broken invariant."""
+    rows, heights, commands, most = system.rows, [], [], 0.0
+    start = begin(system)
+    before, bounded = start.row(0), system.stepper.name in BOUNDED
+    for state in periods(system, trajectories, start, count):
+        height, force = state.row(0), state.row(rows.force)
+        wrong = allowed_range(height, force, system.cell.actuator.stroke)
+        if (
+            not wrong
+            and bounded
+            and not _within_reach(system, trajectories, state.period - 1, before, height)
+        ):
+            wrong = "a pin where none can be"
+        assert not wrong, wrong
+        before = height
+        heights.append(height)
+        commands.append(state.row(rows.command))
+        most = max(most, float(force.max()))
+    return np.array(heights), np.array(commands), most
+
+
+def _within_reach(
+    system: System, trajectories: Sequence[Trajectory], period: int, before: Floats, after: Floats
+) -> bool:
+    """Return whether heights, (n,), are within `Speeds.reach` of those a control period before."""
+    assert system.cell.touch is not None
+    poses = require_one(trajectories).poses(period * system.period + system.instants)
+    places = system.grid.compute_basis(np.arange(system.grid.count))
+    under = compute_underside(*compute_forms(system.cell.touch.fingertip.outline(poses)), places)
+    lowest, highest = find_speeds(system.cell).reach(before, under, system.period)
+    # Rounding: these undersides are computed from other products.
+    return bool((after >= lowest - 1e-12).all() and (after <= highest + 1e-12).all())
+
+
+def period_of(step: float) -> float:
+    """Return the control period of a physics step, s."""
+    return max(step, PERIOD)
+
+
+def commands_of(case: Case) -> Floats:
+    """Record the commands of a case, (t, n), each of which lasts for `HOLD`."""
+    recorded = scene(CASES[EASY] if case.borrowed else case, "bernoulli", 1e-3, HOLD)
+    return case.factor * _run(assemble(recorded), recorded.trajectories(), recorded.periods)[1]
+
+
+def live(case: Case, stepper: str, step: float) -> Floats:
+    """Run a case with its controller at a physics step, s, and return the heights, (t, n)."""
+    shown = scene(case, stepper, step, period_of(step))
+    return _run(assemble(shown), shown.trajectories(), shown.periods)[0]
+
+
+def _replay(
+    case: Case, commands: Floats, stepper: str, step: float, period: float
+) -> tuple[System, Sequence[Trajectory], int]:
+    """Return a case's system that plays commands, its path, and its number of periods."""
+    shown = scene(case, stepper, step, period)
+    system = replaying(shown, np.repeat(commands, round(HOLD / period), axis=0))
+    return system, shown.trajectories(), shown.periods
+
+
+def replayed(case: Case, commands: Floats, stepper: str, step: float, period: float) -> Floats:
+    """Integrate a case under commands of `HOLD` each and return the heights, (t, n); step and period, s."""
+    return _run(*_replay(case, commands, stepper, step, period))[0]
+
+
+def largest_force(case: Case, commands: Floats) -> float:
+    """Return the largest force on a cell at the end of a control period, N."""
+    return _run(*_replay(case, commands, "bernoulli", 1e-3, PERIOD))[2]
+
+
+def calls_of(case: Case, commands: Floats, step: float = 1e-3) -> float:
+    """Return the numpy calls of a control period of the default stepper, the median over the run."""
+    system, trajectories, count = _replay(case, commands, "bernoulli", step, period_of(step))
+    return statistics.median(period_calls(system, trajectories, count // 2)[0])
+
+
+def reference(
+    case: Case, commands: Floats, step: float = FINE, integrate: Integrate | None = None
+) -> tuple[Floats, float]:
+    """Return the heights every 5 ms, (t, n), and how far they may be off, m; `integrate`: see `outcome`."""
+    integrate = integrate or partial(replayed, case, commands)
+    fine = integrate("richardson", step, PERIOD)
+    coarse = integrate("richardson", 1e-3 if step < ROUGH else 2 * step, PERIOD)
+    # Order 2 is what is left of order 3 across a kink.
+    return fine, float(np.abs(fine - coarse).max()) / (24.0 if step < ROUGH else 3.0)
+
+
+def outcome(
+    case: Case, commands: Floats, exact: Floats, stepper: str, step: float, integrate: Integrate | None = None
+) -> Outcome:
+    """Run one stepper at one step, and compare it with `exact`, (t, n), heights every 5 ms, m.
+
+    `integrate`: returns what `replayed` does for a stepper, its step and the control period, s. Callers that
+    compare several steppers can keep the results: the finer run is the same for each, and that of the
+    shortest step is the reference's.
+    """
+    integrate = integrate or partial(replayed, case, commands)
+    period = period_of(step)
+    every = round(period / PERIOD)
+    try:
+        with strict():
+            heights = integrate(stepper, step, period)
+    except DivergenceError as wrong:
+        return Outcome(float("nan"), stopped=f"{wrong.quantity} {wrong.value:.2g} at {wrong.time:.3g} s")
+    except (FloatingPointError, RuntimeWarning) as wrong:
+        return Outcome(float("nan"), stopped=str(wrong).partition(" encountered")[0])
+    except AssertionError as wrong:
+        return Outcome(float("nan"), stopped=f"INVARIANT: {wrong}")
+    error = float(np.abs(heights - exact[every - 1 :: every]).max())
+    if error <= WRONG:
+        return Outcome(error)
+    judge = reference_settings(scene(case, stepper, step, period).simulation)
+    with strict():
+        finer = integrate(judge.stepper, judge.physics_step, period)
+    return Outcome(error, SHARE * float(np.abs(heights - finer).max()))
+
+
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Run every case by every stepper at every step."""
+    steppers = tuple(name for name in STEPPERS if arguments.full or name != "adaptive")
+    if arguments.quick:
+        steppers = ("bernoulli", "euler")
     started = time.process_time()
     lines: list[list[str]] = []
     figures: list[list[Any]] = []
-    costs: list[list[str]] = []
+    costs: list[tuple[str, float, float, float, float, str]] = []
     broken: list[str] = []
-    easy = ""
-    with progress(arguments, "stiff", len(CASES)) as bar:
-        for name, case in CASES.items():
-            with strict():
-                commands = commands_of(case)
-                exact, off = reference(case, commands, ROUGH if arguments.quick else FINE)
-                most = largest_force(case, commands)
-            for stepper in steppers:
-                found = [outcome(case, commands, exact, stepper, step) for step in STEPS]
-                lines.append([name if stepper == steppers[0] else "", stepper, *(one.said for one in found)])
-                figures += [
-                    [name, stepper, step * 1e3, one.error * 1e6, one.estimate * 1e6, one.stopped, off * 1e6]
-                    for step, one in zip(STEPS, found, strict=True)
-                ]
-                if stepper == "bernoulli":
-                    broken += _broken(name, case, found, off)
-            broken += _broken_live(name, case)
-            calls, took = calls_of(case, commands), _took(case, commands)
-            easy = easy or f"{calls} {took}"
-            base = [float(one) for one in easy.split()]
-            costs.append([
-                name, f"{most:.2g}", f"{off * 1e6:.1g}", f"{calls:g}", f"{calls / base[0]:.2f}",
-                f"{took / base[1]:.2f}", case.why,
-            ])  # fmt: skip
-            bar(name)
-    text = "\n".join(_text(lines, costs, broken, time.process_time() - started))
-    print(text)
+    for name in steps.through(list(CASES)):
+        case = CASES[name]
+        with strict():
+            commands = commands_of(case)
+            exact, off = reference(case, commands, ROUGH if arguments.quick else FINE)
+            most = largest_force(case, commands)
+        for stepper in steppers:
+            outcomes = [outcome(case, commands, exact, stepper, step) for step in STEPS]
+            lines.append([name if stepper == steppers[0] else "", stepper, *(one.cell for one in outcomes)])
+            figures += [
+                [name, stepper, step * 1e3, one.error * 1e6, one.estimate * 1e6, one.stopped, off * 1e6]
+                for step, one in zip(STEPS, outcomes, strict=True)
+            ]
+            if stepper == "bernoulli":
+                broken += _list_broken(name, case, outcomes, off)
+        broken += _list_broken_live(name, case)
+        costs.append((name, most, off * 1e6, calls_of(case, commands), _time(case, commands), case.why))
     head = ("case", "stepper", "step_ms", "error_um", "own_estimate_um", "stopped", "reference_error_um")
-    kept(arguments.out, "stiff", text, head, figures)
-    return 0
+    took = time.process_time() - started
+    return Report(list(_list_lines(lines, costs, broken, took)), head, figures)
 
 
-def _steppers(*, quick: bool, full: bool) -> tuple[str, ...]:
-    """Return the names of the steppers a table is made of."""
-    if quick:
-        return ("bernoulli", "euler")
-    return tuple(name for name in STEPPERS if full or name != "adaptive")
-
-
-def _took(case: Case, commands: Floats) -> float:
+def _time(case: Case, commands: Floats) -> float:
     """Return the CPU time of the default stepper at 1 ms, s: the least of two."""
     spent = []
     for _ in range(2):
@@ -100,18 +391,18 @@ def _took(case: Case, commands: Floats) -> float:
     return min(spent)
 
 
-def _broken(name: str, case: Case, found: list[Outcome], off: float) -> Iterator[str]:
-    """Give what the default stepper does not keep of its promises under recorded commands."""
-    for step, one in zip(STEPS, found, strict=True):
+def _list_broken(name: str, case: Case, outcomes: list[Outcome], off: float) -> Iterator[str]:
+    """Give which of its promises the default stepper breaks under recorded commands."""
+    for step, one in zip(STEPS, outcomes, strict=True):
         if one.stopped:
             yield f"{name}, {step * 1e3:g} ms: {one.stopped}"
-    errors = [one.error for one in found]
+    errors = [one.error for one in outcomes]
     if not case.why and any(a > max(b, 10.0 * off, 1e-12) for a, b in pairwise(errors)):
         yield f"{name}: the error does not fall with the step"
 
 
-def _broken_live(name: str, case: Case) -> Iterator[str]:
-    """Give where the default stepper blows up under its own controller."""
+def _list_broken_live(name: str, case: Case) -> Iterator[str]:
+    """Give where the default stepper blows up under the case's controller."""
     for step in STEPS:
         try:
             with strict():
@@ -120,22 +411,31 @@ def _broken_live(name: str, case: Case) -> Iterator[str]:
             yield f"{name}, live, {step * 1e3:g} ms: {wrong}"
 
 
-def _text(lines: list[list[str]], costs: list[list[str]], broken: list[str], took: float) -> Iterator[str]:
+def _list_lines(
+    lines: list[list[str]],
+    costs: list[tuple[str, float, float, float, float, str]],
+    broken: list[str],
+    took: float,
+) -> Iterator[str]:
     """Give the lines of the report."""
-    yield made_with()
-    yield "\nLargest height error, µm, under recorded commands held for 100 ms, by step; or why it stopped."
+    yield "\nLargest height error, µm, under recorded commands of 100 ms each, by step; or why it stopped."
     yield f"The control period is {PERIOD * 1e3:g} ms, or the step where that is longer. A mark ! means"
-    yield "wrong, and not known from the run's own estimate of its error.\n"
+    yield "wrong, and not shown by the run's own estimate of its error.\n"
     head = ("case", "stepper", *(f"{step * 1e3:g} ms" for step in STEPS))
     yield from table(head, lines, left=2)
     yield "\nThe default stepper: the largest force on a pin, how far the reference may be off, and what a"
     yield "control period with 1 ms steps costs."
     yield "'times' is over the easy case; a reason marks a case as ill-conditioned: it stays bounded\n"
     head = ("case", "force, N", "reference, µm", "numpy calls", "times", "CPU times", "ill-conditioned")
-    yield from table(head, costs)
+    easy = costs[0]
+    rows = [
+        cells("s .2g .1g g .2f .2f s", name, most, off, calls, calls / easy[3], spent / easy[4], why)
+        for name, most, off, calls, spent, why in costs
+    ]
+    yield from table(head, rows)
     runs = 2 * len(CASES) * len(STEPS)
     silent = sum(line[1] != "bernoulli" and "!" in cell for line in lines for cell in line)
-    yield f"\nThe other steppers: {silent} runs wrong without knowing it."
+    yield f"\nThe other steppers: {silent} runs wrong without showing it."
     yield f"bernoulli: {runs} runs (replayed and live), {len(broken)} broken promises."
     yield f"All took {took:.0f} s of CPU time."
     yield from (f"  {line}" for line in broken)

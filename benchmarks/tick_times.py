@@ -1,16 +1,19 @@
-"""Time of every single tick of a live session while a hand draws with the Press tool, and of its parts."""
+"""Benchmark ``ticks``: distribution of the time of a live session's tick while a hand draws, part by part."""
 
 from __future__ import annotations
 
+import argparse
 import gc
+import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
+from digiclay.commands.progress import table
 from digiclay.compat import bpy, scratch
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, live_session, snapshot
@@ -19,15 +22,25 @@ from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.live.stroke import draw
 from digiclay.live.stroke_queue import change_stroke, queue_stroke
 from digiclay.operators.add_bed import add, select_only
+from digiclay.plots.figure import empty
 from numpy.typing import NDArray
 
+from .report import BLUE, INK, RED, STYLE, Report, Steps
 from .viewport_cost import settings
 
+#: Rows and columns of the beds, their pitch and the bore of their pins, m, and the time that 99 of 100 ticks
+#: are to keep to, s.
+BEDS = ((25, 25, 3e-3, 2e-3, 8e-3), (100, 100, 3e-3, 2e-3, 16e-3), (100, 100, 1.5e-3, 1e-3, 16e-3))
+#: Ticks that are timed, with --quick and without.
+QUICK, FULL = 120, 3000
+#: Shares of the ticks whose times are given; the last one is the largest time.
+SHARES = (0.5, 0.9, 0.99, 0.999, 1.0)
+NAMES = ("median", "90 %", "99 %", "99.9 %", "largest")
 #: Ticks a second.
 RATE = 60
 #: What a tick does. The rest of it is in none of these; garbage is collected within any of them.
 PARTS = ("read", "simulate", "monitor", "pack", "finger", "store", "show", "evaluate", "garbage")
-#: Ticks that are not counted: the finger comes down, and everything is used for the first time.
+#: Ticks that are not counted: the fingertip comes down, and everything is used for the first time.
 WARM_UP = 90
 #: The hand draws circles of this radius, m, each in so many ticks, and presses so deep, m.
 RADIUS, ROUND, DEPTH = 12e-3, 120, 4e-3
@@ -66,12 +79,9 @@ class Ticks:
         return f"{self.rows} x {self.columns} at {1e3 * self.pitch:g} mm"
 
 
-def measure(rows: int, columns: int, pitch: float, bore: float, ticks: int) -> Ticks:
-    """Add a bed, draw on it as a hand does, and time every tick.
-
-    `rows`, `columns`: of the bed; `pitch`, `bore`, m; `ticks`: how many are timed.
-    """
-    found: dict[str, list[float]] = {name: [] for name in PARTS}
+def time_ticks(rows: int, columns: int, pitch: float, bore: float, ticks: int) -> Ticks:
+    """Add a bed, draw on it as a hand does, and time `ticks` ticks; `pitch`, `bore`, m."""
+    spent_in: dict[str, list[float]] = {name: [] for name in PARTS}
     elapsed, spent = [], []
     with settings(), scratch():
         scene = resolve(
@@ -97,10 +107,10 @@ def measure(rows: int, columns: int, pitch: float, bore: float, ticks: int) -> T
                         elapsed.append(ended[0] - began[0])
                         spent.append(ended[1] - began[1])
                         for name in PARTS:
-                            found[name].append(clock[name])
+                            spent_in[name].append(clock[name])
         finally:
             tick.stop(bed.session_uid)
-    parts = {name: np.array(values) for name, values in found.items()}
+    parts = {name: np.array(values) for name, values in spent_in.items()}
     return Ticks(rows, columns, pitch, np.array(elapsed), np.array(spent), parts)
 
 
@@ -200,3 +210,67 @@ def _watch_garbage(clock: _Clock) -> Callable[[str, dict[str, int]], None]:
             clock["garbage"] += time.process_time() - began
 
     return watch
+
+
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Measure every bed on one core."""
+    keep_to_one_core()
+    count, beds = QUICK if arguments.quick else FULL, []
+    for rows, columns, pitch, bore, _ in steps.through(BEDS, lambda bed: f"{bed[0]} x {bed[1]}"):
+        beds.append(time_ticks(rows, columns, pitch, bore, count))
+    head = ("rows", "columns", "pitch_m", "ticks", "part", *(f"share_{share:g}_s" for share in SHARES))
+    figures = [
+        [bed.rows, bed.columns, bed.pitch, count, name, *np.quantile(times, SHARES)]
+        for bed in beds
+        for name, times in list_parts(bed).items()
+    ]
+    return Report(
+        _list_lines(beds), head, figures, lambda: _draw(beds), program=f"Blender {bpy.app.version_string}"
+    )
+
+
+def keep_to_one_core() -> None:
+    """Limit all threads of the process to one core, where the system lets it; Blender has begun some."""
+    if hasattr(os, "sched_setaffinity"):
+        core = {min(os.sched_getaffinity(0))}
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setaffinity(int(thread), core)
+
+
+def _list_lines(beds: Sequence[Ticks]) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield f"\nTicks of a live session at {RATE} a second while a hand draws with the Press tool; one core,"
+    yield "without drawing. Processor time, ms. evaluate: Blender's geometry nodes; pack and store: the state"
+    yield "for undo and files; monitor: estimate of the error; other: what is in no part."
+    for bed, (_, _, _, _, goal) in zip(beds, BEDS, strict=True):
+        kept_to = 100.0 * np.mean(bed.spent < goal)
+        yield f"\n{bed.name}, {len(bed.spent)} ticks; {kept_to:.2f} % under {1e3 * goal:g} ms\n"
+        rows = [
+            [name, *(f"{1e3 * time:.2f}" for time in np.quantile(times, SHARES))]
+            for name, times in list_parts(bed).items()
+        ]
+        yield from table(("", *NAMES), rows)
+
+
+def list_parts(bed: Ticks) -> dict[str, Any]:
+    """Return the times of a bed's ticks, s, by the lines of the report."""
+    rest = bed.spent - sum(times for name, times in bed.parts.items() if name != "garbage")
+    return {"whole tick": bed.spent, **bed.parts, "other": rest, "whole, elapsed time": bed.elapsed}
+
+
+def _draw(beds: Sequence[Ticks]) -> Any:
+    """Draw how the times of the ticks are distributed, one panel a bed."""
+    goals = [bed[-1] for bed in BEDS]
+    with empty(7.2, 2.1 * len(beds), STYLE, layout="constrained") as figure:
+        panels = figure.subplots(len(beds), 1, sharex=True, squeeze=False).ravel()
+        highest = 1e3 * max(*(float(bed.spent.max()) for bed in beds), *goals)
+        bins = np.arange(0.0, highest + 0.5, 0.25)
+        for panel, bed, goal in zip(panels, beds, goals, strict=True):
+            panel.hist(1e3 * bed.spent, bins, color=BLUE, log=True)
+            panel.axvline(1e3 * goal, color=RED, linestyle="--", label=f"goal: {1e3 * goal:g} ms")
+            share = 1e3 * float(np.quantile(bed.spent, 0.99))
+            panel.axvline(share, color=INK, linestyle=":", label=f"99 %: {share:.1f} ms")
+            panel.set(title=f"{bed.name}, {len(bed.spent)} ticks", ylabel="ticks in 0.25 ms")
+            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+        panels[-1].set_xlabel("processor time of a tick, ms")
+        return figure

@@ -1,7 +1,8 @@
-"""Time of the parts of a tick and of the skin in Blender, measured on the functions of the session itself."""
+"""Benchmark ``viewport``: time of a tick of a live session in Blender, part by part, and of its skin."""
 
 from __future__ import annotations
 
+import argparse
 import gc
 import statistics
 import time
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from digiclay import bridge
+from digiclay.commands.progress import table
 from digiclay.compat import bpy, scratch
 from digiclay.core.model.layout import Layout
 from digiclay.device import form, view
@@ -24,6 +26,12 @@ from digiclay.panels import display
 from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
 
+from .report import Report, Steps
+
+#: Rows and columns of the beds, and the time a tick of them may take, s.
+BEDS = ((25, 25, 5e-3), (100, 100, 10e-3), (250, 400, 40e-3))
+#: Ticks that are timed, with --quick and without.
+QUICK, FULL = 40, 200
 #: What is drawn, by turns: form, and kind of skin.
 SHOWN = (("pins", "smooth"), ("skin", "smooth"), ("skin", "membrane"), ("both", "smooth"))
 #: Evaluations in a row before another form has its turn; the first of them is not counted.
@@ -45,10 +53,7 @@ class SkinCost:
 
 
 def measure_skin(rows: int, columns: int, updates: int) -> SkinCost:
-    """Move all pins of a bed again and again, and time what Blender does then, drawing excepted.
-
-    `updates`: how many are timed for each form, at least.
-    """
+    """Move all pins of a bed, and time Blender's evaluation of each form, at least `updates` times."""
     instant = Instant.at_rest(Layout(rows=rows, columns=columns))
     noise = 1e-3 * np.random.default_rng(0).standard_normal((2, len(instant.height)))
     spent: list[list[float]] = [[] for _ in SHOWN]
@@ -77,8 +82,8 @@ WARM_UP = 30
 CIRCLE, ROUND = 8e-3, 120
 #: How deep below the pins at rest, m.
 DEPTH = 5e-3
-#: About how often memory is looked at while as many ticks go by as are timed: each look collects garbage.
-LOOKS = 6
+#: How often about memory is read in as many ticks as are timed; each time garbage is collected.
+READINGS = 6
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,7 @@ class Cost:
     worst : float
         Time that 95 % of the ticks keep to, s.
     growth : float
-        By how much the least memory Python holds rises from as many ticks to as many later, bytes.
+        See `_measure_growth`, bytes.
     """
 
     pins: int
@@ -105,15 +110,13 @@ class Cost:
 
 
 def measured(rows: int, columns: int, ticks: int) -> Cost:
-    """Add a bed, press and drag its fingertip, and time the ticks of its session.
-
-    `rows`, `columns`: pins of the bed; `ticks`: how many are timed.
-    """
+    """Add a bed, press and drag its fingertip, and time `ticks` ticks of its session."""
     with _session(rows, columns) as bed:
-        clock = _ticks(bed, WARM_UP)
-        whole = [_timed(bed, count) for count in range(clock, clock + ticks)]
-        parts = [_timed_parts(bed, count) for count in range(clock + ticks, clock + 2 * ticks)]
-        growth = _growth(bed, clock + 2 * ticks, ticks)
+        for count in range(WARM_UP):
+            _time_tick(bed, count)
+        whole = [_time_tick(bed, count) for count in range(WARM_UP, WARM_UP + ticks)]
+        parts = [_time_parts(bed, count) for count in range(WARM_UP + ticks, WARM_UP + 2 * ticks)]
+        growth = _measure_growth(bed, WARM_UP + 2 * ticks, ticks)
     spent = {name: statistics.median(part[name] for part in parts) for name in PARTS}
     worst = float(np.quantile(whole, 0.95))
     return Cost(rows * columns, spent, statistics.median(whole), worst, growth)
@@ -134,7 +137,7 @@ def _session(rows: int, columns: int) -> Iterator[Any]:
 
 @contextmanager
 def settings() -> Iterator[None]:
-    """Let beds have settings: for the while, where the extension is not enabled anyway."""
+    """Register the settings of beds within the block, unless the extension is enabled."""
     if hasattr(bpy.types.Object, "digiclay"):
         yield
         return
@@ -160,14 +163,7 @@ def _move(bed: Any, count: int) -> None:
     bpy.context.view_layer.update()
 
 
-def _ticks(bed: Any, count: int) -> int:
-    """Let the session live for some ticks; return how many."""
-    for one in range(count):
-        _timed(bed, one)
-    return count
-
-
-def _timed(bed: Any, count: int) -> float:
+def _time_tick(bed: Any, count: int) -> float:
     """Return what a whole tick takes, s."""
     _move(bed, count)
     started = time.perf_counter()
@@ -176,7 +172,7 @@ def _timed(bed: Any, count: int) -> float:
     return time.perf_counter() - started
 
 
-def _timed_parts(bed: Any, count: int) -> dict[str, float]:
+def _time_parts(bed: Any, count: int) -> dict[str, float]:
     """Return what the parts of a tick take, s."""
     _move(bed, count)
     session = running.find(bed)
@@ -197,24 +193,65 @@ def _timed_parts(bed: Any, count: int) -> dict[str, float]:
     return dict(zip(PARTS, np.diff(moments).tolist(), strict=True))
 
 
-def _growth(bed: Any, first: int, ticks: int) -> int:
-    """Return by how much the least memory Python holds has risen from some ticks to as many later, bytes.
+def _measure_growth(bed: Any, first: int, ticks: int) -> int:
+    """Return by how much Python's least memory has risen from some ticks to as many later, bytes.
 
-    The least, because what a session works with comes and goes: arrays for the cells it moves, the
-    monitor that estimates its error. What a leak holds never goes. The first of three rounds gives
-    way to what was held before the counting began.
+    The least, because a session's arrays and its monitor of the error come and go; a leak never goes.
+    The first of three rounds replaces what was allocated before the counting began.
     """
     tracemalloc.start()
     try:
         floors = []
         for part in range(3):
-            held = []
+            sizes = []
             for count in range(ticks):
-                _timed(bed, first + part * ticks + count)
-                if count % max(ticks // LOOKS, 1) == 0:
+                _time_tick(bed, first + part * ticks + count)
+                if count % max(ticks // READINGS, 1) == 0:
                     gc.collect()
-                    held.append(tracemalloc.get_traced_memory()[0])
-            floors.append(min(held))
+                    sizes.append(tracemalloc.get_traced_memory()[0])
+            floors.append(min(sizes))
     finally:
         tracemalloc.stop()
     return floors[2] - floors[1]
+
+
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Measure every bed."""
+    ticks = QUICK if arguments.quick else FULL
+    costs, skins = [], []
+    for rows, columns, _ in steps.through(BEDS, lambda bed: f"{bed[0] * bed[1]} pins"):
+        costs.append(measured(rows, columns, ticks))
+        skins.append(measure_skin(rows, columns, ticks))
+    head = ("pins", *(f"{name}_s" for name in PARTS), "tick_s", "tick_95_s", "growth_bytes")
+    head = (*head, *(f"{shown}_{kind}_s" for shown, kind in SHOWN))
+    figures = [
+        [one.pins, *(one.parts[name] for name in PARTS), one.whole, one.worst, one.growth, *skin.evaluate]
+        for one, skin in zip(costs, skins, strict=True)
+    ]
+    return Report(
+        [*_list_lines(costs), *_list_skins(skins)], head, figures, program=f"Blender {bpy.app.version_string}"
+    )
+
+
+def _list_lines(costs: list[Cost]) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield "\nA tick of a live session: 33 ms of simulated time while a fingertip presses and drags; medians."
+    yield "read: the fingertip's place; keep: the state into the bed, for undo and files; write: pins;"
+    yield "evaluate: Blender's geometry nodes, without drawing. Times in ms.\n"
+    head = ("pins", *PARTS, "tick", "goal", "95 % within", "memory grown, kB")
+    rows = [
+        [
+            f"{one.pins}", *(f"{1e3 * one.parts[name]:.2f}" for name in PARTS), f"{1e3 * one.whole:.2f}",
+            f"{1e3 * goal:g}", f"{1e3 * one.worst:.2f}", f"{one.growth / 1e3:.1f}",
+        ]
+        for one, (_, _, goal) in zip(costs, BEDS, strict=True)
+    ]  # fmt: skip
+    yield from table(head, rows, left=0)
+
+
+def _list_skins(costs: list[SkinCost]) -> Iterator[str]:
+    """Give the lines about the live skin."""
+    yield "\nAll pins moved, forms by turns: processor time of the geometry nodes, medians, ms.\n"
+    head = ("pins", *("pins alone" if form == "pins" else f"{form}, {kind}" for form, kind in SHOWN))
+    rows = [[f"{one.pins}", *(f"{1e3 * spent:.2f}" for spent in one.evaluate)] for one in costs]
+    yield from table(head, rows, left=0)

@@ -12,9 +12,9 @@ import pytest
 from digiclay.core.session import live_session
 from digiclay.live import bed_state, running, sculpting
 
-from benchmarks import ticks
+from benchmarks import tick_times
 from benchmarks.__main__ import main
-from benchmarks.tick_times import DEPTH, PARTS, RATE, measure
+from benchmarks.tick_times import DEPTH, PARTS, RATE, SHARES, time_ticks
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 
 def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
     before = sculpting.advance, bed_state.write
-    found = measure(11, 11, 3e-3, 2e-3, ticks=12)
+    found = time_ticks(11, 11, 3e-3, 2e-3, ticks=12)
     assert (sculpting.advance, bed_state.write) == before
     assert running.list_sessions() == ()
     assert found.spent.shape == found.elapsed.shape == (12,)
@@ -46,7 +46,7 @@ def test_the_finger_presses_while_ticks_are_timed(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(sculpting, "advance", watched)
     monkeypatch.setattr(live_session, "SHARE", 0.0)  # a machine too slow for more than one period a tick
-    measure(11, 11, 3e-3, 2e-3, ticks=6)
+    time_ticks(11, 11, 3e-3, 2e-3, ticks=6)
     assert live_session.SHARE == 0.0
     assert min(lowest[-6:]) < 40e-3 - DEPTH / 2
     assert periods[-1] - periods[-7] == 6 / RATE / 5e-3
@@ -56,9 +56,9 @@ def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pytest.importorskip("matplotlib", reason="the histogram needs it; `make test` has it")
-    monkeypatch.setattr(ticks, "BEDS", ((11, 11, 3e-3, 2e-3, 8e-3), (20, 21, 1.5e-3, 1e-3, 16e-3)))
-    monkeypatch.setattr(ticks, "QUICK", 5)
-    monkeypatch.setattr(ticks, "keep_to_one_core", lambda: None)  # other tests go on in this process
+    monkeypatch.setattr(tick_times, "BEDS", ((11, 11, 3e-3, 2e-3, 8e-3), (20, 21, 1.5e-3, 1e-3, 16e-3)))
+    monkeypatch.setattr(tick_times, "QUICK", 5)
+    monkeypatch.setattr(tick_times, "keep_to_one_core", lambda: None)  # other tests go on in this process
     assert main(["ticks", "--quick", "--quiet", "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert "11 x 11 at 3 mm, 5 ticks" in told
@@ -66,7 +66,7 @@ def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
     with (tmp_path / "ticks.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * (3 + len(PARTS))
-    whole = [float(rows[0][f"share_{share:g}_s"]) for share in ticks.SHARES]
+    whole = [float(rows[0][f"share_{share:g}_s"]) for share in SHARES]
     assert rows[0]["part"] == "whole tick"
     assert 0.0 < whole[0] <= whole[-1]
     assert (tmp_path / "ticks.png").stat().st_size > 10_000
@@ -76,7 +76,7 @@ def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
 def test_threads_that_were_started_before_are_kept_to_the_core_too() -> None:
     script = (
         "import os, threading\n"
-        "from benchmarks.ticks import keep_to_one_core\n"
+        "from benchmarks.tick_times import keep_to_one_core\n"
         "over = threading.Event()\n"
         "thread = threading.Thread(target=over.wait)\n"
         "thread.start()\n"

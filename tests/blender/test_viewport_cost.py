@@ -28,10 +28,8 @@ def test_a_session_does_not_gather_memory_as_it_goes_on() -> None:
 def test_the_command_prints_a_row_for_every_bed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from benchmarks import viewport
-
-    monkeypatch.setattr(viewport, "BEDS", ((12, 12, 5e-3), (12, 14, 5e-3)))
-    monkeypatch.setattr(viewport, "QUICK", 2)
+    monkeypatch.setattr(viewport_cost, "BEDS", ((12, 12, 5e-3), (12, 14, 5e-3)))
+    monkeypatch.setattr(viewport_cost, "QUICK", 2)
     assert main(["viewport", "--quick", "--quiet"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines[-2:]] == ["144", "168"]

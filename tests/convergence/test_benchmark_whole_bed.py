@@ -8,17 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.peers import SOLVERS, peer
-from benchmarks.problems import Measured, Problem, problem, solved
-from benchmarks.python_loop import loop
-from benchmarks.whole_bed import Beside, beside, everywhere, report
-from benchmarks.work_precision import LEVELS, LOOP, Work
+from benchmarks.peers import LOOP, SOLVERS, loop, peer
+from benchmarks.precision import LEVELS, Beside, list_beside, run_beside, spread_everywhere
+from benchmarks.problems import Problem, Solution, Work, problem
 
 PERIODS = 16
 
 
 @pytest.fixture(scope="module")
-def known() -> Problem:
+def task() -> Problem:
     """The start of a press on a bed of 13 x 13 cells."""
     whole = problem("deep press", side=13)
     scene = replace(whole.scene, simulation=replace(whole.scene.simulation, duration=PERIODS * 5e-3))
@@ -26,91 +24,82 @@ def known() -> Problem:
 
 
 @pytest.fixture(scope="module")
-def exact(known: Problem) -> Measured:
+def exact(task: Problem) -> Solution:
     """Richardson's form at 0.1 ms: within 1 nm."""
-    simulation = replace(known.scene.simulation, stepper="richardson", physics_step=1e-4)
-    return solved(replace(known.scene, simulation=simulation), known.commands)
+    return task.solve("richardson", 1e-4)
 
 
-def idle(known: Problem) -> NDArray[np.intp]:
+def idle(task: Problem) -> NDArray[np.intp]:
     """Return the cells that take no part in any period."""
-    return np.setdiff1d(np.arange(known.scene.cells), np.concatenate([cells for cells, _ in known.sets]))
+    return np.setdiff1d(np.arange(task.scene.cells), np.concatenate([cells for cells, _ in task.sets]))
 
 
-def found_by(known: Problem, method: str) -> Measured:
+def found_by(task: Problem, method: str) -> Solution:
     """Return what a peer finds over the whole bed."""
     if method == LOOP:
-        return loop(everywhere(known), 1e-3, PERIODS)[0]
-    return peer(everywhere(known), SOLVERS[method], 1e-7)[0]
+        return loop(spread_everywhere(task), 1e-3)[0]
+    return peer(spread_everywhere(task), SOLVERS[method], 1e-7)[0]
 
 
-def test_the_problem_has_cells_that_take_no_part_and_others_that_move(
-    known: Problem, exact: Measured
-) -> None:
-    assert (known.scene.periods, idle(known).size > 50) == (PERIODS, True)
+def test_the_problem_has_cells_that_take_no_part_and_others_that_move(task: Problem, exact: Solution) -> None:
+    assert (task.scene.periods, idle(task).size > 50) == (PERIODS, True)
     assert np.ptp(exact.heights, axis=0).max() > 0.1e-3
 
 
-def test_over_the_whole_bed_every_cell_may_be_touched_in_every_period(known: Problem) -> None:
-    sets = everywhere(known).sets
+def test_over_the_whole_bed_every_cell_may_be_touched_in_every_period(task: Problem) -> None:
+    sets = spread_everywhere(task).sets
     assert len(sets) == PERIODS
     assert all(cells.tolist() == list(range(169)) and near == 169 for cells, near in sets)
 
 
-@pytest.mark.parametrize("method", ["LSODA", "DOP853", "Radau"])
-def test_a_solver_over_the_whole_bed_finds_our_heights(known: Problem, exact: Measured, method: str) -> None:
-    # A tolerance of 1e-7 of 10 mm is 1 nm a step, which the contact's spring forgets; ours adds its 1 nm.
-    assert found_by(known, method).against(exact)[0] < 5e-9
-
-
-def test_the_loop_over_the_whole_bed_finds_what_it_finds_when_told(known: Problem) -> None:
+def test_the_loop_over_the_whole_bed_finds_what_it_finds_when_told(task: Problem) -> None:
     # Same formulas, same steps, other order of the sums: rounding only.
-    height, force = found_by(known, LOOP).against(loop(known, 1e-3, PERIODS)[0])
+    height, force = found_by(task, LOOP).compare(loop(task, 1e-3)[0])
     assert (height < 1e-14, force < 1e-9) == (True, True)
 
 
-@pytest.mark.parametrize("method", ["LSODA", "DOP853", "Radau", LOOP])
-def test_cells_that_take_no_part_stay_as_in_ours(known: Problem, exact: Measured, method: str) -> None:
-    # Exactly: their valves are shut and nothing presses.
-    cells = idle(known)
-    assert np.array_equal(found_by(known, method).heights[:, cells], exact.heights[:, cells])
+@pytest.mark.parametrize("method", [*SOLVERS, LOOP])
+def test_a_peer_over_the_whole_bed_finds_our_heights(task: Problem, exact: Solution, method: str) -> None:
+    found, cells = found_by(task, method), idle(task)
+    # A tolerance of 1e-7 of 10 mm is 1 nm a step, which the contact's spring forgets; ours adds its 1 nm.
+    assert method == LOOP or found.compare(exact)[0] < 5e-9
+    # Cells that take no part stay exactly as in ours: their valves are shut and nothing presses.
+    assert np.array_equal(found.heights[:, cells], exact.heights[:, cells])
 
 
 def test_both_forms_of_a_peer_run_at_the_same_settings_to_the_same_errors(
-    known: Problem, exact: Measured
+    task: Problem, exact: Solution
 ) -> None:
     # The cells that take no part add no error; their share in a solver's sums is rounding.
-    ran = beside(known, exact, {"bernoulli": (1e-3,)}, {"LSODA": (1e-3, 1e-5)}, {}, rounds=1)
+    ran = run_beside(task, exact, {"bernoulli": (1e-3,)}, {"LSODA": (1e-3, 1e-5)}, {}, rounds=1)
     told, whole = ([(one.method, one.setting) for one in runs] for runs in (ran.told, ran.whole))
     assert told == whole == [("LSODA", 1e-3), ("LSODA", 1e-5), (LOOP, 1e-3)]
     errors = ([one.height_error for one in runs] for runs in (ran.told, ran.whole))
     assert next(errors) == pytest.approx(next(errors), rel=0.02)
 
 
-def test_over_the_whole_bed_nothing_is_known_of_which_cells_take_part(
-    known: Problem, exact: Measured
-) -> None:
+def test_over_the_whole_bed_nothing_is_known_of_which_cells_take_part(task: Problem, exact: Solution) -> None:
     # Told a lie, that one cell takes part, the told are wrong; the others are as exact as their setting.
-    lied = replace(known, sets=[(cells[:1], 1) for cells, _ in known.sets])
-    ran = beside(lied, exact, {}, {"LSODA": (1e-3,)}, {"DOP853": (1e-3,)}, rounds=1)
+    lied = replace(task, sets=[(cells[:1], 1) for cells, _ in task.sets])
+    ran = run_beside(lied, exact, {}, {"LSODA": (1e-3,)}, {"DOP853": (1e-3,)}, rounds=1)
     assert min(one.height_error for one in ran.told) > 1e-4
     assert [one.height_error < 1e-5 for one in ran.whole] == [True, True, True]
 
 
-def test_a_solver_run_once_goes_over_the_whole_bed_alone(known: Problem, exact: Measured) -> None:
-    ran = beside(known, exact, {}, {}, {"DOP853": (1e-3,)}, rounds=1)
+def test_a_solver_run_once_goes_over_the_whole_bed_alone(task: Problem, exact: Solution) -> None:
+    ran = run_beside(task, exact, {}, {}, {"DOP853": (1e-3,)}, rounds=1)
     assert [one.method for one in ran.told] == [LOOP]
     assert [one.method for one in ran.whole] == ["DOP853", LOOP]
 
 
-def test_the_report_sets_the_ratios_of_both_forms_side_by_side(known: Problem) -> None:
+def test_the_report_sets_the_ratios_of_both_forms_side_by_side(task: Problem) -> None:
     def run(method: str, setting: float, seconds: float, *, peer: bool) -> Work:
-        return Work(known.name, method, setting, 1e-10, 0.0, seconds, 0, peer)
+        return Work(task.name, method, setting, 1e-10, 0.0, seconds, 0, peer)
 
     mine = [run("bernoulli", 1e-3, 2.0, peer=False), run("richardson", 5e-3, 1.0, peer=False)]
     told = [run("LSODA", 1e-3, 5.0, peer=True), run(LOOP, 1e-3, 30.0, peer=True)]
     whole = [run("LSODA", 1e-3, 20.0, peer=True), run(LOOP, 1e-3, 150.0, peer=True)]
-    lines = list(report([Beside(known, mine, told, whole)], [1e-12], 2))
+    lines = list(list_beside([Beside(task, mine, told, whole)], [1e-12], 2))
     rows = [line.split() for line in lines if line.endswith((" 15.0", " 75.0"))]
     every = len(LEVELS)
     assert rows == [

@@ -16,8 +16,8 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.session import snapshot
 from numpy.typing import NDArray
 
-from benchmarks import stiff_runs as stiff
-from benchmarks.stiff_runs import CASES, EASY, HOLD
+from benchmarks import stiff
+from benchmarks.stiff import CASES, EASY, HOLD
 
 SAMPLES = Path(__file__).parents[1] / "samples" / "states"
 #: Numpy calls a period of one step may cost more than the easy case.

@@ -22,7 +22,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from benchmarks.stiff_runs import strict
+from benchmarks.stiff import strict
 from tests.assemble import Motion, Record, make_system, one_cell, path, record, sample, scripted, under
 
 Floats = NDArray[np.float64]

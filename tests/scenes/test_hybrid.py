@@ -20,7 +20,7 @@ from digiclay.core.session.run_scene import Result, run
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, track
 from digiclay.core.studies.trial_paths import drag_row, with_path
 
-from benchmarks.wrong_models import list_models, run_mismatched
+from benchmarks.method_figures import list_models, run_mismatched
 from tests.assemble import path, record, sample
 
 REST = 40.0

@@ -1,10 +1,12 @@
-"""What the benchmarks share, and the arithmetic of their tables."""
+"""The benchmarks: their commands, tables and files, what they count and vary."""
 
 from __future__ import annotations
 
+import io
 import re
 import statistics
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,19 +16,29 @@ import numpy as np
 import pytest
 from digiclay.commands.progress import table
 from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.batch.packing import describe_structure
+from digiclay.core.control.hybrid import HybridControl
 from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.trajectory import Path as FingerPath
+from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.studies.axes import Point
+from digiclay.core.studies.evaluation import LEAST, make_bundles
 
-from benchmarks import commit_pair
-from benchmarks import peers as peers
+from benchmarks import ablation, commit_pair, peers, runs_together
 from benchmarks.__main__ import main
-from benchmarks.numpy_calls import Counted, Ledger, floor, methods_noted, period_calls
-from benchmarks.problems import PROBLEMS, problem, solved
-from benchmarks.python_loop import loop
-from benchmarks.report import kept, made_with
+from benchmarks.kinds import BENCHMARKS
+from benchmarks.numpy_calls import Counted, Ledger, note_methods, period_calls
+from benchmarks.precision import best_ratio
+from benchmarks.problems import PROBLEMS, Work, problem, solved
+from benchmarks.report import Report, Steps, write_report
+from benchmarks.runs_together import STUDIES, Size, study
+from benchmarks.session_parts import CORE, FILES, PARTS
 from benchmarks.terms import LONGER, TERMS, without
-from benchmarks.work_precision import Work, best_ratio
 from tests.assemble import sample
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
 
 ONE = "one cell, load step"
 
@@ -34,12 +46,12 @@ ONE = "one cell, load step"
 @pytest.fixture
 def ledger() -> Iterator[Ledger]:
     """A ledger of its own, in place of the class's."""
-    former, Counted.ledger = Counted.ledger, Ledger()
+    former, Counted.ledger = Counted.ledger, Counter()
     yield Counted.ledger
     Counted.ledger = former
 
 
-def test_every_kind_of_call_is_counted_once(ledger: Ledger) -> None:
+def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger: Ledger) -> None:
     a = np.ones(3).view(Counted)
     b = a + 1.0  # add
     np.exp(b, b)  # exp
@@ -48,36 +60,37 @@ def test_every_kind_of_call_is_counted_once(ledger: Ledger) -> None:
     b.max()  # maximum.reduce
     b[1:]  # __getitem__
     b[0] = 1.0  # __setitem__
-    assert ledger.calls.total() == 7
+    assert ledger.total() == 7
+    assert (type(b), b.tolist()) == (Counted, [1.0, *(2.0 * np.exp(np.full(2, 2.0))).tolist()])
 
 
 def test_methods_of_plain_arrays_are_counted(ledger: Ledger) -> None:
     a, bound = np.ones(3).view(Counted), np.eye(3).dot
-    with methods_noted():
+    with note_methods():
         product = bound(a)
         np.zeros(2).copy()
-    assert {key[0]: times for key, times in ledger.calls.items()} == {"dot": 1, "zeros": 1, "copy": 1}
+    assert {key[0]: times for key, times in ledger.items()} == {"dot": 1, "zeros": 1, "copy": 1}
     assert type(product) is Counted
 
 
 def test_the_products_of_plain_arrays_in_a_period_are_all_counted() -> None:
-    # Python's own profiler says how often the core asks for that of the master's view of the cells.
+    # Python's own profiler counts those of the master's view of the cells.
     scene, asked = sample("ridge_mound_valley"), 0
     system, trajectories = assemble(scene), scene.trajectories()
 
-    def noted(frame: FrameType, event: str, called: object) -> None:
+    def note(frame: FrameType, event: str, called: object) -> None:
         nonlocal asked
         owner = getattr(called, "__self__", None)
         asked += event == "c_call" and type(owner) is np.ndarray and owner.shape == (2, 6)
 
     calls, counted = period_calls(system, trajectories, 300)
-    sys.setprofile(noted)
+    sys.setprofile(note)
     try:
         for _ in periods(system, trajectories, begin(system), 300):
             pass
     finally:
         sys.setprofile(None)
-    assert counted.calls["dot", (2, 6)] == asked > 100
+    assert counted["dot", (2, 6)] == asked > 100
     assert len(calls) == 300
 
 
@@ -95,21 +108,6 @@ def test_a_period_of_method_iii_makes_fewer_than_twice_the_numpy_calls_of_method
     assert statistics.mean(calls[300:]) < 2 * 115
 
 
-def test_counting_does_not_change_a_result(ledger: Ledger) -> None:
-    a = np.linspace(0.0, 1.0, 5)
-    counted = np.exp(a.view(Counted) * 2.0)[1:]
-    assert (type(counted), counted.tolist()) == (Counted, np.exp(a * 2.0)[1:].tolist())
-
-
-def test_every_counted_call_can_be_timed_by_itself(ledger: Ledger) -> None:
-    a = np.ones(3).view(Counted)
-    np.add(a, a, a)
-    a[1:]
-    alone = floor(ledger)
-    assert set(alone) == set(ledger.calls)
-    assert min(alone.values()) > 0.0
-
-
 def test_a_table_is_aligned() -> None:
     lines = list(table(("case", "µm"), [["a", "1"], ["long name", "1234"]]))
     assert lines == [
@@ -121,17 +119,74 @@ def test_a_table_is_aligned() -> None:
 
 
 def test_results_name_versions_and_no_path(tmp_path: Path) -> None:
-    kept(tmp_path / "new", "what", made_with(), ("a", "b"), [(1, 2.5)])
+    report = Report(["a line"], ("a", "b"), [(1, 2.5)])
+    write_report(report, tmp_path / "new", "what")
     assert (tmp_path / "new" / "what.csv").read_text(encoding="utf-8") == "a,b\n1,2.5\n"
-    said = (tmp_path / "new" / "what.md").read_text(encoding="utf-8")
-    assert f"numpy {np.__version__}" in said
-    assert not re.search(r"(^|\s)/\w", said)
-
-
-def test_results_that_cannot_be_written_are_told_of_in_one_line(tmp_path: Path) -> None:
+    text = (tmp_path / "new" / "what.md").read_text(encoding="utf-8")
+    assert f"numpy {np.__version__}" in text
+    assert not re.search(r"(^|\s)/\w", text)
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OutputError, match="Cannot write into"):
-        kept(tmp_path / "file", "what", "", ("a",), [])
+        write_report(report, tmp_path / "file", "what")
+
+
+def test_a_bar_goes_through_items() -> None:
+    steps = Steps(io.StringIO(), "stiff")
+    assert (list(steps.through((1, 2, 3))), steps.total) == ([1, 2, 3], 3)
+
+
+@pytest.mark.parametrize("kind", BENCHMARKS)
+def test_every_benchmark_shows_an_example(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out = main([kind, "--help"]), capsys.readouterr().out
+    assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("session --repeats 0", "must be a whole number from 1 to 1000"),
+        (
+            "scale --out my.toml/new",
+            "python -m benchmarks scale: argument --out: my.toml/new cannot be a folder: my.toml is a file. "
+            "See 'python -m benchmarks scale --help'.",
+        ),
+        ("sesion", "Did you mean session?"),
+        ("ablation --part skrit", "--part must be one of nothing, skirt"),
+        ("commits nonsense --quiet", "commits: nonsense must be a commit, branch or tag"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_code_2(
+    line: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder_with("", tmp_path, monkeypatch)
+    code, told = main(line.split()), capsys.readouterr()
+    assert (code, told.out, told.err.count("\n"), message in told.err) == (2, "", 1, True)
+
+
+def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder_with(scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER), tmp_path, monkeypatch)
+    main(["session", "--scene", "my.toml", "--repeats", "1", "--calls"])
+    out = capsys.readouterr().out
+    costs = {part: re.search(rf"^  {part} +([\d.]+) ", out, re.MULTILINE) for part in PARTS}
+    assert [part for part, cost in costs.items() if not cost or not float(cost[1]) > 0.0] == []
+    elapsed, spent = (
+        float(re.search(told, out)[1]) for told in (r"in ([\d.e-]+) s \(", r"time ([\d.e-]+) s \(")
+    )
+    # One process, one thread: it uses no more than passes, but for the grain of the two clocks.
+    assert 0.0 < spent <= 1.1 * elapsed
+    assert re.search(r"^  multiply +[\d.]+$", out, re.MULTILINE)
+
+
+def test_every_part_is_made_of_files_that_exist() -> None:
+    files = [path.relative_to(CORE).as_posix() for path in CORE.rglob("*.py")]
+    assert [name for name in FILES if not any(file.startswith(name) for file in files)] == []
+    assert set(FILES.values()) == set(PARTS)
 
 
 def test_the_cheapest_run_is_the_fastest_that_is_exact_enough() -> None:
@@ -149,27 +204,25 @@ def test_the_cheapest_run_is_the_fastest_that_is_exact_enough() -> None:
 @pytest.mark.parametrize("name", [ONE, "pressed and held"])
 def test_scipys_physics_are_ours(name: str) -> None:
     # LSODA at 1e-8 and Richardson's form at 0.1 ms are each within 1 nm of the exact solution.
-    known = problem(name)
-    simulation = replace(known.scene.simulation, stepper="richardson", physics_step=1e-4)
-    mine = solved(replace(known.scene, simulation=simulation), known.commands)
-    theirs, _, evaluations = peers.peer(known, peers.SOLVERS["LSODA"], 1e-8)
-    assert mine.against(theirs)[0] < 2e-9
-    assert evaluations > known.scene.periods
+    task = problem(name)
+    theirs, _, evaluations = peers.peer(task, peers.SOLVERS["LSODA"], 1e-8)
+    assert task.solve("richardson", 1e-4).compare(theirs)[0] < 2e-9
+    assert evaluations > task.scene.periods
 
 
 def test_the_python_loop_is_the_closed_form_step() -> None:
     # Same formulas, same steps: rounding only.
-    known = problem(ONE)
-    looped, _ = loop(known, 1e-3, known.scene.periods)
-    assert solved(known.scene, known.commands).against(looped)[0] < 1e-12
+    task = problem(ONE)
+    looped, _ = peers.loop(task, 1e-3)
+    assert solved(task.scene, task.commands).compare(looped)[0] < 1e-12
 
 
 def test_every_problem_has_contact_and_moving_pins() -> None:
     idle = []
     for name in PROBLEMS:
-        known = problem(name)
-        found = solved(known.scene, known.commands)
-        if found.forces.max() <= 0.1 or np.ptp(found.heights) <= 0.1e-3:
+        task = problem(name)
+        solution = solved(task.scene, task.commands)
+        if solution.forces.max() <= 0.1 or np.ptp(solution.heights) <= 0.1e-3:
             idle.append(name)
     assert idle == []
 
@@ -206,12 +259,6 @@ def test_terms_gives_a_line_for_every_term(capsys: pytest.CaptureFixture[str]) -
     assert (code, [name for name in named if name not in out]) == (0, [])
 
 
-@pytest.mark.parametrize("kind", ["session", "stiff", "precision", "scale", "terms"])
-def test_every_benchmark_shows_an_example(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out = main([kind, "--help"]), capsys.readouterr().out
-    assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (0, True)
-
-
 def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
     tree = commit_pair.extract("HEAD", tmp_path)
     times = commit_pair.run(tree, "HEAD", 2)
@@ -222,5 +269,73 @@ def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
         DigiclayError, match=r"^commits: HEAD cannot be timed: ZeroDivisionError: division by"
     ):
         commit_pair.run(tree, "HEAD", 2)
-    with pytest.raises(DigiclayError, match=r"^commits: nonsense must be a commit, branch or tag"):
-        commit_pair.extract("nonsense", tmp_path)
+
+
+@pytest.mark.parametrize("name", list(STUDIES))
+def test_the_runs_of_a_study_differ_and_form_one_batch(name: str) -> None:
+    scenes = study(sample("tap"), name, LEAST)
+    section, key, low, high = STUDIES[name]
+    usual = getattr(sample("tap").section(section), key)
+    values = np.array([getattr(scene.section(section), key) for scene in scenes])
+    assert np.all(np.diff(values) > 0.0)
+    assert low * usual < values[0] < values[-1] < high * usual
+    assert len({describe_structure(scene) for scene in scenes}) == 1
+    assert make_bundles([Point(i, (), scene) for i, scene in enumerate(scenes)]).alone == ()
+
+
+def test_a_benchmark_prints_and_writes_a_table_and_a_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(runs_together, "COUNTS", (1, 4))
+    monkeypatch.setattr(runs_together, "REST", 0.0)
+    out = ["--out", str(tmp_path)]
+    assert main(["stack", "--scene", "tap", "--quick", "--quiet", *out]) == 0
+    printed = capsys.readouterr().out
+    assert "control.force_gain varies" in printed
+    assert "valve.stroke varies" in printed
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["stack.csv", "stack.md", "stack.png"]
+    lines = (tmp_path / "stack.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == ("study,runs,alone,stacked,judged_alone,judged_stacked,errors_alone,errors_stacked")
+    assert [line.split(",")[:2] for line in lines[1:]] == [[s, n] for s in STUDIES for n in ("1", "4")]
+
+
+def test_the_table_of_batches_gives_runs_a_second_and_their_ratio() -> None:
+    row = runs_together._list_cells(Size("control", 64, 0.1, 0.01, 0.2, 0.05, 0.5, 0.1))
+    assert row == ["64", "10", "100", "10.0", "5", "20", "4.0", "2", "10", "5.0"]
+
+
+def press(**control: float) -> Scene:
+    """Return a press, a lift and a drag of 9 mm in 0.2 s on a small bed with Method III."""
+    scene = resolve({
+        "layout": {"rows": 11, "columns": 11}, "control": {"method": "hybrid", **control},
+        "sensors": {"force_noise": 2e-3},
+    })  # fmt: skip
+    drag = (0.0, -4.5, 40.5), (0.15, -4.5, 38.0), (0.8, -4.5, 46.0), (1.0, 4.5, 46.0)
+    points = tuple(Waypoint(time=t, position=(1e-3 * x, 0.0, 1e-3 * z)) for t, x, z in drag)
+    simulation = replace(scene.simulation, duration=drag[-1][0])
+    return scene.with_sections(trajectory=FingerPath("linear", points), simulation=simulation)
+
+
+@pytest.fixture(scope="module")
+def whole_rfd() -> float | None:
+    """RFD of Method III with all its parts, N."""
+    controller = assemble(press()).controller
+    assert controller
+    return ablation.run_controller(press(), controller)["rfd"]
+
+
+@pytest.mark.parametrize("part", ablation.PUT_TOGETHER)
+def test_a_controller_without_a_part_differs_from_the_whole(part: str, whole_rfd: float | None) -> None:
+    scene = press()
+    controller = assemble(scene).controller
+    assert isinstance(controller, HybridControl)
+    rfd = ablation.run_controller(scene, ablation.PUT_TOGETHER[part](controller))["rfd"]
+    assert rfd is not None
+    assert np.isfinite(rfd)
+    # More than rounding: a part that is still there gives the same to some ten digits.
+    assert rfd != pytest.approx(whole_rfd, rel=1e-6)
+
+
+def test_the_parameters_that_leave_a_part_out_are_accepted() -> None:
+    for values in ablation.PARAMETERS.values():
+        assert press(**{name: float(value) for name, value in values.items()}).method == "hybrid"
