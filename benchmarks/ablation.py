@@ -18,9 +18,8 @@ from digiclay.core.control.hybrid import HybridControl
 from digiclay.core.control.led_blister import LeadProfile
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.metrics.force import compute_rfd
-from digiclay.core.model.control_interface import Controller
+from digiclay.core.model.control_interface import Controller, find_set_point
 from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.set_point import find_set_point
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene

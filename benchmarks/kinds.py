@@ -16,7 +16,6 @@ from digiclay.commands.arguments import Help, add_command, add_scene
 from digiclay.commands.parser import Parser
 from digiclay.commands.stop import refuse_unwritable, refuse_without, refuse_without_blender
 from digiclay.core.base.errors import OutputError
-from digiclay.settings.beds import BEDS
 
 from .report import Report, Steps, write_report
 
@@ -81,7 +80,7 @@ def _flag(name: str, help: str) -> Options:
 def _add_made(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(sorted(path.stem for path in STROKES.glob("*.toml")))
     parser.add_argument("things", nargs="*", metavar="THING", help=names)
-    parser.add_argument("--bed", choices=BEDS, help="default: the bed of the strokes' file")
+    parser.add_argument("--bed", metavar="BED", help="a size of beds; default: that of the strokes' file")
     parser.add_argument("--pictures", metavar="FOLDER", type=Path, help="also draw them, formed and intended")
 
 

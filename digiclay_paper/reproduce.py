@@ -38,8 +38,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Simulate, draw, write, and tell how the claims came out."""
     check_folder(arguments.out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay paper", "pip install digiclay[plots]")
+    from .page import produce
     from .results import FULL, QUICK
-    from .work import produce
 
     with (
         Stop() as stop,

@@ -1,8 +1,9 @@
-"""The paper's claims on results made by hand: what holds, what does not, and that it says why."""
+"""The paper's claims on results made by hand: what holds, what does not, and why; the page, and its data."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,16 +14,26 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result
 from digiclay.core.studies.method_trials import find_free_speed, find_unintended_losses
 from digiclay.core.studies.speed_limits import Follows
+from digiclay.plots.figure import canvas, save
 
 from digiclay_paper import scenes
-from digiclay_paper.claim import Claim, largest_speed, tracking, verdict
-from digiclay_paper.claims import carried_out
-from digiclay_paper.claims_force import DEVIATIONS, WINDOWED, deviations, onset, trade
+from digiclay_paper.claims import Claim, ahead, escape, radius, rise, varied
+from digiclay_paper.evidence import (
+    DEVIATIONS,
+    WINDOWED,
+    Evidence,
+    carried_out,
+    deviations,
+    largest_speed,
+    onset,
+    tracking,
+    trade,
+)
 from digiclay_paper.figures_session import details, heights_and_force
 from digiclay_paper.page import page
-from digiclay_paper.results import SESSION, WAYS, Results, Session, Swing
-from digiclay_paper.simulations import sessions
-from digiclay_paper.windows import WINDOWS
+from digiclay_paper.paper_figures import COLUMNS, NAMED, curves, letter, table
+from digiclay_paper.results import AS_IT_IS, SESSION, WAYS, Dragged, Located, Results, Session, Swing
+from digiclay_paper.simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS, located, sessions
 
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
@@ -42,21 +53,9 @@ def swing(gain: float, amplitude: float, settling: float | None, position_gain: 
 CALM_THEN_WILD = (swing(2.0, 0.001, 1.0), swing(5.0, 0.001, 0.2), swing(50.0, 0.2, None))
 
 
-@pytest.mark.parametrize(
-    ("holds", "said"),
-    [([True, True], "holds"), ([True, False], "holds in part"), ([False, False], "differs")],
-)
-def test_a_verdict_tells_all_from_some_from_none(holds: list[bool], said: str) -> None:
-    assert verdict(holds) == said
-
-
-def test_a_finger_that_is_followed_everywhere_holds_the_claim() -> None:
+def test_a_fingertip_that_a_method_loses_is_named_with_the_method() -> None:
     assert tracking(results()).verdict == "holds"
-
-
-def test_a_finger_one_method_loses_is_told_with_the_method() -> None:
-    lost = replace(GOOD, losses=1, loss_share=0.4)
-    claim = tracking(results(cell_states=lost))
+    claim = tracking(results(cell_states=replace(GOOD, losses=1, loss_share=0.4)))
     assert claim.verdict == "holds in part"
     assert "Not followed: Method II" in claim.why
     assert "Method I," not in claim.why
@@ -69,27 +68,21 @@ def test_the_onset_lies_between_the_last_calm_gain_and_the_first_that_swings() -
     assert results(*CALM_THEN_WILD).onset(500.0) == (5.0, 50.0)
     assert results(*CALM_THEN_WILD[:2]).onset(500.0) == (5.0, None)
     assert results(*CALM_THEN_WILD[2:]).onset(500.0) == (None, 50.0)
+    assert not Swing(2.0, 500.0, 0.5, None, None).sustained  # a slow drift
 
 
-def test_a_slow_drift_is_no_oscillation() -> None:
-    assert not Swing(2.0, 500.0, 0.5, None, None).sustained
-
-
-def test_a_loop_that_never_oscillates_differs_from_the_paper() -> None:
-    claim = onset(results(*CALM_THEN_WILD[:2]))
-    assert claim.verdict == "differs"
-    assert "none up to K_f = 5 1/N" in claim.measured
-
-
-def test_a_loop_that_oscillates_only_beyond_the_gain_of_the_session_is_not_all_of_the_papers() -> None:
-    found = results(*CALM_THEN_WILD)
-    claim = onset(found)
-    assert claim.verdict == "holds in part"
-    assert "at 50 1/N (amplitude 0.200 N, 10 Hz)" in claim.measured
-    assert "are below the onset, 10 times this K_f" in claim.why  # the scene's own K_f is 5 1/N
+def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session() -> None:
+    never = onset(results(*CALM_THEN_WILD[:2]))
+    assert never.verdict == "differs"
+    assert "none up to K_f = 5 1/N" in never.measured
+    swings = results(*CALM_THEN_WILD)
+    beyond = onset(swings)
+    assert beyond.verdict == "holds in part"
+    assert "at 50 1/N (amplitude 0.200 N, 10 Hz)" in beyond.measured
+    assert "are below the onset, 10 times this K_f" in beyond.why  # the scene's own K_f is 5 1/N
     scene = resolve({"control": {"method": "virtual_master", "force_gain": 60.0}})
-    found.printed[scenes.METHODS[0]] = found.printed[scenes.METHODS[0]]._replace(scene=scene)
-    assert onset(found).verdict == "holds"
+    swings.printed[scenes.METHODS[0]] = swings.printed[scenes.METHODS[0]]._replace(scene=scene)
+    assert onset(swings).verdict == "holds"
 
 
 def test_speed_counts_along_every_way_and_not_along_the_ridge_alone() -> None:
@@ -118,32 +111,18 @@ def test_the_trade_needs_a_response_that_gets_quicker_and_an_oscillation() -> No
     assert trade(results(*CALM_THEN_WILD)).verdict == "holds"
     slower = (swing(2.0, 0.001, 0.2), swing(5.0, 0.001, 0.3), swing(50.0, 0.2, None))
     assert trade(results(*slower)).verdict == "holds in part"
-
-
-def test_a_gain_that_never_settles_is_told() -> None:
     assert "never settles" in trade(results(CALM_THEN_WILD[2])).measured
 
 
 def test_a_slowed_session_takes_as_many_times_as_long() -> None:
     session = load(find(SESSION))
-    slow = scenes.slowed(session, 1.5)
-    assert slow.simulation.duration == pytest.approx(1.5 * session.simulation.duration)
-    assert (
-        slow.section("trajectory").waypoints[3].position
-        == session.section("trajectory").waypoints[3].position
-    )
-
-
-def test_the_fastest_lift_of_a_slowed_session_is_as_many_times_slower() -> None:
-    session = load(find(SESSION))
-    assert scenes.fastest_lift(scenes.slowed(session, 2.0)) == pytest.approx(
-        0.5 * scenes.fastest_lift(session), rel=1e-6
-    )
-
-
-def test_the_fastest_lift_leaves_out_what_no_pin_could_follow() -> None:
-    session = load(find(SESSION))
+    slow = scenes.slowed(session, 2.0)
+    assert slow.simulation.duration == pytest.approx(2.0 * session.simulation.duration)
+    points, before = (one.section("trajectory").waypoints for one in (slow, session))
+    assert [point.position for point in points] == [point.position for point in before]
+    # The fastest lift leaves out what no pin could follow.
     assert 0.0 < scenes.fastest_lift(session) < find_free_speed(session)
+    assert scenes.fastest_lift(slow) == pytest.approx(0.5 * scenes.fastest_lift(session), rel=1e-6)
 
 
 @pytest.mark.parametrize(("speed", "times"), [(0.2, []), (5e-3, [0.5, 0.8])])
@@ -159,6 +138,7 @@ def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float
 
 def test_every_arrow_of_the_controller_is_a_row_of_the_page() -> None:
     text = page(results(), [], {}, 1.0, "0")
+    assert [mode for mode in MEANINGS if mode.name in ("REST", "HOLD") and MEANINGS[mode] not in text] == []
     rows = [line for line in text.splitlines() if line.startswith("| ") and " own force |" in line]
     places = [line for line in text.splitlines() if line.endswith("nearest cell under the finger |")]
     assert (len(rows), len(places)) == (len(BY_FORCE), len(BY_PLACE))
@@ -166,11 +146,6 @@ def test_every_arrow_of_the_controller_is_a_row_of_the_page() -> None:
     assert [
         said for said, row in zip(conditions, rows + places, strict=True) if f"| {said} |" not in row
     ] == []
-
-
-def test_the_page_explains_the_modes_of_the_virtual_spring() -> None:
-    text = page(results(), [], {}, 1.0, "0")
-    assert [mode for mode in MEANINGS if mode.name in ("REST", "HOLD") and MEANINGS[mode] not in text] == []
 
 
 def test_a_claim_is_a_row_of_the_page_with_its_verdict() -> None:
@@ -255,3 +230,141 @@ def test_method_three_is_beside_the_methods_of_the_paper_in_figures_and_in_no_cl
     assert {method for method, _ in both.simple} == set(scenes.COMPARED)
     assert two.compared() is two
     assert "Method III" not in tracking(replace(two, third=three)).measured
+
+
+SURFACE = "in the surface"
+EASY = Dragged(GOOD, force=0.4, deviation=0.02, followers=10.0, unevenness=1e-4, ahead=-1e-3)
+HARD = EASY._replace(force=0.8, follows=replace(GOOD, rfd=0.08))
+BAD = EASY._replace(follows=replace(GOOD, lag=5e-3))
+
+
+def dragged(**found: Dragged) -> dict[tuple[str, str, str], Dragged]:
+    """Return drags in the surface, by variant ("it": as it is) and method ("I", "II")."""
+    variants = {"it": AS_IT_IS, "rise": NO_RISE, "staggered": STAGGERED, "gaussian": GAUSSIAN}
+    keys = (name.split("_") for name in found)
+    known = [(variants[what], scenes.METHODS[len(which) - 1], SURFACE) for what, which in keys]
+    return dict(zip(known, found.values(), strict=True))
+
+
+def two_methods() -> dict[str, Session]:
+    """Return sessions of which only the scenes count."""
+    return {
+        method: Session(resolve({"control": {"method": method}}), {}, {}, {}, [], 0.0, {})
+        for method in scenes.METHODS
+    }
+
+
+def test_a_rise_that_raises_force_and_rfd_causes_them() -> None:
+    claim = rise(Results(dragged=dragged(it_II=HARD, rise_II=EASY)))
+    assert claim.verdict == "holds"
+    assert "0.80 N with the rise and 0.40 N without" in claim.measured
+    assert rise(Results(dragged=dragged(it_II=HARD, rise_II=HARD))).verdict == "differs"
+    louder = HARD._replace(force=0.4)
+    assert rise(Results(dragged=dragged(it_II=louder, rise_II=EASY))).verdict == "holds in part"
+
+
+def test_cells_ahead_that_stay_up_are_not_lowered() -> None:
+    assert ahead(Results(dragged=dragged(it_I=EASY))).verdict == "holds"
+    stays = EASY._replace(ahead=-0.4e-3)  # less than a tenth of 4.5 mm
+    assert ahead(Results(dragged=dragged(it_I=stays, it_II=EASY))).verdict == "differs"
+    assert ahead(Results(dragged=dragged(it_I=EASY._replace(ahead=None)))).verdict == "differs"
+    shallow = {(AS_IT_IS, scenes.METHODS[0], "less deep"): EASY._replace(ahead=0.0)}
+    assert ahead(Results(dragged=dragged(it_I=EASY) | shallow)).verdict == "holds in part"
+
+
+def test_a_method_that_swings_at_some_gain_has_not_escaped() -> None:
+    calm = Results(cell_swings=[swing(15.0, 0.001, None), swing(50.0, 0.002, None)], printed=two_methods())
+    assert escape(calm).verdict == "holds"
+    wild = Results(cell_swings=[swing(15.0, 0.001, None), swing(90.0, 0.4, None)], printed=two_methods())
+    assert escape(wild).verdict == "holds in part"
+    assert "above 15, at 90 1/N, 6.0 times that" in escape(wild).why
+
+
+@pytest.mark.parametrize(
+    ("near", "known", "verdict"),
+    [(0.1, 0.1, "holds"), (0.1, 0.2, "holds in part"), (0.2, 0.3, "differs"), (None, 0.2, "differs")],
+)
+def test_a_search_radius_has_to_halve_the_scatter_with_and_without_thresholds(
+    near: float | None, known: float, verdict: str
+) -> None:
+    found = [
+        Located(1e-3, 8e-3, False, near, 7), Located(1e-3, 1.0, False, 0.3, 0),
+        Located(1e-3, 8e-3, True, known, 0), Located(1e-3, 1.0, True, 0.3, 0),
+    ]  # fmt: skip
+    claim = radius(Results(located=found))
+    assert claim.verdict == verdict
+    assert claim.why.endswith("lost with and without the radius: 1 mN, no such thresholds: 7 and 0 times.")
+
+
+def test_without_noise_the_finger_is_located_where_it_is_held() -> None:
+    one = located(0.0, None, thresholds=True)
+    assert (one.radius, one.losses) == (8e-3, 0)
+    assert one.scatter == pytest.approx(0.0, abs=1e-9)  # rounding in places of millimeters, and far below one
+
+
+def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_as_well() -> None:
+    near, everywhere = (located(1e-3, one, thresholds=False).scatter for one in (None, 1.0))
+    known = located(1e-3, 1.0, thresholds=True).scatter
+    assert near is not None
+    assert everywhere is not None
+    assert known is not None
+    # Noise of the 61 cells in reach, or of the 21 within 8 mm, with arms in proportion: 0.18 and 0.06 mm.
+    assert 0.0 < near < 0.5 * everywhere
+    assert 0.0 < known < 0.5 * everywhere
+
+
+@pytest.mark.parametrize("variant", [STAGGERED, GAUSSIAN])
+def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant: str) -> None:
+    def judge(**drags: Dragged) -> Evidence:
+        return varied(variant, Results(dragged=dragged(**drags)))
+
+    same = {"it_I": EASY, "it_II": BAD, f"{variant}_I": EASY, f"{variant}_II": BAD}
+    assert judge(**same).verdict == "holds"  # what fails anyway says nothing of the variant
+    worse = judge(**{**same, "it_II": EASY})
+    assert worse.verdict == "holds in part"
+    assert "Not so: Method II, in the surface." in worse.why
+    assert judge(**{"it_I": BAD, f"{variant}_I": BAD}).verdict == "differs"
+
+
+def test_panels_are_lettered_and_their_named_curves_are_the_data(tmp_path: Path) -> None:
+    with canvas(6.0, 3.0) as (figure, place):
+        one, two = place("one", 0.5, 0.5, 2.0, 2.0), place("two", 3.5, 0.5, 2.0, 2.0)
+        one.plot([1.0, 2.0], [3.0, np.nan], label="$K_f$ low")
+        one.plot([1.0], [9.0])
+        one.axhline(0.5, label="limit")
+        one.set(title="left", xlabel="time (s)", ylabel="force (N)")
+        two.plot([4.0], [1.0 / 3.0], label="b")
+    letter(figure)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["(a) left", "(b)"]
+    rows = list(curves(figure))
+    # No unnamed curve, no line across the panel, nothing that is no number.
+    assert rows == [
+        ("a", "K_f low", 1.0, "time (s)", 3.0, "force (N)"), ("b", "b", 4.0, "", pytest.approx(1 / 3), "")
+    ]  # fmt: skip
+    lines = table(rows).splitlines()
+    assert lines == [",".join(COLUMNS), "a,K_f low,1,time (s),3,force (N)", "b,b,4,,0.333333,"]
+
+
+def test_the_data_of_named_places_have_their_names_and_shared_axes_their_label() -> None:
+    with canvas(6.0, 3.0) as (figure, place):
+        one, two = place("one", 0.5, 0.5, 2.0, 2.0), place("two", 3.5, 0.5, 2.0, 2.0)
+        one.plot([-0.0, 2.0], [0.1, -0.9], label="force")
+        one.set_yticks([0.0, -1.0], ["in the surface", "a valley"])
+        one.set_gid(NAMED)
+        two.plot([0.0], [5.0], label="b")
+        one.set(xlim=(0.0, 3.0))
+        two.set(xlim=(0.0, 3.0), xlabel="force (N)")
+    letter(figure)
+    assert table(curves(figure)).splitlines()[1:] == [
+        "a,force,0,force (N),in the surface,", "a,force,2,force (N),a valley,", "b,b,0,force (N),5,"
+    ]  # fmt: skip
+
+
+def test_a_vector_file_is_the_same_every_time(tmp_path: Path) -> None:
+    files = []
+    for name in ("one.svg", "two.svg"):
+        with canvas(3.0, 2.0, "title") as (figure, place):
+            place("a", 0.5, 0.5, 2.0, 1.0).plot([0.0, 1.0], [0.0, 1.0])
+        files.append(save(figure, tmp_path / name).read_bytes())
+    assert files[0].startswith(b"<?xml")
+    assert files[0] == files[1]
