@@ -291,9 +291,9 @@ HEAD = ("thing", "bed", "strokes", "simulated", "correlation", "slope", "rms", "
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Make the things, and draw them with ``--pictures``."""
     beds = [arguments.bed] if arguments.bed else []
-    for option, given, names in (("THING", arguments.things, RELIEFS), ("--bed", beds, BEDS)):
-        for name in set(given) - set(names):
-            raise ParameterError(option, "", f"must be one of {', '.join(names)}", repr(name))
+    for option, given, choices in (("THING", arguments.things, THINGS), ("--bed", beds, tuple(BEDS))):
+        for name in set(given) - set(choices):
+            raise ParameterError(option, "", f"must be one of {', '.join(choices)}", repr(name))
     if arguments.pictures is not None:
         refuse_unwritable(arguments.pictures)
     names = arguments.things or list(RELIEFS)[: 1 if arguments.quick else None]
