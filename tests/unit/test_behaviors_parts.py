@@ -1,18 +1,24 @@
-"""What the behaviors are made of: the drive, the exchange between neighbors, shapes."""
+"""Parts of the behaviors: drive, exchange between neighbors, shapes; and their parameters in scene files."""
 
 from __future__ import annotations
 
 import itertools
+import tomllib
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.drive import Drive
 from digiclay.core.control.exchange import make_exchange
+from digiclay.core.control.methods import METHODS
 from digiclay.core.control.named_shapes import SHAPES, evaluate_shape
 from digiclay.core.model.layout import Grid, Layout, make_grid
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.toml_table import resolve
+from digiclay.core.scene.toml_table import format_scene, resolve
 
+BEHAVIORS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 
@@ -42,20 +48,22 @@ def test_a_pin_without_load_moves_at_the_speed_asked_for(gap: str, share: float)
     assert speed == pytest.approx(wanted, abs=2e-5 * drive.up[-1])
 
 
-def test_more_than_a_pin_can_do_opens_the_valve_fully() -> None:
-    assert driven().open_for(np.array([-1.0, 1.0])).tolist() == [-1.0, 1.0]
+@pytest.mark.parametrize(("speed", "opening"), [(-1.0, -1.0), (0.0, 0.0), (1.0, 1.0)])
+def test_more_than_a_pin_can_do_opens_the_valve_fully_and_no_speed_shuts_it(
+    speed: float, opening: float
+) -> None:
+    assert driven().open_for(np.array([speed])).tolist() == [opening]
 
 
-def test_no_speed_is_a_shut_valve() -> None:
-    assert driven().open_for(np.zeros(1))[0] == 0.0
-
-
-def test_a_height_within_the_dead_band_is_left_alone() -> None:
-    assert driven().approach(np.array([-9.9e-6, 9.9e-6])).tolist() == [0.0, 0.0]
-
-
-def test_a_height_amiss_is_mended_with_the_settling_time() -> None:
-    assert driven().approach(np.array([1e-3])) == pytest.approx(50e-3)  # 1 mm in 20 ms
+@pytest.mark.parametrize(
+    ("error", "speed"),
+    [(-9.9e-6, 0.0), (9.9e-6, 0.0), (1e-3, 50e-3)],
+    ids=["within", "the band", "1 mm in 20 ms"],
+)
+def test_a_height_beyond_the_dead_band_is_approached_with_the_settling_time(
+    error: float, speed: float
+) -> None:
+    assert driven().approach(np.array([error])) == pytest.approx(speed)
 
 
 def test_reservoirs_that_cannot_raise_a_pin_give_finite_commands() -> None:
@@ -67,14 +75,14 @@ def test_reservoirs_that_cannot_raise_a_pin_give_finite_commands() -> None:
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_neighbors_are_the_nearest_cells(arrangement: str) -> None:
+def test_the_nearest_cells_are_neighbors_each_pair_once(arrangement: str) -> None:
     plan = bed(arrangement)
     cells = np.random.default_rng(3).permutation(plan.count)
-    found = {
+    pairs = [
         frozenset((int(cells[one]), int(cells[other])))
         for ones, others, _ in make_exchange(plan, 1e-5, 5e-3).find_pairs(cells)
         for one, other in zip(ones, others, strict=True)
-    }
+    ]
     place = plan.positions
     # Aligned: 1 pitch; staggered: 1.118 to the next row; the next farther ones are at 1.41 and more.
     near = {
@@ -82,18 +90,16 @@ def test_neighbors_are_the_nearest_cells(arrangement: str) -> None:
         for pair in itertools.combinations(range(plan.count), 2)
         if np.hypot(*(place[pair[0]] - place[pair[1]])) < 1.2 * 3e-3
     }
-    assert found == near
+    assert (set(pairs), len(pairs)) == (near, len(near))
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_no_pair_of_neighbors_exchanges_twice(arrangement: str) -> None:
+def test_in_a_long_period_a_cell_exchanges_half_of_what_its_neighbors_differ_by(arrangement: str) -> None:
     plan = bed(arrangement)
-    pairs = [
-        frozenset(map(int, pair))
-        for ones, others, _ in make_exchange(plan, 1e-5, 5e-3).find_pairs(np.arange(plan.count))
-        for pair in zip(ones, others, strict=True)
-    ]
-    assert len(pairs) == len(set(pairs))
+    cells, given = np.arange(plan.count), np.zeros(plan.count)
+    for ones, others, share in make_exchange(plan, 1e-5, 1e9).find_pairs(cells):
+        np.add.at(given, np.concatenate((ones, others)), share)
+    assert given[plan.count // 2] == pytest.approx(0.5, rel=1e-12)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -140,16 +146,139 @@ def test_a_bed_of_one_cell_has_no_neighbors() -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_named_shape_lies_between_minus_one_and_one(shape: str) -> None:
+def test_a_named_shape_lies_between_minus_one_and_one_and_fits_a_bed_of_one_cell(shape: str) -> None:
     values = evaluate_shape(shape, bed("aligned", 41, 41))
     assert np.all(np.abs(values) <= 1.0 + 1e-12)
-
-
-@pytest.mark.parametrize("shape", [name for name in SHAPES if name != "flat"])
-def test_a_named_shape_has_heights_to_show(shape: str) -> None:
-    assert np.ptp(evaluate_shape(shape, bed("aligned", 41, 41))) > 0.9
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_a_named_shape_fits_a_bed_of_one_cell(shape: str) -> None:
+    assert shape == "flat" or np.ptp(values) > 0.9
     assert np.all(np.isfinite(evaluate_shape(shape, bed("aligned", 1, 1))))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        # At x = 0.5, y = 0.25 of the square from -1 to 1, 0.559 from its middle.
+        ("dome", 1.0 - 0.3125),
+        ("saddle", 0.1875),
+        ("wave", 0.0),
+        ("ripple", np.cos(3.0 * np.pi * 0.3125**0.5)),
+        ("crater", 0.930852),
+        ("pyramid", 0.5),
+        ("ramp", 0.5),
+        ("flat", 0.0),
+    ],
+)
+def test_a_named_shape_has_the_values_of_its_formula(name: str, value: float) -> None:
+    assert SHAPES[name](np.array([0.5]), np.array([0.25]))[0] == pytest.approx(value, abs=1e-6)
+
+
+# Scenes
+
+
+def build(method: str, **known: Any) -> Any:
+    """Return a behavior, put together for a bed of 5 x 5 cells."""
+    return assemble(
+        resolve({"layout": {"rows": 5, "columns": 5}, "control": {"method": method, **known}})
+    ).controller
+
+
+@pytest.mark.parametrize("method", BEHAVIORS)
+def test_a_scene_names_the_behavior_and_reads_back_equal(method: str) -> None:
+    scene = resolve({"control": {"method": method}})
+    assert build(method).name == method
+    assert METHODS[method].blister is None
+    assert resolve(tomllib.loads(format_scene(scene))) == scene
+
+
+WRONG = [
+    ("elastic", {"stiffness": 0}, "control.stiffness must be above 0 N/m (got 0 N/m)."),
+    ("plastic", {"yield_force": -0.1}, "control.yield_force must be above 0 N (got -0.1 N)."),
+    (
+        "plastic",
+        {"yield_force": 1e-3},
+        "control.yield_force must be at least felt_force, 0.005 N (got 0.001 N).",
+    ),
+    (
+        "force_display",
+        {"field": "ramp", "contrast": 0.95},
+        "control.contrast must keep the field at or above control.felt_force, 0.005 N "
+        "(got 0.0025 N at its smallest).",
+    ),
+    (
+        "viscous",
+        {"recovery": 1.0},
+        "control.recovery must be a known key (got 1.0). Did you mean control.recovery_time?",
+    ),
+    (
+        "push_pull",
+        {"following_speed": 1e-3},
+        "control.following_speed must be at least listening_speed, 0.008 m/s (got 0.001 m/s).",
+    ),
+    (
+        "push_pull",
+        {"threshold": 20e-6},
+        "control.threshold must be above a listening pin's own way in a control period, 4e-05 m "
+        "(got 2e-05 m).",
+    ),
+    (
+        "force_display",
+        {"field": "ramp", "force": 0.12},
+        "control.force must keep the field below what a pin can press, 0.157 N (got 0.18 N at its largest).",
+    ),
+    (
+        "shape_display",
+        {"shape": "hat"},
+        "control.shape must be one of dome, saddle, wave, ripple, crater, pyramid, ramp, flat, "
+        "or a file .npy (got 'hat').",
+    ),
+    (
+        "shape_display",
+        {"refresh": "at_once"},
+        "control.refresh must be one of one_time, gradual, approximate_gradual (got 'at_once').",
+    ),
+    (
+        "shape_display",
+        {"amplitude": 70e-3},
+        "control.amplitude must keep the shape between 0 and the stroke, 0.1 m "
+        "(got heights from 0.04 m to 0.11 m).",
+    ),
+    (
+        "elastic",
+        {"settling_time": 5e-3},
+        "control.settling_time must be at least two control periods, 0.01 s (got 0.005 s).",
+    ),
+    (
+        "elastic",
+        {"damping": 1.0},
+        "control.damping must be at least 2.1 N s/m at this control period, or the pin would swing "
+        "(got 1 N s/m).",
+    ),
+    (
+        "shape_display",
+        {"shape": "nowhere.npy"},
+        "control.shape must be a file that can be read (got nowhere.npy: No such file or directory).",
+    ),
+]
+
+
+@pytest.mark.parametrize(("method", "given", "line"), WRONG)
+def test_a_bad_parameter_is_refused_in_one_line(method: str, given: dict[str, Any], line: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        build(method, **given)
+    assert str(caught.value) == line
+
+
+@pytest.mark.parametrize(
+    ("array", "said"),
+    [
+        (np.zeros((4, 5)), "must hold an array of the bed's 5 x 5 cells (got {}: 4 x 5)."),
+        (np.full((5, 5), 0.2), "must hold values from 0 to 0.1 m (got {}: 0.2 m)."),
+        (np.full((5, 5), np.nan), "must hold values from 0 to 0.1 m (got {}: nan m)."),
+        (np.array([["a"] * 5] * 5), "must be a file that holds one array of numbers (got {})."),
+    ],
+)
+def test_a_file_that_does_not_fit_the_bed_is_refused(tmp_path: Path, array: Any, said: str) -> None:
+    path = tmp_path / "mine.npy"
+    np.save(path, array)
+    with pytest.raises(ParameterError) as caught:
+        build("shape_display", shape=str(path))
+    assert str(caught.value) == "control.shape " + said.format(path)

@@ -1,4 +1,4 @@
-"""Method II, one control period at a time: what a cell becomes, and what it is commanded."""
+"""Method II, one control period at a time: what a cell becomes and is commanded; the arrows of Fig. 5."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
-from digiclay.core.control.cell_states import CellStates, CellStatesControl, Patch
+from digiclay.core.control.cell_states import (
+    BY_FORCE,
+    BY_PLACE,
+    CellStates,
+    CellStatesControl,
+    Patch,
+    follow_arrows,
+)
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.control_interface import Commands, Measurement
@@ -49,46 +56,38 @@ def distance(cell: int) -> float:
     return float(np.hypot(BED.x[cell] - BED.x[MIDDLE], BED.y[cell] - BED.y[MIDDLE]))
 
 
-def test_a_cell_pressed_to_the_trigger_follows_the_force() -> None:
-    assert ordered(seen({MIDDLE: 0.06}))[1].mode[MIDDLE] == Mode.FORCE_FOLLOW
+@pytest.mark.parametrize(
+    ("before", "force", "after", "command"),
+    [
+        pytest.param(Mode.REST, 0.06, Mode.FORCE_FOLLOW, -0.3, id="pressed to the trigger: it follows"),
+        pytest.param(Mode.REST, 0.059, Mode.SPRING, -1.0, id="pressed less: on its spring"),
+        # 0.02 N over 20 N/m is 1 mm below; the gain of 500 1/m makes half a valve of it.
+        pytest.param(Mode.REST, 0.02, Mode.SPRING, -0.5, id="a spring gives way by force over stiffness"),
+        # 15 1/N times (0.04 - 0.02) N.
+        pytest.param(Mode.FORCE_FOLLOW, 0.02, Mode.FORCE_FOLLOW, 0.3, id="gain times missing force"),
+        pytest.param(Mode.FORCE_FOLLOW, 0.0, Mode.CRITICAL, 0.6, id="without a force critical first"),
+    ],
+)
+def test_a_cell_is_driven_by_its_own_force(before: Mode, force: float, after: Mode, command: float) -> None:
+    _, orders = ordered(seen({MIDDLE: force}, {MIDDLE: before}), Patch(felt=before == Mode.FORCE_FOLLOW))
+    assert orders.mode[MIDDLE] == after
+    assert orders.command[MIDDLE] == pytest.approx(command, rel=1e-12)
 
 
-def test_a_cell_pressed_less_stays_on_its_spring() -> None:
-    assert ordered(seen({MIDDLE: 0.059}))[1].mode[MIDDLE] == Mode.SPRING
-
-
-def test_a_spring_cell_gives_way_by_force_over_stiffness() -> None:
-    # 0.02 N over 20 N/m is 1 mm below; the gain of 500 1/m makes half a valve of it.
-    assert ordered(seen({MIDDLE: 0.02}))[1].command[MIDDLE] == pytest.approx(-0.5, rel=1e-12)
-
-
-def test_the_neighbors_of_a_following_cell_become_its_blister() -> None:
-    mode = ordered(seen({MIDDLE: 0.1}))[1].mode
-    inside = [c for c in range(BED.count) if 0.0 < distance(c) < BLISTER.radius * (1 - 1e-6)]
-    assert {Mode(int(m)) for m in mode[inside]} == {Mode.BLISTER}
-
-
-def test_cells_just_outside_are_the_edge() -> None:
-    mode = ordered(seen({MIDDLE: 0.1}))[1].mode
-    ring = [c for c in range(BED.count) if BLISTER.radius < distance(c) < BLISTER.edge_radius]
-    assert {Mode(int(m)) for m in mode[ring]} == {Mode.EDGE}
+@pytest.mark.parametrize(
+    ("low", "high", "mode"), [(0.0, BLISTER.radius * (1 - 1e-6), Mode.BLISTER), (12e-3, 15.5e-3, Mode.EDGE)]
+)
+def test_the_neighbors_of_a_following_cell_become_its_blister_and_its_edge(
+    low: float, high: float, mode: Mode
+) -> None:
+    modes = ordered(seen({MIDDLE: 0.1}))[1].mode
+    assert {Mode(int(m)) for m in modes[[low < distance(c) < high for c in range(BED.count)]]} == {mode}
 
 
 def test_a_blister_cell_follows_at_a_lower_force_than_one_at_rest() -> None:
     first = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE + 1: Mode.BLISTER}
     mode = ordered(seen({MIDDLE: 0.05, MIDDLE + 1: 0.016}, first))[1].mode
     assert mode[MIDDLE + 1] == Mode.FORCE_FOLLOW
-
-
-def test_a_following_cell_opens_up_by_gain_times_missing_force() -> None:
-    # 15 1/N times (0.04 - 0.02) N.
-    measured = seen({MIDDLE: 0.02}, {MIDDLE: Mode.FORCE_FOLLOW})
-    assert ordered(measured)[1].command[MIDDLE] == pytest.approx(0.3, rel=1e-12)
-
-
-def test_a_following_cell_that_loses_the_finger_is_critical_before_it_is_given_up() -> None:
-    memory = Patch(felt=True)
-    assert ordered(seen({}, {MIDDLE: Mode.FORCE_FOLLOW}), memory)[1].mode[MIDDLE] == Mode.CRITICAL
 
 
 def test_a_critical_cell_is_given_up_after_the_time_out() -> None:
@@ -120,15 +119,21 @@ def test_without_any_following_cell_no_cell_is_left_in_a_blister() -> None:
     assert set(ordered(seen({}, modes))[1].mode.tolist()) == {int(Mode.REST)}
 
 
-def test_the_blister_stands_a_rise_above_its_following_cells() -> None:
+def test_the_blister_stands_a_rise_above_its_following_cells_and_falls_off_to_the_edge() -> None:
     target = ordered(seen({MIDDLE: 0.1}))[1].target
     assert target[MIDDLE + 1] == pytest.approx(REST + 1e-3, abs=1e-12)
-
-
-def test_the_blister_falls_off_to_the_edge() -> None:
-    target = ordered(seen({MIDDLE: 0.1}))[1].target
     # 9 mm from the cell: a third of the way down the cone from 3 to 12 mm is left.
     assert target[MIDDLE + 3] == pytest.approx(REST + 1e-3 / 3.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("low", "expected"), [(1e-3, 0.0), (99.5e-3, 0.1)])
+def test_the_blister_stays_within_the_stroke(low: float, expected: float) -> None:
+    measured = seen({MIDDLE: 0.1}, {MIDDLE: Mode.FORCE_FOLLOW})
+    measured.height[:] = low
+    # A top above or below the stroke, as a measured height can be: noise, or a surface that slopes.
+    measured.height[MIDDLE] = 0.1 + 5e-3 if expected else -5e-3
+    target = CONTROL.command(Patch(felt=True, edge=low), measured)[1].target
+    assert target[MIDDLE + 1] == expected
 
 
 def test_a_cell_behind_a_traveling_finger_is_frozen_at_its_command() -> None:
@@ -166,8 +171,11 @@ def test_a_finger_that_jumps_farther_than_r_vm_is_counted_as_lost() -> None:
     assert memory.losses == 1
 
 
-def test_the_controlled_disc_reaches_the_edge_of_the_outermost_pressed_cell() -> None:
-    _, disc = CONTROL.locate(CONTROL.begin(), seen({MIDDLE - 1: 0.1, MIDDLE + 1: 0.1}))
+@pytest.mark.parametrize("floor", [0.0, 25e-3])
+def test_the_controlled_disc_reaches_the_edge_of_the_outermost_pressed_cell(floor: float) -> None:
+    # One that follows without a force is no part of the patch, with noise neither.
+    measured = seen({MIDDLE - 1: 0.1, MIDDLE + 1: 0.1}, {MIDDLE + 4: Mode.FORCE_FOLLOW})
+    _, disc = replace(CONTROL, floor=floor).locate(CONTROL.begin(), measured)
     assert disc == pytest.approx((0.0, 0.0, 3e-3 + BLISTER.edge_radius), abs=1e-9)
 
 
@@ -211,3 +219,59 @@ def test_a_following_cell_counts_to_the_patch_with_what_it_reads() -> None:
     measured = seen({MIDDLE: 10e-3, MIDDLE + 1: 10e-3, MIDDLE + 3: 24e-3}, following)
     memory, _ = NOISY.locate(NOISY.begin(), measured)
     assert memory.x - BED.x[MIDDLE] == pytest.approx(1.5e-3, abs=1e-12)
+
+
+# Arrows
+
+#: Fig. 5, written down from the paper: from, to, when. VS is any cell on a virtual spring.
+FIGURE_5 = [
+    ("VS", "FF", "above_spring_trigger"),
+    ("blister", "FF", "above_blister_trigger"),
+    ("frozen", "FF", "above_blister_trigger"),
+    ("FF", "critical", "below_critical_trigger"),
+    ("critical", "FF", "above_critical_trigger"),
+    ("critical", "blister", "timed_out"),
+    ("VS", "blister", "in_blister"),
+    ("blister", "frozen", "left_behind"),
+    ("VS", "edge", "at_edge"),
+    ("blister", "edge", "at_edge"),
+    ("frozen", "edge", "at_edge"),
+    ("edge", "VS", "outside"),
+    ("blister", "VS", "outside"),
+    ("frozen", "VS", "outside"),
+]
+STATES = {
+    "VS": (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE),
+    "FF": (Mode.FORCE_FOLLOW,),
+    "blister": (Mode.BLISTER,),
+    "frozen": (Mode.FROZEN,),
+    "critical": (Mode.CRITICAL,),
+    "edge": (Mode.EDGE,),
+}
+GOALS = {"VS": Mode.HOLD, **{name: modes[0] for name, modes in STATES.items() if name != "VS"}}
+CONDITIONS = sorted({arrow.condition for arrow in (*BY_FORCE, *BY_PLACE)})
+
+
+def after(mode: Mode, condition: str | None) -> Mode:
+    """Return where one cell goes when only `condition` holds."""
+    holds = {name: np.array([name == condition]) for name in CONDITIONS}
+    modes = follow_arrows(np.array([mode], np.int8), BY_FORCE, holds)
+    return Mode(int(follow_arrows(modes, BY_PLACE, holds)[0]))
+
+
+@pytest.mark.parametrize(("source", "goal", "condition"), FIGURE_5)
+def test_an_arrow_of_the_figure_leads_where_it_points(source: str, goal: str, condition: str) -> None:
+    assert {after(mode, condition) for mode in STATES[source]} == {GOALS[goal]}
+
+
+@pytest.mark.parametrize("condition", [*CONDITIONS, None])
+def test_no_cell_moves_along_an_arrow_the_figure_lacks(condition: str | None) -> None:
+    drawn = {mode for source, _, when in FIGURE_5 if when == condition for mode in STATES[source]}
+    assert {mode for mode in Mode if after(mode, condition) != mode} <= drawn
+
+
+def test_of_two_arrows_from_one_mode_the_later_wins() -> None:
+    holds = {
+        name: np.array([name in ("below_critical_trigger", "above_critical_trigger")]) for name in CONDITIONS
+    }
+    assert follow_arrows(np.array([Mode.CRITICAL], np.int8), BY_FORCE, holds)[0] == Mode.FORCE_FOLLOW

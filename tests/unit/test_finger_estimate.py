@@ -47,29 +47,34 @@ def follow(
     return found
 
 
-def test_a_fingertip_at_rest_is_found_to_a_micrometer() -> None:
-    found = follow(filter_of(Fingertip()), Fingertip())
-    assert found.mean[:3] == pytest.approx([-10e-3, 1e-3, 40e-3], abs=1e-6)
-
-
-def test_the_velocity_of_a_drag_is_found() -> None:
-    found = follow(filter_of(Fingertip()), Fingertip(), speed=20e-3)
-    assert found.mean[3:6] == pytest.approx([20e-3, 0.0, 0.0], abs=0.2e-3)
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.6, 0.5 * math.pi, 2.5])
-def test_a_turn_is_found(turn: float) -> None:
-    found = follow(filter_of(Fingertip()), Fingertip(), speed=10e-3, turn=turn)
-    assert found.mean[7:] == pytest.approx(
-        [LONG * math.cos(2.0 * turn), LONG * math.sin(2.0 * turn)], abs=5e-3
+@pytest.mark.parametrize(
+    ("size", "speed", "turn"),
+    [(1.0, 0.0, 0.0), (1.0, 20e-3, 0.0), (1.0, 10e-3, 0.6), (1.0, 10e-3, 0.5 * math.pi), (1.0, 10e-3, 2.5),
+     (0.75, 5e-3, 0.0), (1.3, 5e-3, 0.0)],
+    ids=["at rest", "dragged", "turned", "across", "turned far", "smaller than known", "larger"],
+)  # fmt: skip
+def test_a_fingertip_is_found(size: float, speed: float, turn: float) -> None:
+    tip = Fingertip(10e-3 * size, 8e-3 * size, 8e-3 * size)
+    x, y, z, vx, vy, vz, scale, along, askew = follow(filter_of(Fingertip()), tip, speed, turn).mean
+    # To a micrometer at rest; the last of 200 periods begins 199 periods after the first.
+    place = (-10e-3 + 199 * PERIOD * speed, 1e-3, 40e-3)
+    assert (x, y, z) == pytest.approx(place, abs=20e-6 if speed else 1e-6)
+    assert (vx, vy, vz) == pytest.approx((speed, 0.0, 0.0), abs=0.2e-3)
+    assert scale == pytest.approx(math.log(size), abs=5e-3)
+    assert (along, askew) == pytest.approx(
+        (LONG * math.cos(2.0 * turn), LONG * math.sin(2.0 * turn)), abs=5e-3
     )
 
 
-@pytest.mark.parametrize("size", [0.75, 1.3])
-def test_a_fingertip_of_another_size_than_known_is_found(size: float) -> None:
-    tip = Fingertip(10e-3 * size, 8e-3 * size, 8e-3 * size)
-    found = follow(filter_of(Fingertip()), tip, speed=5e-3)
-    assert found.mean[6] == pytest.approx(math.log(size), abs=5e-3)
+def test_a_first_contact_is_uncertain_by_millimeters_and_a_first_underside_is_weighed_with_it() -> None:
+    known = filter_of(Fingertip())
+    first = known.begin(0.0, 0.0, 40e-3)
+    spread = np.sqrt(np.diag(first.covariance))
+    assert spread == pytest.approx([2e-3, 2e-3, 1e-3, 2e-2, 2e-2, 2e-2, 0.1, 0.2, 0.2])
+    # Over the lowest point, and as uncertain as that: half of the error is believed.
+    at = known.measure(first.mean, make_basis(np.zeros(1), np.zeros(1)))
+    after, left = known.correct(first, at, np.array([40.4e-3]), np.array([1e-6]))
+    assert (after.mean[2], left[0]) == pytest.approx((40.2e-3, 0.2e-3))
 
 
 @pytest.mark.parametrize("known", [Fingertip(15e-3), Fingertip(width=4.8e-3), Fingertip(8e-3)])
@@ -120,7 +125,16 @@ def test_slopes_are_differences_of_the_underside() -> None:
         assert at.slopes[row][near] == pytest.approx(slope[near], rel=1e-4, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_inverse_is_that_of_numpy(seed: int) -> None:
-    matrix = np.random.default_rng(seed).normal(size=(6, 6)) * np.logspace(-3, 3, 6)
+@pytest.mark.parametrize(
+    "order", [(0, 1, 2, 3, 4, 5), (5, 4, 3, 2, 1, 0), (1, 2, 3, 4, 5, 0), (0, 5, 1, 4, 2, 3)]
+)
+def test_the_inverse_is_that_of_numpy_also_where_pivots_vanish(order: tuple[int, ...]) -> None:
+    matrix = np.random.default_rng(order[0]).normal(size=(6, 6)) * np.logspace(-3, 3, 6)
     assert invert_six(matrix) == pytest.approx(np.linalg.inv(matrix), rel=1e-9)
+    # But for one number a row too small to divide by.
+    tiny = matrix * 1e-13 + np.eye(6)[list(order)]
+    assert invert_six(tiny) == pytest.approx(np.linalg.inv(tiny), rel=1e-9, abs=1e-15)
+
+
+def test_a_singular_covariance_as_of_a_crafted_snapshot_has_no_inverse() -> None:
+    assert np.isnan(invert_six(np.zeros((6, 6)))).any()

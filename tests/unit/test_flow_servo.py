@@ -1,4 +1,4 @@
-"""The servo of Method III brings loaded pins to their heights in time, for every flow law and delay."""
+"""Height servos: Method III's brings loaded pins to their heights in time, for every flow law and delay."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.control.flow_servo import FlowServo, make_flow_servo
+from digiclay.core.control.servo import Tracking, lock_overloaded
 from digiclay.core.model.physics import Cell
 from digiclay.core.model.valve import Valve
 
@@ -89,3 +90,32 @@ def test_a_free_pin_comes_to_its_height_without_swinging(dead_time: float) -> No
         heights.append(float(height[0]))
     assert heights[-1] == pytest.approx(1e-3, abs=2.0 * BAND)
     assert max(heights) <= 1.02e-3
+
+
+# Proportional control of Methods I and II
+
+
+@pytest.mark.parametrize(
+    ("error", "command"),
+    [
+        pytest.param([1.0, -0.5], [0.5, -0.25], id="gain times error"),
+        pytest.param([10.0, -10.0], [1.0, -1.0], id="limited to a fully open valve"),
+        pytest.param([0.0099, -0.0099, 0.0], [0.0, 0.0, 0.0], id="within the dead band"),
+        pytest.param([0.0101, -0.0101], [0.00505, -0.00505], id="just beyond it"),
+    ],
+)
+def test_the_command_is_proportional_to_the_height_error(error: list[float], command: list[float]) -> None:
+    height = np.full(len(error), 50e-3)
+    # Rounding of the difference.
+    assert Tracking().command(height + np.array(error) * 1e-3, height) == pytest.approx(command, rel=1e-10)
+    assert not Tracking(position_gain=0.0).command(height + 1.0, height).any()
+
+
+@pytest.mark.parametrize(
+    ("command", "force", "locked"),
+    [([0.5, 0.5], [0.16, 0.15], [0.0, 0.5]), ([-0.5], [1.0], [-0.5]), ([], [], [])],
+    ids=["not raised", "but lowered", "no cell"],
+)
+def test_an_overloaded_cell_is_locked(command: list[float], force: list[float], locked: list[float]) -> None:
+    # The high reservoir lifts 0.157 N: 0.5 bar on a bore of 2 mm.
+    assert lock_overloaded(np.array(command), np.array(force), 0.157).tolist() == locked

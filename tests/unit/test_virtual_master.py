@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster, VirtualMasterControl
+from digiclay.core.control.travel import Heading
+from digiclay.core.control.virtual_master import (
+    Master,
+    Phase,
+    VirtualMaster,
+    VirtualMasterControl,
+    make_master_cell,
+)
+from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout
+from digiclay.core.model.physics import Cell
+from digiclay.core.model.valve import Fluid, Valve
 
 from tests.assemble import make_basis, make_system, master
 
 PERIOD = 5e-3
 
 
-def control(**gains: float) -> VirtualMasterControl:
-    """Return Method I with some gains changed."""
-    return make_system(Layout(15, 15), control=VirtualMaster(**gains)).controller
+def control() -> VirtualMasterControl:
+    """Return Method I."""
+    return make_system(Layout(15, 15), control=VirtualMaster()).controller
 
 
 def touched(*presses: tuple[float, float, float], height: float = 40.0) -> Measurement:
@@ -33,19 +44,19 @@ def touched(*presses: tuple[float, float, float], height: float = 40.0) -> Measu
 # Locate
 
 
-def test_the_master_is_at_the_centroid_of_the_forces() -> None:
-    memory, _ = control().locate(control().begin(), touched((0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)))
-    assert (memory.x, memory.y) == pytest.approx((0.75e-3, 1.5e-3), abs=1e-15)
-
-
-def test_at_first_touch_all_cells_count() -> None:
-    memory, _ = control().locate(control().begin(), touched((-20, 0, 0.1), (20, 0, 0.3)))
-    assert memory.x == pytest.approx(10e-3, abs=1e-15)
-
-
-def test_later_only_cells_near_the_master_count() -> None:
-    memory, _ = control().locate(master(), touched((0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)))
-    assert memory.x == pytest.approx(3e-3, abs=1e-15)
+@pytest.mark.parametrize(
+    ("before", "presses", "place"),
+    [
+        pytest.param(None, [(0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)], (0.75e-3, 1.5e-3), id="the centroid"),
+        pytest.param(None, [(-20, 0, 0.1), (20, 0, 0.3)], (10e-3, 0.0), id="at first touch of all cells"),
+        pytest.param(master(), [(0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)], (3e-3, 0.0), id="later those near"),
+    ],
+)
+def test_the_master_is_at_the_centroid_of_the_forces(
+    before: Master | None, presses: list[tuple[float, float, float]], place: tuple[float, float]
+) -> None:
+    memory, _ = control().locate(before or control().begin(), touched(*presses))
+    assert (memory.x, memory.y) == pytest.approx(place, abs=1e-15)
 
 
 def test_the_reference_is_the_surface_at_first_touch() -> None:
@@ -53,38 +64,55 @@ def test_the_reference_is_the_surface_at_first_touch() -> None:
     assert memory.reference == pytest.approx(52e-3)
 
 
-def test_a_force_too_small_to_be_a_finger_starts_nothing() -> None:
-    memory, disc = control().locate(control().begin(), touched((0, 0, 0.9e-3)))
-    assert (memory.phase, disc) == (Phase.IDLE, None)
-
-
-def test_the_cells_asked_for_reach_to_the_edge_ring() -> None:
+def test_the_requested_cells_reach_to_the_edge_ring() -> None:
     _, disc = control().locate(master(), touched((0, 0, 0.4)))
     assert disc == pytest.approx((0.0, 0.0, 18.5e-3))
+    assert control().locate(control().begin(), touched((0, 0, 0.9e-3)))[1] is None
 
 
-# Control
+# Control and noise
+
+IDLE, SPRINGY, SHAPING = Master(), master(phase=Phase.SPRING), master()
+#: Memory before, noise floor, N, presses; phase and losses after.
+PHASES: dict[str, tuple[Master, float, list[tuple[float, float, float]], Phase, int]] = {
+    "too small to be a fingertip": (IDLE, 0.0, [(0, 0, 0.9e-3)], Phase.IDLE, 0),
+    "first touch: a spring": (IDLE, 0.0, [(0, 0, 0.1)], Phase.SPRING, 0),
+    "a spring below the set point": (SPRINGY, 0.0, [(0, 0, 0.399)], Phase.SPRING, 0),
+    "shaping from it on": (SPRINGY, 0.0, [(0, 0, 0.401)], Phase.SHAPING, 0),
+    # The centroid takes those within r_VM of the master alone; a flank pressed farther off counts as well.
+    "the force of all cells": (SPRINGY, 0.0, [(0, 0, 0.3), (9, 0, 0.11)], Phase.SHAPING, 0),
+    "shaping continues below it": (SHAPING, 0.0, [(0, 0, 0.1)], Phase.SHAPING, 0),
+    "elsewhere: anew, and counted": (SHAPING, 0.0, [(-18, 0, 0.1)], Phase.SPRING, 1),
+    "may be noise": (IDLE, 10e-3, [(0, 0, 9.9e-3)], Phase.IDLE, 0),
+    "no noise": (IDLE, 10e-3, [(0, 0, 10.1e-3)], Phase.SPRING, 0),
+    "noise adds up to nothing": (IDLE, 10e-3, [(3.0 * x, 0, 9e-3) for x in range(5)], Phase.IDLE, 0),
+    # What noise hides next to the master counts to the controlled force, farther off it does not.
+    "enough near": (SPRINGY, 10e-3, [(0, 0, 0.39), (6, 0, 2e-3), (-6, 0, 9e-3)], Phase.SHAPING, 0),
+    "too little near": (SPRINGY, 10e-3, [(0, 0, 0.39), (6, 0, -2e-3), (-6, 0, 9e-3)], Phase.SPRING, 0),
+    "hidden far off": (SPRINGY, 10e-3, [(0, 0, 0.395), (9, 0, 9.9e-3)], Phase.SPRING, 0),
+    "felt far off": (SPRINGY, 10e-3, [(0, 0, 0.395), (9, 0, 10.1e-3)], Phase.SHAPING, 0),
+    # 6 mm behind where it was and 11 mm from where it is now; the other way round 12 mm and 7 mm.
+    "near where it was": (SPRINGY, 30e-3, [(5, 0, 0.39), (-6, 0, 20e-3)], Phase.SHAPING, 0),
+    "near where it is": (SPRINGY, 30e-3, [(5, 0, 0.39), (12, 0, 20e-3)], Phase.SPRING, 0),
+    "hidden at first touch": (IDLE, 10e-3, [(0, 0, 0.395), (3, 0, 9e-3)], Phase.SPRING, 0),
+}
 
 
-def test_first_touch_starts_the_virtual_spring() -> None:
-    memory, _ = control().locate(control().begin(), touched((0, 0, 0.1)))
-    assert memory.phase is Phase.SPRING
+@pytest.mark.parametrize(("before", "floor", "presses", "phase", "losses"), PHASES.values(), ids=PHASES)
+def test_forces_set_the_phase(
+    before: Master, floor: float, presses: list[tuple[float, float, float]], phase: Phase, losses: int
+) -> None:
+    memory, _ = replace(control(), floor=floor).locate(before, touched(*presses))
+    assert (memory.phase, memory.losses) == (phase, losses)
 
 
-def test_shaping_starts_at_the_set_point() -> None:
-    memory = master(phase=Phase.SPRING)
-    phases = [control().locate(memory, touched((0, 0, force)))[0].phase for force in (0.399, 0.401)]
-    assert phases == [Phase.SPRING, Phase.SHAPING]
+def test_noise_does_not_draw_the_master_aside() -> None:
+    noisy = replace(control(), floor=10e-3)
+    memory, _ = noisy.locate(master(), touched((0, 0, 0.1), (6, 0, 9e-3), (-3, 0, 0.1)))
+    assert memory.x == pytest.approx(-1.5e-3, abs=1e-15)
 
 
-def test_the_force_that_is_held_is_that_on_all_touched_cells() -> None:
-    # The centroid takes those within r_VM of the master alone; a flank pressed farther off is felt as well.
-    memory, _ = control().locate(master(phase=Phase.SPRING), touched((0, 0, 0.3), (9, 0, 0.11)))
-    assert (memory.phase, memory.x) == (Phase.SHAPING, 0.0)
-
-
-def test_shaping_goes_on_below_the_set_point() -> None:
-    assert control().locate(master(), touched((0, 0, 0.1)))[0].phase is Phase.SHAPING
+# Model
 
 
 def settled(memory: Master, force: float, count: int = 600) -> Master:
@@ -95,24 +123,24 @@ def settled(memory: Master, force: float, count: int = 600) -> Master:
     return memory
 
 
-def test_the_virtual_spring_gives_way_by_force_over_stiffness() -> None:
-    memory = settled(master(phase=Phase.SPRING, height=40e-3), 0.2)
-    # 0.2 N / 200 N/m is 1 mm. The flow goes with the error squared: after 3 s some 60 µm are left.
-    assert memory.height == pytest.approx(39e-3, abs=0.1e-3)
-
-
-@pytest.mark.parametrize(("force", "direction"), [(0.3, 1.0), (0.5, -1.0)])
-def test_force_control_raises_the_master_below_the_set_point_and_lowers_it_above(
-    force: float, direction: float
+@pytest.mark.parametrize(
+    ("before", "force", "count", "height"),
+    [
+        # 0.2 N / 200 N/m is 1 mm. The flow goes with the error squared: after 3 s some 60 µm are left.
+        (master(phase=Phase.SPRING, height=40e-3), 0.2, 600, pytest.approx(39e-3, abs=0.1e-3)),
+        (master(), 0.4, 600, 45e-3),  # at the set point it stays
+        (master(), 0.3, 20, pytest.approx(45.6e-3, abs=0.6e-3)),  # below it rises
+        (master(), 0.5, 20, pytest.approx(44.4e-3, abs=0.6e-3)),  # above it sinks
+        (master(), 0.002, 1500, 100e-3),  # it stops where a real pin does
+        (master(), 5.0, 1500, 0.0),
+    ],
+)
+def test_a_steady_force_takes_the_master_to_a_height(
+    before: Master, force: float, count: int, height: object
 ) -> None:
-    assert np.sign(settled(master(), force, 20).height - 45e-3) == direction
-
-
-def test_the_master_stays_at_the_set_point() -> None:
-    assert settled(master(), 0.4).height == 45e-3
-
-
-# Model
+    after = settled(before, force, count).height
+    assert after == height
+    assert (after == before.height) == (force == 0.4)
 
 
 @pytest.mark.parametrize(("force", "speed"), [(0.002, 24e-3), (5.0, -24e-3)])
@@ -121,129 +149,121 @@ def test_the_master_is_no_faster_than_a_real_free_pin(force: float, speed: float
     assert (later.height - fast.height) / PERIOD == pytest.approx(speed, rel=0.01)  # two digits
 
 
-@pytest.mark.parametrize(("force", "stop"), [(0.002, 100e-3), (5.0, 0.0)])
-def test_the_master_stops_where_a_real_pin_does(force: float, stop: float) -> None:
-    assert settled(master(), force, 1500).height == stop
-
-
 def test_the_master_s_valve_lags_as_a_real_one() -> None:
     memory = settled(master(), 5.0, 1)
     # One period of a full command: 1 - exp(-5 ms/2 ms). Rounding.
     assert memory.opening == pytest.approx(-(1.0 - np.exp(-2.5)), rel=1e-12)
 
 
-# Direction
+# Direction and loss
 
 
-def moved(memory: Master, *path_x: float) -> Master:
-    """Return the master after the finger has been at some x, mm, one period each."""
-    method = control()
+@pytest.mark.parametrize(
+    ("before", "path_x", "toward"),
+    [
+        pytest.param(master(), np.linspace(0, 1.6, 500), (1.0, 0.0), id="slow, far enough"),
+        pytest.param(master(), np.linspace(0, 1.4, 500), (0.0, 0.0), id="not far enough"),
+        pytest.param(master(0.0, 1.0), [0.3, -0.4] * 200, (0.0, 1.0), id="at rest it keeps its direction"),
+        pytest.param(master(), [-5.0], (-1.0, 0.0), id="fast, in one period"),
+    ],
+)
+def test_a_fingertip_gets_its_direction_once_it_has_gone_far_enough(
+    before: Master, path_x: list[float], toward: tuple[float, float]
+) -> None:
+    method, memory = control(), before
     for x in path_x:
         memory, _ = method.locate(memory, touched((x, 0, 0.4)))
-    return memory
-
-
-def test_a_slow_finger_gets_its_direction_once_it_has_traveled_far_enough() -> None:
-    assert moved(master(), *np.linspace(0, 1.6, 500)).heading[2:] == (1.0, 0.0)
-
-
-def test_a_finger_that_has_not_traveled_has_no_direction() -> None:
-    assert moved(master(), *np.linspace(0, 1.4, 500)).heading[2:] == (0.0, 0.0)
-
-
-def test_a_resting_finger_keeps_its_direction() -> None:
-    assert moved(master(0.0, 1.0), *([0.3, -0.4] * 200)).heading[2:] == (0.0, 1.0)
-
-
-def test_a_fast_finger_gets_its_direction_in_one_period() -> None:
-    assert moved(master(), -5.0).heading[2:] == (-1.0, 0.0)
-
-
-# Loss
+    assert memory.heading[2:] == toward
 
 
 def alone(memory: Master, count: int) -> Master:
-    """Return the master after some periods without a finger."""
+    """Return the master after some periods without a fingertip."""
     for _ in range(count):
         memory, _ = control().locate(memory, touched())
     return memory
 
 
-def test_a_finger_is_not_lost_within_the_loss_time() -> None:
-    assert alone(master(), 10).phase is Phase.SHAPING  # 50 ms
+@pytest.mark.parametrize(
+    ("phase", "count", "after"),
+    [
+        (Phase.SHAPING, 10, (Phase.SHAPING, 0)),  # 50 ms
+        (Phase.SHAPING, 11, (Phase.IDLE, 1)),
+        (Phase.SPRING, 11, (Phase.IDLE, 0)),  # lost before shaping is no loss
+    ],
+)
+def test_a_fingertip_is_lost_after_the_loss_time(phase: Phase, count: int, after: tuple[Phase, int]) -> None:
+    memory = alone(master(phase=phase), count)
+    assert (memory.phase, memory.losses) == after
 
 
-def test_a_finger_is_lost_after_the_loss_time() -> None:
-    memory = alone(master(), 11)
-    assert (memory.phase, memory.losses) == (Phase.IDLE, 1)
-
-
-def test_a_finger_lost_before_shaping_is_no_loss() -> None:
-    memory = alone(master(phase=Phase.SPRING), 11)
-    assert (memory.phase, memory.losses) == (Phase.IDLE, 0)
-
-
-def test_a_finger_felt_again_in_time_is_not_lost() -> None:
+def test_a_fingertip_felt_again_in_time_is_not_lost_and_later_is_a_new_one() -> None:
     memory, _ = control().locate(alone(master(), 9), touched((0, 0, 0.4)))
     assert alone(memory, 10).losses == 0
-
-
-def test_a_finger_that_comes_down_elsewhere_starts_anew_and_is_counted() -> None:
-    memory, _ = control().locate(master(), touched((-18, 0, 0.1), height=43.0))
-    assert (memory.phase, memory.x, memory.losses) == (Phase.SPRING, pytest.approx(-18e-3), 1)
-
-
-def test_a_new_touch_after_a_loss_starts_the_virtual_spring() -> None:
     memory, _ = control().locate(alone(master(), 11), touched((3, 3, 0.1)))
     assert (memory.phase, memory.losses) == (Phase.SPRING, 1)
 
 
-# Noise
+# Cell of the master
+
+#: Parts whose unloaded valves are laminar, and others that may be turbulent.
+CELLS: dict[str, dict[str, Any]] = {
+    "valve and conduit": {},
+    "no conduit": {"conduit": None},
+    "a thin conduit": {"conduit": Conduit(diameter=0.3e-3)},
+    "a gap as wide as the opening": {"valve": Valve(gap="opening")},
+    "turbulent": {"valve": Valve(orifice_diameter=2e-3), "fluid": Fluid(viscosity=1e-6)},
+}
+EAST = Heading(0.1, 0.2, 1.0, 0.0)
+#: A master of which no two numbers are alike.
+MASTER = Master(Phase.SPRING, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, Heading(7.0, 8.0, 0.6, 0.8), 9.0, 10, 11)
 
 
-def hearing(floor: float) -> VirtualMasterControl:
-    """Return Method I with sensors whose noise hides forces below a floor, N."""
-    return replace(control(), floor=floor)
+def cell(**parts: Any) -> Cell:
+    """Return a cell with some parts changed."""
+    return make_system(**parts).cell
 
 
-def test_a_reading_that_may_be_noise_is_no_finger() -> None:
-    phases = [hearing(10e-3).locate(Master(), touched((0, 0, force)))[0].phase for force in (9.9e-3, 10.1e-3)]
-    assert phases == [Phase.IDLE, Phase.SPRING]
+def test_one_of_the_cells_may_be_turbulent() -> None:
+    turbulent = {
+        name for name, parts in CELLS.items() if (one := cell(**parts)).flow.knee <= one.supply.largest
+    }
+    assert turbulent == {"turbulent"}
 
 
-def test_readings_that_may_be_noise_do_not_add_up_to_a_finger() -> None:
-    memory, _ = hearing(10e-3).locate(Master(), touched(*[(3.0 * x, 0, 9e-3) for x in range(5)]))
-    assert memory.phase is Phase.IDLE
+@pytest.mark.parametrize("parts", CELLS.values(), ids=CELLS.keys())
+@pytest.mark.parametrize("opening", [-1.0, -0.3, 1e-9, 0.07, 1.0])
+def test_the_speed_is_that_of_the_valve_s_flow_law(parts: dict[str, Any], opening: float) -> None:
+    one = cell(**parts)
+    supply = one.supply.high if opening > 0.0 else one.supply.low
+    flow = one.flow.flow(np.array([opening]), np.array([supply]))[0]
+    # Another order of the same few products: rounding.
+    assert make_master_cell(one, 5e-3).speed(opening) == pytest.approx(flow / one.actuator.area, rel=1e-14)
 
 
-def test_noise_does_not_draw_the_master_aside() -> None:
-    memory, _ = hearing(10e-3).locate(master(), touched((0, 0, 0.1), (6, 0, 9e-3), (-3, 0, 0.1)))
-    assert memory.x == pytest.approx(-1.5e-3, abs=1e-15)
+@pytest.mark.parametrize("parts", CELLS.values(), ids=CELLS.keys())
+def test_a_shut_valve_stands_still(parts: dict[str, Any]) -> None:
+    assert make_master_cell(cell(**parts), 5e-3).speed(0.0) == 0.0
 
 
-def test_what_noise_hides_next_to_the_master_counts_to_the_force_that_is_held() -> None:
-    # 0.39 N are felt: what lies below the floor makes it more or less than the set point, 0.4 N.
-    start = master(phase=Phase.SPRING)
-    near = [touched((0, 0, 0.39), (6, 0, hidden), (-6, 0, 9e-3)) for hidden in (2e-3, -2e-3)]
-    phases = [hearing(10e-3).locate(start, seen)[0].phase for seen in near]
-    assert phases == [Phase.SHAPING, Phase.SPRING]
+def test_in_a_period_it_goes_the_way_its_opening_lets_it() -> None:
+    one, period, start, command = cell(), 5e-3, 0.3, 0.9
+    found, _ = make_master_cell(one, period).advance(40e-3, start, command)
+    times = (np.arange(2000) + 0.5) / 2000 * period
+    opening = command + (start - command) * np.exp(-times / one.lag.time_constant)
+    flow = one.flow.flow(opening, np.full(2000, one.supply.high))
+    # Two Gauss points: the fourth derivative of a square of exponentials over 2.5 time constants.
+    assert found - 40e-3 == pytest.approx(period * flow.mean() / one.actuator.area, rel=0.01)
 
 
-def test_what_noise_hides_farther_off_does_not() -> None:
-    start = master(phase=Phase.SPRING)
-    far = [touched((0, 0, 0.395), (9, 0, force)) for force in (9.9e-3, 10.1e-3)]
-    phases = [hearing(10e-3).locate(start, seen)[0].phase for seen in far]
-    assert phases == [Phase.SPRING, Phase.SHAPING]
-
-
-def test_what_noise_hides_counts_around_where_the_master_was() -> None:
-    # 6 mm behind where it was and 11 mm from where it is now; the other way round 12 mm and 7 mm.
-    start = master(phase=Phase.SPRING)
-    moving = [touched((5, 0, 0.39), (x, 0, 20e-3)) for x in (-6, 12)]
-    found = [hearing(30e-3).locate(start, seen)[0] for seen in moving]
-    assert [(one.x, one.phase) for one in found] == [(5e-3, Phase.SHAPING), (5e-3, Phase.SPRING)]
-
-
-def test_at_first_touch_what_noise_hides_does_not_count() -> None:
-    memory, _ = hearing(10e-3).locate(Master(), touched((0, 0, 0.395), (3, 0, 9e-3)))
-    assert memory.phase is Phase.SPRING
+@pytest.mark.parametrize(
+    ("after", "changes"),
+    [
+        (MASTER.move_to(21.0, 22.0, EAST), {"x": 21.0, "y": 22.0, "heading": EAST, "alone": 0}),
+        (MASTER.lead(Phase.SHAPING, 23.0, 0.5), {"phase": Phase.SHAPING, "height": 23.0, "opening": 0.5}),
+        (MASTER.with_edge(24.0), {"edge": 24.0}),
+    ],
+    ids=["felt again", "led", "in another surface"],
+)
+def test_a_period_changes_a_part_of_a_master(after: Master, changes: dict[str, Any]) -> None:
+    assert after == MASTER._replace(**changes)
+    assert MASTER._replace(alone=0).lead(Phase.SHAPING, 23.0, 0.5).felt == 23.0

@@ -1,4 +1,4 @@
-"""Method I around its master: blister, edge heights, freezing; on the bed and at its rim."""
+"""The blister: its profiles; around the master of Method I: edge heights, freezing; at the bed's rim."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
@@ -37,6 +38,34 @@ def created(memory: Master, seen: Measurement, blister: Blister | None = None) -
     return system.controller.command(memory, seen)
 
 
+# Profiles
+
+CONE, BELL = Blister(), Blister(profile="gaussian")
+
+
+@pytest.mark.parametrize(
+    ("blister", "distance", "profile"),
+    [
+        pytest.param(CONE, [0.0, 3e-3, 6e-3], [1.0, 1.0, 1.0], id="flat on top"),
+        pytest.param(CONE, [8.25e-3, 10.5e-3, 15e-3], [0.75, 0.5, 0.0], id="linear to its radius"),
+        pytest.param(BELL, [0.0, 7e-3, 14e-3], [1.0, np.exp(-0.5), np.exp(-2.0)], id="a Gaussian"),
+    ],
+)
+def test_a_profile_has_its_formula_over_any_surface(
+    blister: Blister, distance: list[float], profile: list[float]
+) -> None:
+    places, part = np.array(distance), np.array(profile)
+    assert blister.evaluate_profile(places) == pytest.approx(part, rel=1e-14, abs=1e-15)
+    for edge, top in ((40e-3, 55e-3), (40e-3, 30e-3)):
+        assert blister.interpolate(places, edge, top) == pytest.approx(edge + part * (top - edge), abs=1e-16)
+
+
+@pytest.mark.parametrize(("name", "rule"), [("flat_radius", "below"), ("edge_radius", "above")])
+def test_radii_in_the_wrong_order_are_refused(name: str, rule: str) -> None:
+    with pytest.raises(ParameterError, match=rf"^Blister\.{name} must be {rule} the radius, 0\.015 m"):
+        Blister(**{name: 15e-3})
+
+
 # Blister
 
 
@@ -62,16 +91,11 @@ def test_blister_targets_stay_within_the_stroke() -> None:
     assert orders.target.max() == 100e-3
 
 
-def test_cells_under_the_finger_follow_the_force_while_shaping() -> None:
+@pytest.mark.parametrize(("phase", "mode"), [(Phase.SHAPING, Mode.FORCE_FOLLOW), (Phase.SPRING, Mode.SPRING)])
+def test_cells_under_the_fingertip_show_the_phase(phase: Phase, mode: Mode) -> None:
     seen = bed()
     seen.force[at(0, 0)] = 0.1
-    assert created(master(), seen)[1].mode[at(0, 0)] == Mode.FORCE_FOLLOW
-
-
-def test_cells_under_the_finger_are_springs_before_that() -> None:
-    seen = bed()
-    seen.force[at(0, 0)] = 0.1
-    assert created(master(phase=Phase.SPRING), seen)[1].mode[at(0, 0)] == Mode.SPRING
+    assert created(master(phase=phase), seen)[1].mode[at(0, 0)] == mode
 
 
 def test_cells_just_outside_are_the_edge() -> None:
@@ -118,18 +142,29 @@ def ridge(mode: Mode = Mode.BLISTER) -> Measurement:
 EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
 
 
-def test_cells_behind_a_traveling_finger_keep_their_command() -> None:
-    _, orders = created(master(*EAST), ridge())
-    assert (orders.mode[at(-12, 0)], orders.target[at(-12, 0)]) == (Mode.FROZEN, 44e-3)
-
-
-def test_cells_ahead_and_beside_are_not_frozen() -> None:
-    mode = created(master(*EAST), ridge())[1].mode
-    assert [mode[at(12, 0)], mode[at(0, 12)], mode[at(0, -12)]] == [Mode.BLISTER] * 3
-
-
-def test_cells_of_the_flat_top_are_never_newly_frozen() -> None:
-    assert created(master(*EAST), ridge())[1].mode[at(-3, 0)] == Mode.BLISTER
+@pytest.mark.parametrize(
+    ("toward", "before", "place", "force", "after"),
+    [
+        pytest.param(EAST, Mode.BLISTER, (-12, 0), 0.0, Mode.FROZEN, id="behind"),
+        pytest.param(EAST, Mode.BLISTER, (12, 0), 0.0, Mode.BLISTER, id="ahead"),
+        pytest.param(EAST, Mode.BLISTER, (0, 12), 0.0, Mode.BLISTER, id="abeam"),
+        pytest.param(EAST, Mode.BLISTER, (0, -12), 0.0, Mode.BLISTER, id="abeam on the other side"),
+        pytest.param(EAST, Mode.BLISTER, (-3, 0), 0.0, Mode.BLISTER, id="on the flat top"),
+        pytest.param((0.0, 0.0), Mode.BLISTER, (-12, 0), 0.0, Mode.BLISTER, id="before any direction"),
+        pytest.param(WEST, Mode.FROZEN, (-12, 0), 0.0, Mode.FROZEN, id="ahead again after a turn"),
+        pytest.param(EAST, Mode.FROZEN, (-12, 0), 0.019, Mode.FROZEN, id="touched lightly"),
+        pytest.param(EAST, Mode.FROZEN, (-12, 0), 0.02, Mode.FORCE_FOLLOW, id="pressed: freed"),
+        pytest.param(EAST, Mode.FROZEN, (-21, 0), 0.0, Mode.HOLD, id="out of the blister"),
+    ],
+)
+def test_cells_freeze_behind_a_traveling_fingertip(
+    toward: tuple[float, float], before: Mode, place: tuple[float, float], force: float, after: Mode
+) -> None:
+    seen = ridge(before)
+    seen.force[at(*place)] = force
+    _, orders = created(master(*toward), seen)
+    assert orders.mode[at(*place)] == after
+    assert (orders.target[at(*place)] == 44e-3) == (after in (Mode.FROZEN, Mode.HOLD))
 
 
 def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_side() -> None:
@@ -138,19 +173,19 @@ def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_sid
     assert len(set(modes)) == 1
 
 
-def test_nothing_freezes_before_the_finger_has_a_direction() -> None:
-    assert not np.any(created(master(), ridge())[1].mode == Mode.FROZEN)
-
-
-def test_a_frozen_cell_stays_frozen_when_the_finger_turns_back() -> None:
-    assert created(master(*WEST), ridge(Mode.FROZEN))[1].mode[at(-12, 0)] == Mode.FROZEN
-
-
-def test_a_blister_that_outgrows_a_frozen_cell_takes_it_along() -> None:
-    # 12 mm from the master a third of the cone is left: 40 mm and a third of 15 mm.
-    _, orders = created(master(*EAST, height=55e-3), ridge(Mode.FROZEN))
+@pytest.mark.parametrize(
+    ("height", "target", "after"),
+    [
+        # 12 mm from the master a third of the cone is left: a third of 15 mm up, or of 9 mm down.
+        pytest.param(55e-3, 44e-3, 45e-3, id="a blister"),
+        pytest.param(31e-3, 39e-3, 37e-3, id="a dent"),
+    ],
+)
+def test_what_outgrows_a_frozen_cell_takes_it_along(height: float, target: float, after: float) -> None:
+    seen = ridge(Mode.FROZEN)._replace(target=np.full(BED.count, target))
+    _, orders = created(master(*EAST, height=height), seen)
     assert orders.mode[at(-12, 0)] == Mode.FROZEN
-    assert orders.target[at(-12, 0)] == pytest.approx(45e-3, abs=1e-9)
+    assert orders.target[at(-12, 0)] == pytest.approx(after, abs=1e-9)
 
 
 @pytest.mark.parametrize(("risen", "kept"), [(1.4e-3, False), (1.6e-3, True)])
@@ -163,26 +198,6 @@ def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_o
     assert target == pytest.approx(44e-3 if kept else 45e-3, abs=1e-9)
 
 
-def test_a_dent_that_outgrows_a_frozen_cell_takes_it_along() -> None:
-    seen = ridge(Mode.FROZEN)._replace(target=np.full(BED.count, 39e-3))
-    _, orders = created(master(*EAST, height=31e-3), seen)
-    assert orders.target[at(-12, 0)] == pytest.approx(37e-3, abs=1e-9)
-
-
-def test_a_frozen_cell_touched_lightly_stays_frozen() -> None:
-    seen = ridge(Mode.FROZEN)
-    seen.force[at(-12, 0)] = 0.019
-    assert created(master(*EAST), seen)[1].mode[at(-12, 0)] == Mode.FROZEN
-
-
-def test_a_frozen_cell_that_is_pressed_is_freed() -> None:
-    seen = ridge(Mode.FROZEN)
-    seen.force[at(-12, 0)] = 0.02
-    _, orders = created(master(*EAST), seen)
-    assert orders.mode[at(-12, 0)] == Mode.FORCE_FOLLOW
-    assert orders.target[at(-12, 0)] != 44e-3
-
-
 def test_noise_neither_frees_a_frozen_cell_nor_marks_one_as_touched() -> None:
     noisy = replace(make_system(Layout(15, 15), control=VirtualMaster()).controller, floor=30e-3)
     seen = ridge(Mode.BLISTER)
@@ -190,11 +205,6 @@ def test_noise_neither_frees_a_frozen_cell_nor_marks_one_as_touched() -> None:
     seen.force[[at(-12, 0), at(0, 0)]] = 29e-3
     mode = noisy.command(master(*EAST), seen)[1].mode
     assert [mode[at(-12, 0)], mode[at(0, 0)]] == [Mode.FROZEN, Mode.BLISTER]
-
-
-def test_a_frozen_cell_out_of_the_blister_holds() -> None:
-    mode = created(master(*EAST), ridge(Mode.FROZEN))[1].mode
-    assert mode[at(-21, 0)] == Mode.HOLD
 
 
 def test_a_cell_that_was_never_formed_rests() -> None:
