@@ -132,7 +132,7 @@ def test_the_inverse_is_that_of_numpy_also_where_pivots_vanish(order: tuple[int,
     matrix = np.random.default_rng(order[0]).normal(size=(6, 6)) * np.logspace(-3, 3, 6)
     assert invert_six(matrix) == pytest.approx(np.linalg.inv(matrix), rel=1e-9)
     # But for one number a row too small to divide by.
-    tiny = matrix * 1e-13 + np.eye(6)[list(order)]
+    tiny = matrix * 1e-13 - np.eye(6)[list(order)]
     assert invert_six(tiny) == pytest.approx(np.linalg.inv(tiny), rel=1e-9, abs=1e-15)
 
 
