@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.fingertip import JOIN, LEVEL, Fingertip
 from scipy.spatial.transform import Rotation
 
@@ -12,27 +11,21 @@ from tests.assemble import under
 
 AXES = np.array([10e-3, 8e-3, 8e-3])
 RANDOM = np.random.default_rng(2)
+AROUND = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 
 
 def random_poses(count: int) -> np.ndarray:
     """Return poses in all orientations, (k, 7)."""
-    quaternions = RANDOM.normal(size=(count, 4))
-    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    return np.column_stack(
-        [RANDOM.uniform(-20e-3, 20e-3, (count, 2)), RANDOM.uniform(0, 0.1, count), quaternions]
-    )
-
-
-def form(pose: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return center and matrix A of the ellipsoid (p - c)ᵀ A (p - c) = 1; SciPy turns it."""
-    turn = Rotation.from_quat(pose[[4, 5, 6, 3]]).as_matrix()
-    squared = turn @ np.diag(axes**2) @ turn.T
-    return pose[:3] + squared[:, 2] / np.sqrt(squared[2, 2]), np.linalg.inv(squared)
+    turns = RANDOM.normal(size=(count, 4))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    return np.column_stack([RANDOM.uniform(-20e-3, 20e-3, (count, 2)), RANDOM.uniform(0, 0.1, count), turns])
 
 
 def cut(pose: np.ndarray, axes: np.ndarray, x: float, y: float) -> float:
-    """Return the lower of the heights at which the vertical through (x, y) cuts the ellipsoid."""
-    center, a = form(pose, axes)
+    """Return the lower height at which the vertical cuts (p - c)ᵀ A (p - c) = 1, which SciPy turns."""
+    turn = Rotation.from_quat(pose[[4, 5, 6, 3]]).as_matrix()
+    squared = turn @ np.diag(axes**2) @ turn.T
+    center, a = pose[:3] + squared[:, 2] / np.sqrt(squared[2, 2]), np.linalg.inv(squared)
     dx, dy = x - center[0], y - center[1]
     roots = np.roots(
         [a[2, 2], 2.0 * (a[0, 2] * dx + a[1, 2] * dy),
@@ -56,31 +49,18 @@ def test_the_underside_is_where_a_vertical_ray_meets_the_ellipsoid(axes: np.ndar
     for pose, outline in zip(poses, finger.outline(poses), strict=True):
         for square in (0.0, 0.3, 0.8, 0.95):
             x, y = within(outline, square, RANDOM.uniform(0, 2 * np.pi, 3))
-            ours = under(outline[None], x, y)[0]
             rays = [cut(pose, axes, *point) for point in zip(x, y, strict=True)]
-            assert ours == pytest.approx(rays, abs=1e-14)  # rounding of heights of 0.1 m
+            assert under(outline[None], x, y)[0] == pytest.approx(rays, abs=1e-14)  # rounding of 0.1 m
 
 
-def test_the_position_is_the_lowest_point() -> None:
+def test_the_position_is_the_lowest_point_of_the_underside() -> None:
     poses = random_poses(50)
-    outlines = Fingertip().outline(poses)
-    for pose, outline in zip(poses, outlines, strict=True):
+    for pose, outline in zip(poses, Fingertip().outline(poses), strict=True):
         x, y = (axis.ravel() for axis in np.meshgrid(*(np.linspace(-9e-3, 9e-3, 61) + at for at in pose[:2])))
         assert under(outline[None], x, y).min() >= pose[2] - 1e-15  # rounding
-
-
-def test_the_underside_passes_through_the_position() -> None:
-    poses = random_poses(50)
-    at = [
-        float(under(o[None], p[:1], p[1:2])[0, 0])
-        for p, o in zip(poses, Fingertip().outline(poses), strict=True)
-    ]
-    assert at == pytest.approx(poses[:, 2], abs=1e-15)  # rounding
-
-
-def test_the_center_of_a_level_finger_is_its_height_above_the_position() -> None:
-    outline = Fingertip().outline(np.array([[1e-3, 2e-3, 50e-3, *LEVEL]]))[0]
-    assert outline[:3] == pytest.approx([1e-3, 2e-3, 58e-3], abs=1e-17)
+        assert under(outline[None], pose[:1], pose[1:2])[0, 0] == pytest.approx(pose[2], abs=1e-15)
+    center = Fingertip().outline(np.array([[1e-3, 2e-3, 50e-3, *LEVEL]]))[0, :3]
+    assert center == pytest.approx([1e-3, 2e-3, 58e-3], abs=1e-17)
 
 
 def test_a_finger_turned_about_the_vertical_swaps_length_and_width() -> None:
@@ -93,35 +73,20 @@ def test_a_finger_turned_about_the_vertical_swaps_length_and_width() -> None:
 
 def test_opposite_quaternions_are_the_same_finger() -> None:
     poses = random_poses(5)
-    other = poses * [1, 1, 1, -1, -1, -1, -1]
-    assert np.array_equal(Fingertip().outline(poses), Fingertip().outline(other))
+    assert np.array_equal(Fingertip().outline(poses), Fingertip().outline(poses * [1, 1, 1, -1, -1, -1, -1]))
 
 
-def across_the_join(outline: np.ndarray, offset: float) -> np.ndarray:
-    """Return the underside a little inside or outside the join, all around."""
-    angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    x, y = within(outline, JOIN, angle)
-    return under(outline[None], x + offset * np.cos(angle), y + offset * np.sin(angle))[0]
-
-
-def test_the_underside_is_continuous_at_the_join() -> None:
+def test_height_and_slope_are_continuous_at_the_join_and_beyond_it_the_underside_rises_on() -> None:
     for outline in Fingertip().outline(random_poses(20)):
+        x, y = within(outline, JOIN, AROUND)
         # Over 2 nm/1000 a slope of 1/sqrt(1 - r²), 5 to 10, moves the underside 2e-11 m.
-        assert np.abs(across_the_join(outline, 1e-12) - across_the_join(outline, -1e-12)).max() < 5e-11
-
-
-def test_the_slope_is_continuous_at_the_join() -> None:
-    dx = 1e-9
-    for outline in Fingertip().outline(random_poses(20)):
-        before, at, after = (across_the_join(outline, k * dx) for k in (-1, 0, 1))
-        inner, outer = (at - before) / dx, (after - at) / dx
-        # Curvature near the rim, some 1e5 1/m, times dx; rounding 1e-17/1e-9.
-        assert np.abs(outer - inner).max() < 1e-3 * np.abs(inner).max()
-
-
-def test_beyond_the_join_the_underside_rises_on() -> None:
-    for outline in Fingertip().outline(random_poses(20)):
-        x, y = within(outline, JOIN, np.linspace(0, 2 * np.pi, 12, endpoint=False))
+        inside, before, at, after, outside = (
+            under(outline[None], x + offset * np.cos(AROUND), y + offset * np.sin(AROUND))[0]
+            for offset in (-1e-12, -1e-9, 0.0, 1e-9, 1e-12)
+        )
+        assert np.abs(outside - inside).max() < 5e-11
+        # Curvature near the rim, some 1e5 1/m, times 1 nm; rounding 1e-17/1e-9.
+        assert np.abs(after - at - (at - before)).max() < 1e-3 * np.abs(at - before).max()
         dx, dy = x - outline[0], y - outline[1]
         rays = [under(outline[None], outline[0] + s * dx, outline[1] + s * dy)[0] for s in (1.5, 2, 3, 5)]
         assert np.diff(rays, axis=0).min() > 0.0
@@ -130,8 +95,3 @@ def test_beyond_the_join_the_underside_rises_on() -> None:
 def test_the_underside_is_finite_far_away() -> None:
     outlines = Fingertip().outline(random_poses(5))
     assert np.isfinite(under(outlines, np.array([1.0, -100.0]), np.array([0.0, 100.0]))).all()
-
-
-def test_a_finger_without_width_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"^Fingertip\.width must be above 0 m \(got 0 m\)\.$"):
-        Fingertip(width=0.0)

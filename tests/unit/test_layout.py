@@ -1,4 +1,4 @@
-"""Where the cells are."""
+"""Where the cells are, which of them are in a disc, and which discs hold each other."""
 
 from __future__ import annotations
 
@@ -6,41 +6,20 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.model.layout import Layout, encloses, join_discs, make_grid, widen_disc
 
-ARRANGEMENTS = ["aligned", "staggered", "hexagonal"]
-
-
-def table(arrangement: str, rows: int = 5, columns: int = 4) -> np.ndarray:
-    """Return positions as (rows, columns, 2)."""
-    return make_grid(Layout(rows, columns, 3e-3, arrangement)).positions.reshape(rows, columns, 2)
+#: Distance of rows and shift of odd ones, in pitches.
+ARRANGEMENTS = {"aligned": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (math.sqrt(3) / 2, 0.5)}
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_x_grows_by_the_pitch_along_a_row(arrangement: str) -> None:
-    assert np.diff(table(arrangement)[:, :, 0], axis=1) == pytest.approx(3e-3, abs=1e-17)
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_row_has_one_y(arrangement: str) -> None:
-    assert np.ptp(table(arrangement)[:, :, 1], axis=1).max() == 0.0
-
-
-@pytest.mark.parametrize(
-    ("arrangement", "spacing"),
-    [("aligned", 3e-3), ("staggered", 3e-3), ("hexagonal", 3e-3 * math.sqrt(3) / 2)],
-)
-def test_y_grows_by_the_row_spacing(arrangement: str, spacing: float) -> None:
-    assert np.diff(table(arrangement)[:, 0, 1]) == pytest.approx(spacing, abs=1e-17)
-
-
-@pytest.mark.parametrize(
-    ("arrangement", "shift"), [("aligned", 0.0), ("staggered", 1.5e-3), ("hexagonal", 1.5e-3)]
-)
-def test_odd_rows_are_shifted(arrangement: str, shift: float) -> None:
-    x = table(arrangement)[:, 0, 0]
-    assert x - x[0] == pytest.approx([0.0, shift, 0.0, shift, 0.0], abs=1e-17)
+def test_the_cells_stand_row_by_row_a_pitch_apart(arrangement: str) -> None:
+    spacing, shift = 3e-3 * np.array(ARRANGEMENTS[arrangement])
+    table = make_grid(Layout(5, 4, 3e-3, arrangement)).positions.reshape(5, 4, 2)
+    assert np.diff(table[:, :, 0], axis=1) == pytest.approx(3e-3, abs=1e-17)
+    assert np.ptp(table[:, :, 1], axis=1).max() == 0.0
+    assert np.diff(table[:, 0, 1]) == pytest.approx(spacing, abs=1e-17)
+    assert table[:, 0, 0] - table[0, 0, 0] == pytest.approx([0.0, shift, 0.0, shift, 0.0], abs=1e-17)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -51,7 +30,7 @@ def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, i
 
 
 def test_inner_cells_of_a_hexagonal_bed_have_six_neighbors_a_pitch_away() -> None:
-    positions = table("hexagonal", 5, 5).reshape(-1, 2)
+    positions = make_grid(Layout(5, 5, 3e-3, "hexagonal")).positions
     away = np.linalg.norm(positions - positions[12], axis=1)
     assert np.isclose(away, 3e-3, rtol=1e-12).sum() == 6
 
@@ -61,23 +40,38 @@ def test_the_default_bed_is_72_mm_wide() -> None:
     assert (bed.count, bed.x.max(), bed.y.max()) == (625, pytest.approx(36e-3), pytest.approx(36e-3))
 
 
-def test_a_disc_counts_cells_exactly_on_its_rim() -> None:
-    assert make_grid(Layout(5, 5)).disc(0.0, 0.0, 3e-3).tolist() == [7, 11, 12, 13, 17]
+@pytest.mark.parametrize(
+    ("disc", "cells"),
+    [
+        ((0.0, 0.0, 3e-3), [7, 11, 12, 13, 17]),  # those exactly on the rim too
+        ((1.0, 0.0, 0.1), []),  # beside the bed
+        ((-6e-3, -6e-3, 3e-3), [0, 1, 5]),  # partly beside it
+    ],
+)
+def test_a_disc_has_the_cells_there_are(disc: tuple[float, float, float], cells: list[int]) -> None:
+    bed = make_grid(Layout(5, 5))
+    assert bed.disc(*disc).tolist() == cells
+    # Of a batch a run may have none; wider by rounding, for the cells on the rim.
+    together = bed.covered(widen_disc(join_discs([None, disc]), 1e-12))
+    assert [np.flatnonzero(run).tolist() for run in together.T] == [[], cells]
 
 
-def test_a_disc_beside_the_bed_is_empty() -> None:
-    assert make_grid(Layout(5, 5)).disc(1.0, 0.0, 0.1).size == 0
+SMALL, LARGE, ASIDE = (1e-3, 0.0, 2e-3), (0.0, 0.0, 3e-3), (2e-3, 0.0, 2e-3)
 
 
-def test_a_disc_partly_beside_the_bed_has_the_cells_there_are() -> None:
-    assert make_grid(Layout(5, 5)).disc(-6e-3, -6e-3, 3e-3).tolist() == [0, 1, 5]
-
-
-def test_zero_rows_are_refused() -> None:
-    with pytest.raises(ParameterError, match=r"^Layout\.rows must be at least 1 \(got 0\)\.$"):
-        Layout(rows=0)
-
-
-def test_a_bed_beyond_memory_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"^Layout\.rows \* columns must have at most 20 million cells"):
-        Layout(rows=10_000, columns=10_000)
+@pytest.mark.parametrize(
+    ("outer", "inner", "holds"),
+    [
+        (LARGE, SMALL, True),  # from inside it touches the rim
+        (LARGE, ASIDE, False),
+        (SMALL, LARGE, False),
+        (None, SMALL, False),
+        (SMALL, None, True),
+        (None, None, True),
+    ],
+)
+def test_a_disc_holds_another_alone_and_in_a_batch(outer: object, inner: object, holds: bool) -> None:
+    assert encloses(outer, inner) == holds
+    assert encloses(join_discs([LARGE, outer]), join_discs([SMALL, inner])) == holds
+    assert encloses(None, join_discs([inner])) is False
+    assert math.isinf(join_discs([None])[2][0])

@@ -1,21 +1,32 @@
-"""The valve's two branches (equations 3 to 7), from the conditions they were made from."""
+"""Flow (equations 3 to 8): the valve's two branches, a conduit in series, and the reservoirs."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.actuator import Supply
+from digiclay.core.model.conduit import Conduit, OrificeAndConduit, connect_in_series
+from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.valve import Fluid, Orifice, Valve, make_orifice
+from scipy.integrate import quad
+
+from tests.assemble import one_cell
 
 OPENINGS = np.array([0.05, 0.2, 0.5, 0.8, 1.0])
 #: A wide valve and a thin fluid: the flow of a free cell is turbulent.
 WIDE = Valve(orifice_diameter=0.8e-3)
 THIN = Fluid(density=760.0, viscosity=0.65e-6)
+BOTH = pytest.mark.parametrize(("valve", "fluid"), [(Valve(), Fluid()), (WIDE, THIN)])
+#: For the wide valve, the thin fluid and a narrow conduit: both branches, and drops of like size.
+MESH, DROPS = (grid.ravel() for grid in np.meshgrid([0.03, 0.2, 0.6, 1.0], np.geomspace(10.0, 1e6, 9)))
+#: Relative errors of some ten products; steps of 2e-13 of a drop to either side move the flow by 4e-13.
+ROUNDING = 1e-12
 
 
-def critical(valve: Valve, fluid: Fluid, opening: np.ndarray) -> np.ndarray:
+def critical(valve: Valve, fluid: Fluid, opening: Any) -> Any:
     """Return ΔP_crit of equation 6, as corrected, from its exact constant 32e12/81."""
     top = 32e12 / 81.0 * fluid.density * fluid.viscosity**2 * valve.stroke**2
     return top / (math.pi**2 * opening**2 * valve.orifice_diameter**4)
@@ -26,161 +37,116 @@ def coefficient(valve: Valve, fluid: Fluid, flow: np.ndarray, drop: np.ndarray) 
     return 4.0 * flow / (math.pi * valve.orifice_diameter**2) * np.sqrt(fluid.density / (2.0 * drop))
 
 
-@pytest.fixture(params=[(Valve(), Fluid()), (WIDE, THIN)], ids=["default", "wide"])
-def parts(request: pytest.FixtureRequest) -> tuple[Valve, Fluid, Orifice]:
-    """A valve, a fluid and the law they make."""
-    valve, fluid = request.param
-    return valve, fluid, make_orifice(valve, fluid)
-
-
-def test_flow_is_continuous_where_the_branches_meet(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    valve, fluid, law = parts
-    drop = critical(valve, fluid, OPENINGS)
-    # The steps of 2e-13 to either side move Q itself by 4e-13 of its value at most; rounding adds 1e-15.
-    below, above = law.flow(OPENINGS, drop * (1.0 - 2e-13)), law.flow(OPENINGS, drop * (1.0 + 2e-13))
-    assert np.abs(above / below - 1.0).max() < 1e-12
-
-
-def test_both_branches_give_the_same_flow_at_the_critical_drop(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    valve, fluid, law = parts
-    drop = critical(valve, fluid, OPENINGS)
-    laminar, turbulent = law.laminar * OPENINGS**2 * drop, law.turbulent * OPENINGS * np.sqrt(drop)
-    assert np.abs(laminar / turbulent - 1.0).max() < 1e-12  # rounding of some ten products
-
-
-def test_below_the_critical_drop_the_flow_is_proportional_to_the_drop(
-    parts: tuple[Valve, Fluid, Orifice],
-) -> None:
-    valve, fluid, law = parts
-    drop = critical(valve, fluid, OPENINGS)
-    part = law.flow(OPENINGS, 0.9 * drop) / law.flow(OPENINGS, 0.3 * drop)
-    assert part == pytest.approx(3.0, rel=1e-12)  # rounding
-
-
-def test_above_the_critical_drop_the_flow_grows_with_its_root(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    valve, fluid, law = parts
-    drop = critical(valve, fluid, OPENINGS)
-    part = law.flow(OPENINGS, 18.0 * drop) / law.flow(OPENINGS, 2.0 * drop)
-    assert part == pytest.approx(3.0, rel=1e-12)  # rounding
-
-
-def test_the_default_valve_stays_laminar_between_the_reservoirs() -> None:
+def test_the_default_valve_stays_laminar_between_the_reservoirs_and_a_wide_one_does_not() -> None:
     assert make_orifice(Valve(), Fluid()).knee > 1e5
-
-
-def test_a_wide_valve_with_a_thin_fluid_is_turbulent_at_supply_pressure() -> None:
     assert make_orifice(WIDE, THIN).knee < 0.5e5
 
 
-def test_the_knee_is_the_critical_drop_of_the_open_valve(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    valve, fluid, law = parts
-    assert law.knee == pytest.approx(float(critical(valve, fluid, np.array(1.0))), rel=1e-12)  # rounding
+@BOTH
+def test_the_branches_meet_at_the_critical_drop(valve: Valve, fluid: Fluid) -> None:
+    law, drop = make_orifice(valve, fluid), critical(valve, fluid, OPENINGS)
+    # Re* = sqrt(Q/(ν h_v)) = 200 is the same as Q = 4e4 ν h_v, whatever the opening.
+    meeting = pytest.approx(np.full(5, 4e4 * fluid.viscosity * valve.stroke), rel=ROUNDING)
+    for side in (1.0 - 2e-13, 1.0, 1.0 + 2e-13):
+        assert law.flow(OPENINGS, drop * side) == meeting
+    assert law.laminar * OPENINGS**2 * drop == meeting
+    assert law.turbulent * OPENINGS * np.sqrt(drop) == meeting
+    assert law.knee == pytest.approx(critical(valve, fluid, 1.0), rel=ROUNDING)
+    # Below, the flow is proportional to the drop; above it grows with its root.
+    for one, other in ((0.9, 0.3), (18.0, 2.0)):
+        share = law.flow(OPENINGS, one * drop) / law.flow(OPENINGS, other * drop)
+        assert share == pytest.approx(3.0, rel=ROUNDING)
 
 
-def test_laminar_flow_has_the_printed_constant(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    valve, fluid, law = parts
-    top = math.pi**2 * valve.orifice_diameter**4
-    constant = top / (law.laminar * fluid.viscosity * valve.stroke * fluid.density)
-    assert constant == pytest.approx(9.877e6, rel=5e-3)  # printed to two digits as 9.9e6, to four by us
-
-
-def test_turbulent_flow_has_the_printed_constant(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    valve, fluid, law = parts
-    constant = math.pi * valve.orifice_diameter**2 * math.sqrt(2.0 / fluid.density) / law.turbulent
-    assert constant == pytest.approx(22.2, rel=5e-3)  # two digits
-
-
-def test_the_critical_drop_has_the_printed_constant(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    valve, fluid, law = parts
-    bottom = fluid.density * fluid.viscosity**2 * valve.stroke**2
-    constant = law.knee * math.pi**2 * valve.orifice_diameter**4 / bottom
-    assert constant == pytest.approx(3.95e11, rel=5e-3)  # two digits
-
-
-def test_the_branches_meet_at_the_same_flow_whatever_the_opening(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    # Re* = sqrt(Q/(ν h_v)) = 200 is the same as Q = 4e4 ν h_v.
-    valve, fluid, law = parts
-    flow = law.flow(OPENINGS, critical(valve, fluid, OPENINGS))
-    assert flow == pytest.approx(4e4 * fluid.viscosity * valve.stroke, rel=1e-12)  # rounding
-
-
-def test_the_turbulent_discharge_coefficient_is_the_slope_times_the_opening(
-    parts: tuple[Valve, Fluid, Orifice],
-) -> None:
-    valve, fluid, law = parts
-    drop = 5.0 * critical(valve, fluid, OPENINGS)
-    c_q = coefficient(valve, fluid, law.flow(OPENINGS, drop), drop)
-    assert c_q == pytest.approx(0.18 * OPENINGS, rel=1e-12)  # rounding
-
-
-def test_the_laminar_discharge_coefficient_falls_with_the_reynolds_number(
-    parts: tuple[Valve, Fluid, Orifice],
-) -> None:
-    valve, fluid, law = parts
-    drop = 0.2 * critical(valve, fluid, OPENINGS)
-    flow = law.flow(OPENINGS, drop)
-    reynolds = np.sqrt(flow / (fluid.viscosity * valve.stroke))
-    assert reynolds.max() < 200.0
-    c_q = coefficient(valve, fluid, flow, drop)
-    assert c_q == pytest.approx(0.18 * OPENINGS * reynolds / 200.0, rel=1e-12)  # rounding
-
-
-def test_with_the_opening_as_gap_laminar_flow_is_linear_in_the_opening() -> None:
-    law = make_orifice(Valve(gap="opening"), Fluid())
-    flow = law.flow(OPENINGS, np.full(OPENINGS.size, 1e4))
-    assert flow / OPENINGS == pytest.approx(flow[-1], rel=1e-12)  # rounding
-
-
-def test_with_the_opening_as_gap_the_critical_drop_is_the_same_for_all_openings() -> None:
+def test_with_the_opening_as_gap_all_openings_turn_turbulent_at_one_drop() -> None:
     valve = Valve(orifice_diameter=0.8e-3, gap="opening")
     law = make_orifice(valve, THIN)
-    drop = np.full(OPENINGS.size, law.knee)
-    reynolds = np.sqrt(law.flow(OPENINGS, drop) / (THIN.viscosity * valve.stroke * OPENINGS))
-    assert reynolds == pytest.approx(200.0, rel=1e-12)  # rounding
-
-
-def test_with_the_opening_as_gap_flow_is_continuous_too() -> None:
-    law = make_orifice(Valve(gap="opening"), THIN)
-    below, above = (law.flow(OPENINGS, np.full(5, law.knee * side)) for side in (1.0 - 2e-13, 1.0 + 2e-13))
-    assert np.abs(above / below - 1.0).max() < 1e-12  # as above
-
-
-def test_both_gaps_agree_on_the_fully_open_valve() -> None:
+    sides = (1.0 - 2e-13, 1.0, 1.0 + 2e-13)
+    below, at, above = (law.flow(OPENINGS, np.full(5, law.knee * side)) for side in sides)
+    assert np.sqrt(at / (THIN.viscosity * valve.stroke * OPENINGS)) == pytest.approx(200.0, rel=ROUNDING)
+    assert np.abs(above / below - 1.0).max() < ROUNDING
+    laminar = law.flow(OPENINGS, np.full(5, 0.1 * law.knee)) / OPENINGS
+    assert laminar == pytest.approx(laminar[-1], rel=ROUNDING)
+    # Fully open the gap makes no difference.
     drop = np.array([1e3, 1e5, 1e7])
-    flows = [make_orifice(Valve(gap=gap), Fluid()).flow(np.ones(3), drop) for gap in ("stroke", "opening")]
-    assert np.array_equal(*flows)
+    assert np.array_equal(law.flow(np.ones(3), drop), make_orifice(WIDE, THIN).flow(np.ones(3), drop))
 
 
-def test_flow_reverses_with_the_drop(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    _, _, law = parts
-    drop = np.geomspace(1.0, 1e7, 5)
-    assert np.array_equal(law.flow(OPENINGS, -drop), -law.flow(OPENINGS, drop))
+def series(gap: str = "stroke") -> OrificeAndConduit:
+    """Return a wide valve, a thin fluid and a narrow conduit."""
+    conduit = Conduit(length=10e-3, diameter=0.3e-3)
+    return connect_in_series(make_orifice(Valve(orifice_diameter=0.8e-3, gap=gap), THIN), conduit, THIN)
 
 
-def test_the_sign_of_the_opening_does_not_set_the_direction(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    _, _, law = parts
-    drop = np.geomspace(1.0, 1e7, 5)
-    assert np.array_equal(law.flow(-OPENINGS, drop), law.flow(OPENINGS, drop))
+@pytest.mark.parametrize(
+    "law",
+    [make_orifice(Valve(), Fluid()), make_orifice(WIDE, THIN), series(), series("opening")],
+    ids=["default", "wide", "series", "series by opening"],
+)
+def test_flow_has_the_sign_of_the_drop_alone_and_is_none_without_opening_or_drop(law: Orifice) -> None:
+    flow = law.flow(MESH, DROPS)
+    assert np.array_equal(law.flow(MESH, -DROPS), -flow)
+    assert np.array_equal(law.flow(-MESH, DROPS), flow)
+    assert np.array_equal(law.conductance(MESH, DROPS) * DROPS, flow)
+    assert not law.flow(np.zeros(5), np.array([-1e9, -1.0, 0.0, 1.0, 1e9])).any()
+    assert not law.flow(MESH, np.zeros(MESH.size)).any()
 
 
-def test_a_shut_valve_passes_nothing(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    _, _, law = parts
-    drop = np.array([-1e9, -1.0, 0.0, 1.0, 1e9])
-    assert np.array_equal(law.flow(np.zeros(5), drop), np.zeros(5))
+def test_the_resistance_is_that_of_a_parabolic_profile() -> None:
+    fluid, conduit = Fluid(), Conduit()
+    edge, gradient = conduit.diameter / 2.0, 1e5 / conduit.length
+
+    def ring(r: float) -> float:
+        return gradient * (edge**2 - r**2) / (4.0 * fluid.dynamic_viscosity) * 2.0 * math.pi * r
+
+    # The integrand is a cubic: quadrature is exact but for rounding.
+    assert conduit.resistance(fluid) == pytest.approx(1e5 / quad(ring, 0.0, edge)[0], rel=1e-12)
 
 
-def test_no_drop_gives_no_flow(parts: tuple[Valve, Fluid, Orifice]) -> None:
-    _, _, law = parts
-    assert np.array_equal(law.flow(OPENINGS, np.zeros(5)), np.zeros(5))
+@pytest.mark.parametrize(("gap", "power"), [("stroke", 2), ("opening", 1)])
+def test_the_drops_of_valve_and_conduit_add_up(gap: str, power: int) -> None:
+    law = series(gap)
+    flow = law.flow(MESH, DROPS)
+    # The drop over the valve alone is the inverse of each branch, told apart by Re* (Q = 4e4 ν h).
+    turbulent = flow >= 4e4 * THIN.viscosity * 30e-6 * (MESH if power == 1 else 1.0)
+    laminar = flow / (law.valve.laminar * MESH**power)
+    ours = np.where(turbulent, (flow / (law.valve.turbulent * MESH)) ** 2, laminar)
+    assert ours + law.resistance * flow == pytest.approx(DROPS, rel=1e-12)  # solved without cancellation
+    assert 5 < turbulent.sum() < turbulent.size - 5
+    assert (law.resistance * flow / DROPS).max() > 0.3, "the conduit hardly counts"
+    assert np.all(flow < law.valve.flow(MESH, DROPS))
 
 
-def test_an_orifice_below_zero_is_refused_in_one_line() -> None:
-    with pytest.raises(
-        ParameterError, match=r"^Valve\.orifice_diameter must be above 0 m \(got -0\.0003 m\)\.$"
-    ):
-        Valve(orifice_diameter=-0.3e-3)
+def test_a_conduit_without_length_changes_nothing_and_behind_a_wide_valve_it_is_all() -> None:
+    valve = make_orifice(WIDE, THIN)
+    without = connect_in_series(valve, Conduit(length=0.0), THIN)
+    assert without.flow(MESH, DROPS) == pytest.approx(valve.flow(MESH, DROPS), rel=1e-14)  # rounding
+    wide = connect_in_series(make_orifice(Valve(orifice_diameter=0.2), Fluid()), Conduit(), Fluid())
+    # 200 mm against 0.8 mm: the valve's resistance is (1/250)^4 of the conduit's, some 1e-9.
+    drop = np.array([1e2, 1e4, 1e5])
+    assert wide.flow(np.ones(3), drop) * wide.resistance == pytest.approx(drop, rel=1e-6)
 
 
-def test_an_unknown_gap_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ParameterError, match=r"^Valve\.gap must be one of stroke, opening \(got 'slit'\)\.$"):
-        Valve(gap="slit")
+def test_the_sign_of_the_opening_picks_the_reservoir() -> None:
+    openings = np.array([1e-12, 1.0, -1e-12, -1.0])
+    assert Supply().pressure(openings).tolist() == [0.5e5, 0.5e5, -0.5e5, -0.5e5]
+
+
+def speed_under(force: float, opening: float) -> float:
+    """Return how fast a cell moves whose finger presses with `force`, m/s."""
+    cell = one_cell(valve_lag=None, relaxation=None).cell
+    contact = cell.touch.contact
+    depth = np.log1p(force / contact.share * contact.exponent / contact.stiffness) / contact.exponent
+    y, under = np.array([[50e-3]]), np.array([50e-3 - depth])
+    return float(compute_rates(cell, y, under, np.array([opening]))[0, 0])
+
+
+def test_the_drop_between_reservoir_and_load_moves_the_pin() -> None:
+    lift = 0.5e5 * np.pi * 1e-6  # P_s A_a = 0.157 N
+    assert speed_under(1.5 * lift, 1.0) < 0.0
+    # Twice the balance force turns ΔP = P_s - F/A_a into its opposite; the laminar flow with it. Rounding.
+    assert speed_under(2.0 * lift, 1.0) == pytest.approx(-speed_under(0.0, 1.0), rel=1e-9)
+    # Rounding of ΔP: 1e-16 of 0.5 bar, against the free speed of 24 mm/s.
+    assert abs(speed_under(lift, 1.0)) < 1e-12
+    assert speed_under(0.1, -1.0) < speed_under(0.0, -1.0) < 0.0
+    assert speed_under(1e3, 0.0) == 0.0
