@@ -1,6 +1,6 @@
 """Pictures of the docs that are drawn without a window: `python tools/doc_pictures.py NAME ...`.
 
-The page docs/pictures.md has the command of every picture.
+CONTRIBUTING.md has the command of every picture.
 """
 
 from __future__ import annotations

@@ -30,7 +30,9 @@ PAGES = sorted(
 )
 PACKAGES = ("addon", "benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study", "tools")
 SOURCES = {
-    f"/{path.relative_to(ROOT)}" for name in (*PACKAGES, "tests") for path in (ROOT / name).rglob("*.py")
+    f"/{path.relative_to(ROOT)}"
+    for name in (*PACKAGES, "docs", "tests")
+    for path in (ROOT / name).rglob("*.py")
 }
 #: Words that make a heading a sentence or a question.
 SENTENCE = re.compile(

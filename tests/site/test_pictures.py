@@ -1,4 +1,4 @@
-"""Pictures of the docs: each has the command that makes it (docs/pictures.md), and is shown."""
+"""Pictures of the docs: each has the command that makes it (CONTRIBUTING.md), and is shown."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from tests.form.test_pages import PAGES
 
 ROOT = Path(__file__).parents[2]
-TABLE = ROOT / "docs" / "pictures.md"
-ROW = re.compile(r"^\| (`.*?) \| (.*) \|$", re.MULTILINE)
+TABLE = ROOT / "CONTRIBUTING.md"
+ROW = re.compile(r"^\| (`[\w.]+\.(?:jpg|png)`.*?) \| (.*) \|$", re.MULTILINE)
 SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 
 
@@ -53,7 +53,7 @@ def test_what_makes_a_picture_exists(made: dict[str, str]) -> None:
         elif command.startswith("make "):
             assert f"\n{command.removeprefix('make ')}:" in makefile
         elif not command:  # a page has the command
-            assert re.search(r"\]\(\w+\.md#|same section", cell), name
+            assert re.search(r"\]\(docs/\w+\.md#|same section", cell), name
         else:  # tests.form.test_pages.py checks the arguments
             assert command.startswith(("python -m benchmarks ", "digiclay "))
 
