@@ -45,29 +45,30 @@ def at(x: float, y: float) -> int:
     return int(np.hypot(BED.x - x * 1e-3, BED.y - y * 1e-3).argmin())
 
 
-def test_cells_at_the_rim_stay_where_they_are_formed() -> None:
-    target = command(master(height=50e-3), seen(RIDGE, Mode.HOLD)).target
-    assert target[at(0, 15)] == pytest.approx(44e-3, abs=1e-9)
-    assert target[at(15, 0)] == pytest.approx(40e-3, abs=1e-9)
+#: Share of the way to the top 12 mm from the middle.
+SHARE = Blister().evaluate_profile(np.array([12e-3]))[0]
+RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e-3))
+
+
+@pytest.mark.parametrize(
+    ("measured", "place", "height"),
+    [
+        pytest.param(seen(RIDGE, Mode.HOLD), (0, 15), 44e-3, id="at the rim it stays where it is formed"),
+        pytest.param(seen(RIDGE, Mode.HOLD), (15, 0), 40e-3, id="also beside the ridge"),
+        pytest.param(seen(RIDGE, Mode.HOLD), (0, 12), 44e-3 + SHARE * 6e-3, id="its share of the way"),
+        pytest.param(seen(RIDGE, Mode.HOLD), (12, 0), 40e-3 + SHARE * 10e-3, id="beside the ridge likewise"),
+        pytest.param(RISEN, (12, 0), 40e-3 + SHARE * 10e-3, id="from where it was when the blister came"),
+    ],
+)
+def test_a_cell_rises_from_its_own_ground(
+    measured: Measurement, place: tuple[float, float], height: float
+) -> None:
+    assert command(master(height=50e-3), measured).target[at(*place)] == pytest.approx(height, abs=1e-9)
 
 
 def test_the_papers_ground_cuts_a_ridge_at_the_rim() -> None:
     target = command(master(height=50e-3), seen(RIDGE, Mode.HOLD), "edge").target
     assert target[at(0, 15)] < 42e-3
-
-
-def test_between_rim_and_flat_top_each_cell_goes_its_share_of_the_way_to_the_top() -> None:
-    target = command(master(height=50e-3), seen(RIDGE, Mode.HOLD)).target
-    share = Blister().evaluate_profile(np.array([12e-3]))[0]
-    assert target[at(0, 12)] == pytest.approx(44e-3 + share * 6e-3, abs=1e-9)
-    assert target[at(12, 0)] == pytest.approx(40e-3 + share * 10e-3, abs=1e-9)
-
-
-def test_a_blister_that_stays_rises_from_where_its_cells_were_when_it_came() -> None:
-    risen = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e-3))
-    share = Blister().evaluate_profile(np.array([12e-3]))[0]
-    target = command(master(height=50e-3), risen).target
-    assert target[at(12, 0)] == pytest.approx(40e-3 + share * 10e-3, abs=1e-9)
 
 
 @pytest.mark.parametrize("mode", [Mode.REST, Mode.HOLD, Mode.EDGE])
@@ -96,13 +97,10 @@ def test_what_is_left_behind_a_blister_that_travels(
     assert (found == target) == kept
 
 
-def test_a_scene_with_the_papers_ground_is_written_as_older_versions_read_it() -> None:
-    assert "ground" not in format_scene(resolve({}))
-
-
 @pytest.mark.parametrize("ground", GROUNDS)
-def test_a_scene_is_read_with_the_ground_it_was_written_with(ground: str) -> None:
+def test_a_scene_is_read_with_its_ground_and_the_papers_as_older_versions_read_it(ground: str) -> None:
     scene = resolve({"control": {"ground": ground}})
+    assert ("ground" in format_scene(scene)) == (ground != "edge")
     assert resolve(tomllib.loads(format_scene(scene))) == scene
 
 
@@ -142,25 +140,19 @@ EVEN = 40e-3 + 0.03 * BED.x
 
 
 @pytest.mark.parametrize(
-    ("ground", "top", "mode"),
-    [(SLOPE, 36e-3, Mode.FROZEN), (SLOPE, 44e-3, Mode.BLISTER), (EVEN, 36e-3, Mode.BLISTER)],
+    ("ground", "top", "left", "ahead"),
+    [
+        (SLOPE, 36e-3, Mode.FROZEN, Mode.BLISTER),
+        (SLOPE, 45e-3, Mode.BLISTER, Mode.FROZEN),
+        (EVEN, 36e-3, Mode.BLISTER, Mode.FROZEN),
+    ],
     ids=["sinks into a slope", "rises", "sinks into even ground"],
 )
-def test_what_the_finger_has_left_freezes_on_the_flat_top_where_the_blister_sinks_into_uneven_ground(
-    ground: Floats, top: float, mode: Mode
+def test_on_uneven_ground_that_a_blister_sinks_into_cells_freeze_sooner_and_are_freed_ahead(
+    ground: Floats, top: float, left: Mode, ahead: Mode
 ) -> None:
-    assert pressed(3.0, top, ground=ground).mode[at(-3, 0)] == mode
-
-
-@pytest.mark.parametrize(
-    ("ground", "top", "mode"),
-    [(SLOPE, 36e-3, Mode.BLISTER), (SLOPE, 46e-3, Mode.FROZEN), (EVEN, 36e-3, Mode.FROZEN)],
-    ids=["sinks into a slope", "rises", "sinks into even ground"],
-)
-def test_a_frozen_cell_ahead_of_a_blister_that_sinks_into_uneven_ground_is_freed(
-    ground: Floats, top: float, mode: Mode
-) -> None:
-    assert pressed(0.0, top, Mode.FROZEN, ground).mode[at(6, 0)] == mode
+    assert pressed(3.0, top, ground=ground).mode[at(-3, 0)] == left
+    assert pressed(0.0, top, Mode.FROZEN, ground).mode[at(6, 0)] == ahead
 
 
 def test_what_a_blister_that_climbs_a_slope_has_pressed_stays_behind_it() -> None:

@@ -1,4 +1,4 @@
-"""Control methods of one's own: named on the command line, in scenes, in other processes."""
+"""Control methods of one's own: named on the command line, in scenes, other processes and job series."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
+from digiclay.commands.run_state import RunState, judge_run
 from digiclay.core.base.errors import MethodError, SceneError
 from digiclay.core.batch.run_together import run_together
-from digiclay.core.control.methods import METHODS, find_method, list_added, remove_method
+from digiclay.core.control.methods import METHODS, list_added, remove_method
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
 from digiclay.plugins import method_loader
@@ -157,10 +158,6 @@ def test_the_name_in_scene_files_is_that_of_the_class(attribute: str, name: str)
     assert name_method(attribute) == name
 
 
-def test_the_table_of_methods_finds_built_in_ones_first() -> None:
-    assert find_method("elastic") is METHODS["elastic"]
-
-
 def test_a_batch_gives_what_the_runs_give_alone(here: Path) -> None:
     write_method(here)
     name = load_method("pad.py:SoftPad")
@@ -176,3 +173,77 @@ def test_a_shape_is_displayed_before_it_takes_over(here: Path) -> None:
     scene = small(load_method("pad.py:SoftPad"), "shape.file=saddle", "simulation.duration=0.4")
     height = run(scene).history["height"]
     assert np.ptp(height[-1]) > 1e-3
+
+
+# A job series: the code lies beside each job, a command loads it.
+
+JOBS = """
+scenes = ["tap"]
+methods = ["elastic"]
+errors = false
+
+[settings]
+small = { layout.rows = 11, layout.columns = 11, simulation.duration = 0.05 }
+"""
+JOB = Path("jobs", "jobs", "tap-soft_pad-small")
+RUN = Path("jobs", "runs", "tap-soft_pad-small")
+
+
+@pytest.fixture
+def jobs(here: Path) -> Path:
+    """Work in a folder with a JOBS file and a method."""
+    (here / "jobs.toml").write_text(JOBS, encoding="utf-8")
+    write_method(here)
+    return here
+
+
+def prepare() -> int:
+    """Write the files of the jobs, and forget the method as another process would not know it."""
+    code = main(["batch", "jobs.toml", "--method", "pad.py:SoftPad", "--prepare", "--quiet"])
+    remove_method("soft_pad")
+    return code
+
+
+def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(
+    jobs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert prepare() == 0
+    assert sorted(path.name for path in JOB.iterdir()) == ["job.toml", "method.py", "scene.toml"]
+    assert not (JOB.with_name("tap-elastic-small") / "method.py").exists()
+    assert (JOB / "method.py").read_text(encoding="utf-8") == PAD
+    assert main(["job", str(JOB), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert (said.count("\n"), "--method path/to/mine.py:Mine" in said) == (1, True)
+    assert judge_run(JOB, RUN) is RunState.ABSENT
+    own = ["--method", "method.py:SoftPad", "--quiet"]
+    assert main(["job", str(JOB), *own]) == 0
+    assert judge_run(JOB, RUN) is RunState.WHOLE
+    found = json.loads((RUN / "metrics.json").read_text(encoding="utf-8"))
+    assert found["versions"]["method"].startswith("method.py:SoftPad sha256:")
+    remove_method("soft_pad")
+    write_method(jobs, PAD.replace("50e-6", "60e-6"))
+    assert prepare() == 0
+    assert judge_run(JOB, RUN) is RunState.CHANGED
+    assert main(["job", str(JOB), *own]) == 0
+    assert judge_run(JOB, RUN) is RunState.WHOLE
+
+
+def test_a_series_runs_with_it_in_processes_and_farms_are_told_its_code(jobs: Path) -> None:
+    methods = JOBS.replace('methods = ["elastic"]\n', "")
+    (jobs / "jobs.toml").write_text(methods, encoding="utf-8")
+    own = ["batch", "jobs.toml", "--method", "pad.py:SoftPad", "--quiet"]
+    assert main(own) == 0
+    assert judge_run(JOB, RUN) is RunState.WHOLE
+    assert [path.name for path in RUN.parent.iterdir()] == [RUN.name]  # without methods in the file: this one
+    assert main([*own, "--submit", "cuecmd"]) == 0
+    lists = "".join(path.read_text(encoding="utf-8") for path in sorted(jobs.glob("jobs/cuecmd/*.txt")))
+    assert "--method method.py:SoftPad" in lists
+
+
+def test_a_series_with_a_method_that_cannot_be_loaded_leaves_nothing(
+    jobs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["batch", "jobs.toml", "--method", "pad.py:Pad"]) == 2
+    said = capsys.readouterr().err
+    assert said == "--method: pad.py:Pad: the file must have the class Pad (it has pad.py:SoftPad).\n"
+    assert sorted(path.name for path in jobs.iterdir()) == ["jobs.toml", "pad.py"]

@@ -92,27 +92,21 @@ def test_pins_outside_the_ring_stay_exactly_where_they_are(arrangement: str) -> 
     assert np.abs(after - before)[~outside].max() > 1e-3
 
 
-def test_a_spike_sinks_without_swinging_and_no_pin_leaves_the_range_of_the_others() -> None:
-    system = bed()
+@pytest.mark.parametrize(("period", "swing"), [(5e-3, 1e-9), (20e-3, BAND)])
+def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period: float, swing: float) -> None:
+    system = bed(period=period)
     relief = make_spike_and_ridge(system.grid)
     state = heighten(system, relief)
     first, spike = state.row(0), int(relief.argmax())
     heights = np.array(smooth(system, state, make_orders(150, 0.0, 0.0, 0.0, RADIUS, 100)))
-    assert np.diff(heights[:, spike]).max() <= 1e-9
+    assert np.diff(heights[:, spike]).max() <= swing
+    # No pin leaves the range of the others; all stand still before the wait is over.
     assert heights.min() >= first.min() - BAND
     assert heights.max() <= first.max() + BAND
-    # Still before the wait is over.
     assert np.abs(heights[-20:] - heights[-1]).max() < 1e-9
-
-
-def test_pins_go_no_faster_than_their_valves_let_them() -> None:
-    system = bed()
-    heights = np.array(smooth(system, heighten(system, make_spike_and_ridge(system.grid)), STROKE))
-    speed = np.diff(heights, axis=0) / system.period
-    limit = find_speeds(system.cell)
+    speed, limit = np.diff(heights, axis=0) / system.period, find_speeds(system.cell)
     assert speed.max() <= limit.rise * (1.0 + 1e-9)
-    assert speed.min() >= limit.fall * (1.0 + 1e-9)
-    assert speed.min() < 0.9 * limit.fall
+    assert limit.fall * (1.0 + 1e-9) <= speed.min() < 0.5 * limit.fall
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -194,15 +188,6 @@ def test_the_neighbors_of_all_pins_in_the_disc_take_part(arrangement: str) -> No
             assert set(goal[np.isin(start, smoothed)].tolist()) <= there
 
 
-def test_pins_are_smoothed_without_swinging_at_a_slow_control_period_too() -> None:
-    system = bed(method="absent", period=20e-3)
-    state = heighten(system, make_spike_and_ridge(system.grid))
-    spike = int(state.row(0).argmax())
-    heights = np.array(smooth(system, state, make_orders(40, 0.0, 0.0, 0.0, RADIUS, 40)))
-    assert heights[-1, spike] < 45e-3
-    assert np.diff(heights[:, spike]).max() <= BAND
-
-
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
 def test_every_method_lets_its_pins_be_smoothed(method: str) -> None:
     system = bed(method=method)
@@ -261,27 +246,24 @@ def test_periods_without_an_order_are_those_of_the_method_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    "order",
+    ("order", "sound"),
     [
-        (np.nan, 0.0, 1e-2, 1.0),
-        (0.0, np.inf, 1e-2, 1.0),
-        (0.0, 0.0, -1e-2, 1.0),
-        (0.0, 0.0, 1e-9, 1.0),
-        (0.0, 0.0, 1e9, 1.0),
-        (0.0, 0.0, 1e-2, 1.1),
-        (0.0, 0.0, 1e-2, -0.1),
+        ((np.nan, 0.0, 1e-2, 1.0), False),
+        ((0.0, np.inf, 1e-2, 1.0), False),
+        ((0.0, 0.0, -1e-2, 1.0), False),
+        ((0.0, 0.0, 1e-9, 1.0), False),
+        ((0.0, 0.0, 1e9, 1.0), False),
+        ((0.0, 0.0, 1e-2, 1.1), False),
+        ((0.0, 0.0, 1e-2, -0.1), False),
+        ((0.0, 0.0, 1e-6, 0.0), True),
+        ((1e3, -1e3, 1e3, 1.0), True),
+        ((0.0, 0.0, 0.0, 0.0), True),
     ],
 )
-def test_an_order_that_is_none_is_found(order: tuple[float, ...]) -> None:
+def test_an_order_out_of_its_range_is_found(order: tuple[float, ...], sound: bool) -> None:
     orders = np.zeros((3, 4))
-    assert find_fault(orders, 3) == ""
     orders[1] = order
-    assert find_fault(orders, 3).startswith("row 1 is [")
-
-
-def test_the_least_and_the_greatest_order_are_sound() -> None:
-    orders = np.array([[0.0, 0.0, 1e-6, 0.0], [1e3, -1e3, 1e3, 1.0], [0.0, 0.0, 0.0, 0.0]])
-    assert find_fault(orders, 3) == ""
+    assert find_fault(orders, 3) == "" if sound else find_fault(orders, 3).startswith("row 1 is [")
 
 
 @pytest.mark.parametrize("shape", [(0, 4), (2, 4), (3, 5), (12,)])

@@ -61,23 +61,16 @@ def test_each_part_of_the_criterion_can_fail_a_finger(bad: dict[str, float]) -> 
     assert not replace(GOOD, **bad).meets(Criterion())
 
 
-def test_the_criterion_says_its_limits() -> None:
-    said = str(Criterion(lag=2e-3, deviation=0.3))
-    assert "2 mm" in said
-    assert "0.3 N" in said
-
-
-def test_a_drag_goes_straight_and_level_at_its_speed() -> None:
-    path, start, end = Drag().path(12e-3, 40e-3)
-    poses = path.trajectory().poses(np.linspace(start, end, 11))
-    np.testing.assert_allclose(np.diff(poses[:, 0]) / np.diff(np.linspace(start, end, 11)), 12e-3, rtol=1e-9)
-    assert np.ptp(poses[:, 1:3]) == pytest.approx(poses[0, 2], rel=1e-12)  # y is 0, z does not change
-
-
-def test_a_drag_at_the_depth_of_the_first_press_is_a_path_as_well() -> None:
-    pathway, start, end = Drag(press=4e-3, height=-4e-3).path(12e-3, 40e-3)
-    heights = pathway.trajectory().poses(np.linspace(start, end, 11))[:, 2]
-    np.testing.assert_allclose(heights, 36e-3, rtol=1e-12)
+@pytest.mark.parametrize(
+    ("drag", "height"), [(Drag(), None), (Drag(press=4e-3, height=-4e-3), 36e-3)], ids=["ridge", "as deep"]
+)
+def test_a_drag_goes_straight_and_level_at_its_speed(drag: Drag, height: float | None) -> None:
+    path, start, end = drag.path(12e-3, 40e-3)
+    times = np.linspace(start, end, 11)
+    x, y, z = path.trajectory().poses(times)[:, :3].T
+    np.testing.assert_allclose(np.diff(x) / np.diff(times), 12e-3, rtol=1e-9)
+    np.testing.assert_allclose(y, 0.0, atol=1e-12)
+    np.testing.assert_allclose(z, height or z[0], rtol=1e-12)
 
 
 def test_a_lift_is_as_fast_as_it_says_at_its_fastest() -> None:
@@ -113,9 +106,11 @@ def press() -> Result:
     return run(device(rows=11, columns=11))
 
 
-def test_a_run_gives_every_figure(press: Result) -> None:
+def test_a_run_gives_every_figure_and_its_rows_between_two_times(press: Result) -> None:
     assert list(press.figures) == list(RUN_METRICS)
     assert press.figures["duration"] == press.metrics["duration"] > 0.0
+    part = select_rows(press.history, 0.5, 1.0)
+    assert (part["time"][0], part["time"][-1], len(part["height"])) == (0.5, 1.0, 101)
 
 
 @pytest.mark.parametrize(
@@ -143,21 +138,14 @@ def test_losses_of_a_phase_are_counted_from_the_record_for_every_method(
     assert judge(done, 0.5, 1.0, 0.0).losses == losses
 
 
-def test_the_rows_between_two_times_are_kept(press: Result) -> None:
-    part = select_rows(press.history, 0.5, 1.0)
-    assert (part["time"][0], part["time"][-1], len(part["height"])) == (0.5, 1.0, 101)
-
-
-def test_a_method_that_counts_no_losses_has_none() -> None:
-    bare = run(resolve({"control": "absent", "layout": {"rows": 5, "columns": 5}}))
-    assert bare.metrics["losses"] is None
-
-
-def test_a_bed_that_begins_with_a_shape_counts_what_its_method_counts() -> None:
-    bed = {
-        "layout": {"rows": 11, "columns": 11},
-        "shape": {"file": "crater"},
-        "simulation": {"duration": 0.02},
-    }
-    assert run(resolve({**bed, "control": {"method": "elastic"}})).metrics["losses"] is None
-    assert run(resolve(bed)).metrics["losses"] == 0
+@pytest.mark.parametrize(
+    ("changed", "losses"),
+    [
+        ({"control": "absent", "layout": {"rows": 5, "columns": 5}}, None),
+        ({"shape": {"file": "crater"}, "control": {"method": "elastic"}}, None),
+        ({"shape": {"file": "crater"}}, 0),  # what the method counts after the shape
+    ],
+)
+def test_only_a_method_that_counts_losses_has_some(changed: dict[str, object], losses: int | None) -> None:
+    bed = {"layout": {"rows": 11, "columns": 11}, "simulation": {"duration": 0.02}}
+    assert run(resolve({**bed, **changed})).metrics["losses"] == losses
