@@ -49,35 +49,20 @@ def volume(layout: Layout, height: np.ndarray) -> float:
 
 @given(beds())
 @example(bed(2, 2, "aligned"))
+@example(bed(2, 2, "staggered"))
 @example(bed(60, 40, "aligned"))
 @example(bed(60, 40, "staggered"))
 @example(bed(60, 40, "hexagonal"))
-def test_the_solid_is_closed_and_consistently_wound(case):
+def test_the_solid_is_closed_in_one_piece_without_handles_and_of_the_volume_of_its_prisms(case):
     mesh = made(*case)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
-
-
-@given(beds())
-@example(bed(2, 2, "staggered"))
-@example(bed(60, 40, "aligned"))
-@example(bed(60, 40, "hexagonal"))
-def test_the_volume_enclosed_is_the_sum_of_the_prisms(case):
-    # Positive also says that the normals point outward.
-    assert made(*case).volume == pytest.approx(volume(*case), rel=ROUNDING)
-    assert volume(*case) > 0.0
-
-
-@given(beds())
-def test_every_triangle_has_an_area(case):
-    assert made(*case).area_faces.min() > 0.0
-
-
-@given(beds())
-def test_the_solid_has_one_piece_without_handles(case):
+    assert mesh.area_faces.min() > 0.0
     # Euler: vertices - edges + faces = 2; the edges of a closed mesh are three halves of its faces.
-    mesh = made(*case)
     assert len(mesh.vertices) - len(mesh.faces) * 3 // 2 + len(mesh.faces) == 2
+    # Positive also says that the normals point outward.
+    assert mesh.volume == pytest.approx(volume(*case), rel=ROUNDING)
+    assert volume(*case) > 0.0
 
 
 @given(beds())

@@ -134,13 +134,10 @@ def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
         assert np.linalg.norm(mine[:, :2] - (x, 0.0), axis=1).max() < 12e-3
 
 
-def test_without_a_search_there_are_no_groups():
+def test_features_are_bodies_of_their_own_name_and_groups_only_after_a_search():
+    assert [body.name for body in make_bodies(formed(), Model(kind="features"))] == ["boss_1", "crease_1"]
     (body,) = make_bodies(formed(), Model())
     assert (body.groups, body.group.size) == ((), 0)
-
-
-def test_features_are_bodies_of_their_own_name():
-    assert [body.name for body in make_bodies(formed(), Model(kind="features"))] == ["boss_1", "crease_1"]
 
 
 def test_a_surface_without_features_says_what_was_looked_for():

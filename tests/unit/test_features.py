@@ -56,15 +56,7 @@ def test_a_dome_is_one_boss_with_the_area_and_volume_of_the_cap(arrangement):
     assert dome.area * 1e6 == pytest.approx(np.pi * cut, rel=0.01)
     assert dome.volume * 1e9 == pytest.approx(np.pi * cut * (0.5 + 8.0) / 2.0, rel=0.01)
     assert dome.extreme * 1e3 == pytest.approx(8.0, abs=0.05)  # the top may lie between pins
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_dome_has_no_crest(arrangement):
-    (dome,) = features(
-        formed(lambda x, y: np.clip(8.0 * (1.0 - (x * x + y * y) / 144.0), 0.0, None), arrangement)
-    )
-    assert dome.crests == ()
-    assert dome.crest_length == 0.0
+    assert (dome.crests, dome.crest_length) == ((), 0.0)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -94,21 +86,6 @@ def test_a_slope_along_the_crest_counts_in_its_length():
     # From 3 mm high at one end to 15 mm at the other: along the slope it is longer than in plan.
     assert boss.crest_length >= np.linalg.norm(span) - 1e-9
     assert abs(span[2]) > 0.4 * abs(span[0])
-
-
-def test_a_ring_is_one_boss_with_a_closed_crest():
-    (boss,) = features(formed(lambda x, y: np.clip(5.0 - (np.hypot(x, y) - 12.0) ** 2 / 2.0, 0.0, None)))
-    (crest,) = boss.crests
-    np.testing.assert_array_equal(crest[0], crest[-1])
-    assert boss.crest_length * 1e3 == pytest.approx(2.0 * np.pi * 12.0, rel=0.06)  # through pins 1 mm apart
-
-
-def test_a_crossing_has_the_crests_of_both_its_ridges():
-    def cross(x, y):
-        return np.maximum(ridge(x, y, half=15.0), ridge(x, y, half=15.0, angle=np.pi / 2))
-
-    (boss,) = features(formed(cross))
-    assert boss.crest_length * 1e3 == pytest.approx(60.0, abs=6.0)  # four ends, a pin and a half each
 
 
 def test_a_crease_is_measured_as_the_boss_it_mirrors():
@@ -179,18 +156,14 @@ def test_the_table_is_in_millimeters():
     assert row[4] == "6.00"
 
 
-@pytest.mark.parametrize("bad", [0.0, -1e-3, np.nan, np.inf, "wide"])
-def test_a_threshold_that_makes_no_sense_is_refused(bad):
-    with pytest.raises(
-        ParameterError, match=r"^Finding\.threshold must be (at least 1e-06 m|a finite number|a number)"
-    ):
-        Finding(threshold=bad)
-
-
-@pytest.mark.parametrize("bad", [0, -1, 2.5])
-def test_a_smallest_size_that_makes_no_sense_is_refused(bad):
-    with pytest.raises(ParameterError, match=r"^Finding\.smallest must be"):
-        Finding(smallest=bad)
+@pytest.mark.parametrize(
+    ("name", "bad"),
+    [("threshold", bad) for bad in (0.0, -1e-3, np.nan, np.inf, "wide")]
+    + [("smallest", bad) for bad in (0, -1, 2.5)],
+)
+def test_criteria_that_make_no_sense_are_refused(name, bad):
+    with pytest.raises(ParameterError, match=rf"^Finding\.{name} must be"):
+        Finding(**{name: bad})
 
 
 def rough(seed: int, arrangement: str) -> Formed:

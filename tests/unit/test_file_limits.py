@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
+from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.control.named_shapes import read_values
 from digiclay.core.engine.simulation import begin
 from digiclay.core.files.tables import LARGEST
@@ -268,8 +268,3 @@ def test_an_array_for_another_bed_is_not_read(tmp_path: Path) -> None:
     bed = make_grid(Layout(2, 2, 3e-3))
     path = str(tmp_path / "large.npy")
     assert "2 x 2 cells" in refused(lambda: read_values("shape", path, bed, 0.0, 1.0, "m"))
-
-
-def test_a_missing_scene_file_is_told() -> None:
-    with pytest.raises(SceneError, match="cannot be read"):
-        read_table(Path("nowhere.toml"))

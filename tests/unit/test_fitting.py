@@ -50,11 +50,6 @@ def test_contained_a_shape_keeps_its_proportions_within_the_bed() -> None:
     assert raised.sum() == 13 * 13
 
 
-def test_covering_a_shape_fills_the_bed() -> None:
-    cells = laid(box(10, 10, 5), fit="cover")
-    assert cells.covered == BED.count
-
-
 def test_stretched_a_shape_fills_the_bed_to_its_corners_and_no_more() -> None:
     values = np.random.default_rng(3).uniform(0.0, 1.0, (13, 25))
     cells = laid(make_height_map("x.png", values), fit="stretch")
@@ -91,15 +86,17 @@ def test_scaled_to_the_stroke_the_highest_pin_is_at_its_end() -> None:
     assert cells.too_high == 0
 
 
-def test_a_true_relief_is_as_high_as_the_plan_makes_it() -> None:
-    # 10 mm become 39 mm, and so 5 mm become 19.5 mm.
-    assert table(laid(box(10, 10, 5), relief="true")).max() == 19.5
-
-
-def test_a_map_of_heights_is_true_in_meters_whatever_its_plan() -> None:
-    values = np.linspace(0.0, 7e-3, 12).reshape(3, 4)
-    cells = laid(make_height_map("x.npy", values, 1.0), relief="true", fit="stretch")
-    assert np.ptp(cells.heights) == pytest.approx(7e-3, abs=ROUNDING)
+@pytest.mark.parametrize(
+    ("what", "known", "high"),
+    [
+        (box(10, 10, 5), {}, 19.5),  # 10 mm become 39 mm, and so 5 mm become 19.5 mm
+        (make_height_map("x.npy", np.linspace(0.0, 7e-3, 12).reshape(3, 4), 1.0), {"fit": "stretch"}, 7.0),
+    ],
+)
+def test_a_true_relief_is_as_high_as_the_plan_or_its_own_unit_makes_it(
+    what: Any, known: dict[str, Any], high: float
+) -> None:
+    assert table(laid(what, relief="true", **known)).max() == pytest.approx(high, abs=ROUNDING * 1e3)
 
 
 def test_placed_a_shape_stands_where_its_coordinates_say() -> None:
@@ -137,14 +134,13 @@ def test_overhangs_are_told() -> None:
     )
 
 
-def test_a_level_picture_makes_a_level_bed() -> None:
-    assert np.all(laid(make_height_map("gray.png", np.full((4, 4), 99))).heights == REST)
-
-
+@pytest.mark.parametrize("fit", ["stretch", "cover"])
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
-def test_every_arrangement_is_covered_by_a_stretched_picture(arrangement: str) -> None:
+def test_a_bed_is_covered_by_a_stretched_picture(arrangement: str, fit: str) -> None:
     bed = make_grid(Layout(7, 9, 3e-3, arrangement))
-    assert laid(make_height_map("x.png", np.eye(4)), bed, fit="stretch").covered == bed.count
+    cells = laid(make_height_map("gray.png", np.full((4, 4), 99)), bed, fit=fit)
+    assert cells.covered == bed.count
+    assert np.all(cells.heights == REST)  # level as the picture
 
 
 PICTURE, ARRAY = make_height_map("x.png", np.eye(3)), make_height_map("x.npy", np.eye(3), 1.0)
@@ -171,11 +167,6 @@ def test_what_cannot_be_laid_onto_the_bed_is_refused(what: Any, known: dict[str,
     with pytest.raises(ParameterError) as caught:
         laid(what, **known)
     assert said in str(caught.value)
-
-
-def test_nothing_is_no_shape() -> None:
-    with pytest.raises(ParameterError, match=r"Shape\.file must be a sample shape's name.* \(got nothing\)"):
-        Shape(file="")
 
 
 # Heights as a text

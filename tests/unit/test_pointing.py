@@ -1,4 +1,4 @@
-"""A ray meets the pins where it should, and the patch is what the finger touches."""
+"""Rays onto pins, the patch that the fingertip touches, and lines over pins without spikes."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from digiclay.core.surface.pointing import (
     find_ray,
     intersect_surface,
 )
+from digiclay.press.drape import drape
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 DOWN = np.array([0.0, 0.0, -1.0])
-ARRANGEMENTS = ["aligned", "staggered", "hexagonal"]
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 
 def bed(arrangement: str = "aligned") -> tuple[Grid, np.ndarray]:
@@ -56,19 +57,21 @@ def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one
     assert longest <= 0.75e-3
 
 
-def test_a_ray_that_passes_by_meets_nothing() -> None:
-    cells, height = bed()
-    aside = np.array([1.0, 0.0, 1.0])
-    assert intersect_surface(cells, height, aside, DOWN) is None
-    assert intersect_surface(cells, height, np.array([0.0, 0.0, 1.0]), -DOWN) is None
-    assert intersect_surface(cells, height, np.array([-1.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])) is None
-
-
-@pytest.mark.parametrize("bad", [[0.0, 0.0, 0.0], [np.nan, 0.0, -1.0], [0.0, np.inf, -1.0]])
-def test_what_is_no_ray_meets_nothing(bad: list[float]) -> None:
-    cells, height = bed()
-    assert intersect_surface(cells, height, np.array([0.0, 0.0, 1.0]), np.array(bad)) is None
-    assert intersect_surface(cells, height, np.array(bad) * np.nan, DOWN) is None
+@pytest.mark.parametrize(
+    ("origin", "way"),
+    [
+        ([1.0, 0.0, 1.0], DOWN),  # they pass by
+        ([0.0, 0.0, 1.0], -DOWN),
+        ([-1.0, 0.0, 1.0], [1.0, 0.0, 0.0]),
+        ([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]),  # no rays
+        ([0.0, 0.0, 1.0], [np.nan, 0.0, -1.0]),
+        ([0.0, 0.0, 1.0], [0.0, np.inf, -1.0]),
+        ([np.nan, 0.0, np.nan], DOWN),
+        ([0.0, np.inf, 1.0], DOWN),
+    ],
+)
+def test_a_ray_that_passes_by_or_is_none_meets_nothing(origin: list[float], way: list[float]) -> None:
+    assert intersect_surface(*bed(), np.array(origin), np.array(way)) is None
 
 
 def test_a_ray_along_the_bed_meets_the_side_of_the_first_pin_that_stands_out() -> None:
@@ -138,14 +141,48 @@ def test_the_patch_never_leaves_the_finger(depth: float) -> None:
     np.testing.assert_allclose(radius, 1.0 if depth > 0.0 else 0.0, rtol=0, atol=1e-7)
 
 
-def test_a_finger_that_is_not_pressed_in_has_the_patch_of_its_lowest_point() -> None:
-    tilted = np.array([0.9, 0.3, -0.2, 0.25])
-    np.testing.assert_array_equal(
-        find_contact_outline(Fingertip(), tilted, -0.01), find_contact_outline(Fingertip(), tilted, 0.0)
-    )
+def ring(radius: float, count: int = 64) -> np.ndarray:
+    """Return a circle about the middle of the bed, m."""
+    turn = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    return radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
-def test_the_matrices_of_quaternions_turn_a_finger_about() -> None:
-    half = np.sqrt(0.5)
-    turned = make_matrices(np.array([[half, 0.0, 0.0, half]]))[0]
-    np.testing.assert_allclose(turned @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], rtol=0, atol=1e-15)
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_on_even_pins_the_line_is_even(arrangement: str) -> None:
+    cells = make_grid(Layout(rows=9, columns=9, arrangement=arrangement))
+    line = drape(cells, np.full(81, 0.04), ring(0.02))
+    # A mean of equal numbers, in some roundings.
+    np.testing.assert_allclose(line[:, 2], 0.04, rtol=1e-14, atol=0)
+
+
+def test_a_step_of_15_mm_between_neighbors_makes_no_spike() -> None:
+    cells = make_grid(Layout())
+    height = np.where(cells.x > 0.0, 0.055, 0.04)
+    places = ring(0.009)
+    apart = np.abs(np.diff(drape(cells, height, places)[:, 2], append=0.04)[:-1])
+    raw = np.abs(np.diff(height[cells.at(*places.T)]))
+    assert raw.max() == pytest.approx(0.015)
+    # The steepest part of a normal distribution of 3 mm over 15 mm: 0.4 * 15 / 3 = 2 mm a mm, and a place of
+    # the ring is 0.88 mm from the next one.
+    assert apart.max() < 2.0 * 0.88e-3 * 1.1
+
+
+def test_a_single_high_pin_raises_the_line_by_a_sixth_of_its_height() -> None:
+    cells = make_grid(Layout())
+    height = np.full(cells.count, 0.04)
+    height[cells.at(np.zeros(1), np.zeros(1))] += 0.012
+    # The weight of the middle of a normal distribution over squares of one standard deviation: 1 / (2 pi).
+    assert drape(cells, height, np.zeros((1, 2)))[0, 2] - 0.04 == pytest.approx(0.012 / (2 * np.pi), rel=0.02)
+
+
+@pytest.mark.parametrize("place", [(0.05, 0.0), (-1.0, 2.0), (1e3, -1e3)])
+def test_beyond_the_edge_the_line_has_the_height_of_the_edge(place: tuple[float, float]) -> None:
+    cells = make_grid(Layout())
+    height = np.full(cells.count, 0.04)
+    height[cells.at(np.zeros(1), np.zeros(1))] = 0.09
+    assert drape(cells, height, np.array([place]))[0, 2] == pytest.approx(0.04)
+
+
+def test_a_bed_of_one_pin_has_its_height_everywhere() -> None:
+    cells = make_grid(Layout(rows=1, columns=1))
+    assert (drape(cells, np.array([0.03]), ring(0.01))[:, 2] == 0.03).all()

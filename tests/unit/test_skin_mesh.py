@@ -1,11 +1,14 @@
-"""The skin over the pins and the solid under it, on beds small enough to reason about."""
+"""The skin over the pins, the solid under it and the stepped bed, on beds small enough to reason about."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.pins_solid import BRIDGE, make_parts, make_pins_solid
 from digiclay.core.surface.skin_mesh import (
     BASE_THICKNESS,
     find_base_level,
@@ -13,6 +16,8 @@ from digiclay.core.surface.skin_mesh import (
     make_skin,
     make_solid,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.prisms import prism_volume
 
@@ -57,15 +62,10 @@ def test_the_skin_passes_through_every_pin_top():
     assert set(faces[: 2 * 3 * 5].ravel()) == set(range(24))
 
 
-def test_by_default_the_base_lies_3_mm_under_the_lowest_pin_top():
-    vertices, _ = make_solid(pins(2, 2), [0.04, 0.03, 0.05, 0.06], 2, 2)
-    assert BASE_THICKNESS == 3e-3
-    np.testing.assert_allclose(vertices[4:, 2], 0.027, rtol=1e-12)  # rounding of one subtraction
-
-
-def test_the_base_can_be_the_floor_of_the_bed():
-    vertices, _ = make_solid(pins(2, 2), [0.04, 0.03, 0.05, 0.06], 2, 2, base=0.0)
-    assert np.all(vertices[4:, 2] == 0.0)
+@pytest.mark.parametrize(("base", "level"), [(None, 0.03 - BASE_THICKNESS), (0.0, 0.0)])
+def test_the_base_lies_under_the_lowest_pin_top_or_where_it_is_wanted(base, level):
+    vertices, _ = make_solid(pins(2, 2), [0.04, 0.03, 0.05, 0.06], 2, 2, base=base)
+    np.testing.assert_allclose(vertices[4:, 2], level, rtol=1e-12)  # rounding of one subtraction
 
 
 @pytest.mark.parametrize("corner", range(4))
@@ -94,16 +94,11 @@ def test_shifted_rows_are_joined_by_the_shorter_diagonal_whatever_the_heights():
     )  # half a pitch across and one along: 1.118 pitches; the longer one has 1.803
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_every_triangle_of_the_skin_faces_up(arrangement):
-    place = pins(5, 7, arrangement)
+def test_every_triangle_of_the_skin_faces_up_whichever_way_the_rows_run(arrangement, way):
+    place = pins(5, 7, arrangement) * (way, 1.0)
     a, b, c = (place[make_skin(place, np.linspace(0.0, 0.1, 35), 5, 7)[:, k]] for k in range(3))
-    assert np.all(turn(b - a, c - a) > 0.0)
-
-
-def test_rows_that_run_the_other_way_still_face_up():
-    place, height = pins(5, 7) * (-1.0, 1.0), np.linspace(0.0, 0.1, 35)
-    a, b, c = (place[make_skin(place, height, 5, 7)[:, k]] for k in range(3))
     assert np.all(turn(b - a, c - a) > 0.0)
 
 
@@ -137,31 +132,114 @@ def test_heights_that_are_not_finite_are_refused_by_cell(bad):
         make_solid(pins(3, 3), height, 3, 3)
 
 
-def test_positions_that_are_not_finite_are_refused_by_cell():
-    place = pins(3, 3)
-    place[4, 1] = np.nan
-    with pytest.raises(ParameterError, match=r"^Surface\.position must be finite \(got nan at cell 4\)\.$"):
-        make_solid(place, np.full(9, 0.04), 3, 3)
+BROKEN = np.where(np.arange(18).reshape(9, 2) == 9, np.nan, pins(3, 3))
 
 
-def test_heights_that_do_not_fit_the_bed_are_refused():
-    with pytest.raises(ParameterError, match=r"each of the 3 x 3 pins \(got 8 values at 9 positions\)\.$"):
-        make_solid(pins(3, 3), np.full(8, 0.04), 3, 3)
+@pytest.mark.parametrize(
+    ("place", "height", "said"),
+    [
+        (BROKEN, np.full(9, 0.04), r"^Surface\.position must be finite \(got nan at cell 4\)\.$"),
+        (pins(3, 3), np.full(8, 0.04), r"each of the 3 x 3 pins \(got 8 values at 9 positions\)\.$"),
+        (pins(3, 3)[[0, 1, 2, 6, 4, 5, 3, 7, 8]], np.full(9, 0.04), "must order the pins row by row"),
+    ],
+)
+def test_pins_that_carry_no_skin_are_refused(place, height, said):
+    with pytest.raises(ParameterError, match=said):
+        make_solid(place, height, 3, 3)
 
 
-def test_pins_out_of_order_are_refused():
-    place = pins(3, 3)[[0, 1, 2, 6, 4, 5, 3, 7, 8]]
-    with pytest.raises(ParameterError, match=r"must order the pins row by row"):
-        make_solid(place, np.full(9, 0.04), 3, 3)
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [("base", base, "below the lowest pin top at 40 mm") for base in (0.04, 0.05, np.nan)]
+    + [("base_thickness", bad, "above 0 mm") for bad in (0.0, -1e-3, np.nan, np.inf)],
+)
+def test_a_base_that_is_not_below_every_pin_is_refused(name, value, said):
+    with pytest.raises(ParameterError, match=rf"^Surface\.{name} must be {said}"):
+        find_base_level(np.array([0.05, 0.04]), **{name: value})
 
 
-@pytest.mark.parametrize("base", [0.04, 0.05, np.nan])
-def test_a_base_that_is_not_below_every_pin_is_refused(base):
+def formed(heights_mm, rows: int, columns: int, arrangement: str = "aligned") -> Formed:
+    place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
+    return Formed.of(place, np.asarray(heights_mm, float) * 1e-3, 0.04, 0.0, 0)
+
+
+@st.composite
+def beds(draw):
+    """Beds with steps of all kinds, many of them of equal height."""
+    layout = Layout(
+        rows=draw(st.integers(2, 9)),
+        columns=draw(st.integers(2, 9)),
+        arrangement=draw(st.sampled_from(ARRANGEMENTS)),
+    )
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    levels = draw(st.sampled_from([1, 2, 3, 5, 1000]))
+    height = 0.03 + 1e-3 * random.integers(0, levels, layout.rows * layout.columns)
+    turned = draw(st.sampled_from([(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]))
+    return Formed.of(make_grid(layout).positions * turned, height, 0.04, 0.0, 0)
+
+
+@given(beds())
+def test_every_edge_has_two_faces_and_all_face_outward(bed):
+    vertices, faces, _ = make_pins_solid(bed)
+    # Merged by place, as a reader of STL does it: so parts that only touch would be found.
+    mesh = trimesh.Trimesh(vertices, faces, process=True)
+    edges = np.sort(mesh.edges, axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    assert set(counts) == {2}
+    assert mesh.is_winding_consistent
+    assert mesh.volume > 0.0
+    assert mesh.body_count == 1
+    assert mesh.area_faces.min() > 0.0
+    assert len(np.unique(faces)) == len(vertices)
+    tops = np.column_stack([bed.position, bed.height])
+    np.testing.assert_allclose(vertices[: len(tops)], tops, rtol=0.0, atol=0.51e-7)  # in steps of 0.1 µm
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_a_bed_without_bridges_has_the_volume_of_its_prisms(arrangement):
+    layout = Layout(rows=4, columns=5, arrangement=arrangement)
+    heights = np.random.default_rng(2).integers(300, 600, 20) / 10.0
+    if arrangement == "aligned":
+        heights = np.arange(20.0) + 30.0  # a stair: no two corners are above both others
+    vertices, faces, _ = make_pins_solid(formed(heights, 4, 5, arrangement), base=0.01)
+    prisms = (heights * 1e-3 - 0.01).sum() * layout.pitch * layout.row_spacing
+    assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(prisms, rel=1e-12)
+
+
+def test_squares_that_meet_at_a_corner_are_joined_by_a_bridge():
+    bed = formed([50, 40, 40, 50], 2, 2)
+    made = make_parts(bed)
+    assert len(made.corner) == 10  # nine and one more: the middle is two
+    between = made.corner[np.abs(made.corner).max(axis=1) < 0.5e-3]
+    np.testing.assert_allclose(np.abs(between), BRIDGE * 3e-3, rtol=1e-9)
+    high = {0, 3}
+    met = made.twin >= 0
+    assert any({int(p), int(o)} == high for p, o in zip(made.pin[met], made.pin[made.twin[met]], strict=True))
+
+
+def test_the_parts_cover_the_bed_without_a_gap():
+    for arrangement in ARRANGEMENTS:
+        layout = Layout(rows=4, columns=5, arrangement=arrangement)
+        made = make_parts(formed(np.full(20, 40.0), 4, 5, arrangement))
+        a, b = made.corner[made.start], made.corner[made.end]
+        area = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        each = np.bincount(made.pin, area)
+        np.testing.assert_allclose(each, layout.pitch * layout.row_spacing, rtol=1e-9)
+        outer = made.twin < 0
+        assert area[outer].sum() == pytest.approx(each.sum(), rel=1e-9)
+
+
+def test_the_base_is_3_mm_under_the_lowest_pin_unless_told_otherwise():
+    bed = formed([40, 45, 50, 55], 2, 2)
+    assert make_pins_solid(bed)[0][:, 2].min() == pytest.approx(0.037, abs=1e-15)
+    assert make_pins_solid(bed, base_thickness=0.01)[0][:, 2].min() == pytest.approx(0.03, abs=1e-15)
     with pytest.raises(ParameterError, match=r"^Surface\.base must be below the lowest pin top at 40 mm"):
-        find_base_level(np.array([0.05, 0.04]), base=base)
+        make_pins_solid(bed, base=0.04)
 
 
-@pytest.mark.parametrize("thickness", [0.0, -1e-3, np.nan, np.inf])
-def test_a_base_without_thickness_is_refused(thickness):
-    with pytest.raises(ParameterError, match=r"^Surface\.base_thickness must be above 0 mm"):
-        find_base_level(np.array([0.04]), base_thickness=thickness)
+def test_differences_no_file_can_hold_make_no_wall():
+    heights = 40.0 + np.array([0.0, 1e-6, 2e-5, 0.0, 5.0, 5.0])
+    vertices, faces, _ = make_pins_solid(formed(heights, 2, 3))
+    corners = vertices[faces].astype(np.float32)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    assert area.min() > 1e-8  # m²; a wall of the least step would have 3e-10

@@ -55,10 +55,6 @@ def test_every_sample_shape_has_a_note_of_its_origin() -> None:
     assert [name for name in list_shapes() if f"| `{find_shape(name).name}` |" not in notes] == []
 
 
-def test_the_sample_shapes_are_small() -> None:
-    assert sum(path.stat().st_size for path in SAMPLES.iterdir()) < 1e6
-
-
 @pytest.mark.parametrize("name", list_shapes())
 def test_every_sample_shape_fits_a_bed_without_clipping(name: str) -> None:
     laid = fit_shape(Shape(file=name), make_grid(Layout()), Actuator())
@@ -170,11 +166,6 @@ def test_a_scene_finds_its_shape_beside_itself(tmp_path: Path) -> None:
     scene = load(tmp_path / "my.toml")
     assert scene.shape
     assert Path(scene.shape.file) == (tmp_path / "Formen" / "größe 1.npy").resolve()
-
-
-def test_a_scene_names_no_shape_unless_asked(tmp_path: Path) -> None:
-    (tmp_path / "my.toml").write_text("", encoding="utf-8")
-    assert load(tmp_path / "my.toml").shape is None
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,10 @@ Flags = NDArray[np.bool_]
 Modes = NDArray[np.int8]
 #: Numbers of cells.
 Cells = NDArray[np.intp]
+#: Numbers of points, or places in a table.
+Indices = NDArray[np.int64]
+#: Corners of triangles (f, 3), numbers of vertices.
+Faces = NDArray[np.int32]
 
 #: Shapes for which one set of `Constants` is kept.
 MOST_SHAPES = 64

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats, Indices
 from ..base.errors import OutputError, ParameterError
 from ..base.quantity import Parameters, quantity
 from ..surface.features import Feature, Finding, find
-from ..surface.formed import NO_PIN, Body, Formed, Indices
+from ..surface.formed import NO_PIN, Body, Formed
 from ..surface.pins_solid import make_pins_solid
 from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
 from ..surface.skins import SKINS, SurfaceGrid, fit_skin
@@ -89,7 +88,7 @@ def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) ->
     return [_skin(skin, model, names, label)]
 
 
-def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Faces) -> Body:
     """Return the skin, or the solid under it; a triangle is in the feature any of its corners is in."""
     if model.kind == "surface":
         vertices, faces = np.column_stack([grid.position, grid.height]), grid.faces
@@ -108,7 +107,7 @@ def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Indice
     return Body("clay", vertices, faces, values, names, group, vertex_group, closed)
 
 
-def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Faces) -> Body:
     """Return the stepped bed; walls and undersides are in the feature of their pin."""
     vertices, faces, pin = make_pins_solid(formed, base_thickness=model.base_thickness)
     owner = np.full(len(vertices), NO_PIN)
@@ -128,7 +127,7 @@ def _feature(formed: Formed, feature: Feature) -> Body:
     return replace(body, values=_of_pins(formed, body.vertices, nearest))
 
 
-def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict[str, Floats]:
+def _of_pins(formed: Formed, vertices: Floats, owner: Indices) -> dict[str, Floats]:
     """Return height, force and mode at vertices that belong to a pin each, or to none."""
     pinned = owner >= 0
     return {

@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Indices
 from ..base.errors import ParameterError
 from .mesh_limits import (
     IDENTITY,
@@ -29,8 +29,6 @@ from .mesh_limits import (
     refuse_many_triangles,
     refuse_size,
 )
-
-Indices = NDArray[np.int64]
 
 INSIDE = "must have its vertices in the file, or in a file in its own folder"
 #: Kinds of numbers, and how many of them an item has.

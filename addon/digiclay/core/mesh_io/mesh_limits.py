@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Indices
 from ..base.errors import ParameterError
 
 #: Most triangles of a mesh: as many as a bed may have cells. They take some 5 GB while they are laid onto it.
@@ -126,8 +125,6 @@ def check_off(data: bytes, name: str) -> None:
     if there < vertices + faces:
         raise make_refusal(WHOLE, name, f"{there:,} of its {vertices + faces:,} lines")
 
-
-Indices = NDArray[np.int64]
 
 #: A placement (4, 3): (x, y, z, 1) times it gives the place. This one leaves all where it is.
 IDENTITY: Floats = np.vstack([np.eye(3), np.zeros(3)])

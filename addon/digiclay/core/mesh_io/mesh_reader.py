@@ -11,15 +11,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Indices
 from ..base.errors import ParameterError
 from . import gltf_reader, obj_reader, threemf_reader
 from .mesh_limits import check_off, check_ply, check_stl, refuse_size, stl_is_text
 from .obj_reader import find_axes, make_axes
-
-Indices = NDArray[np.int64]
 
 #: Meshes by extension.
 MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off", ".3mf")

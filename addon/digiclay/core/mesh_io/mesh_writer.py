@@ -13,10 +13,10 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats
 from ..base.errors import OutputError, ParameterError
 from ..files.run_folder import open_whole
-from ..surface.formed import NO_PIN, Body, Indices, split_pieces
+from ..surface.formed import NO_PIN, Body, split_pieces
 from .obj_reader import UP, find_forward, make_axes
 
 #: One triangle of a binary file.
@@ -128,7 +128,7 @@ def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = U
         first += len(body.vertices)
 
 
-def _faces(file: BinaryIO, faces: Indices, first: int) -> None:
+def _faces(file: BinaryIO, faces: Faces, first: int) -> None:
     """Write triangles whose vertex 0 is number `first` of the file."""
     for some in split_pieces(len(faces)):
         block = faces[some].astype(np.int64) + first

@@ -7,9 +7,8 @@ from array import array
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Indices
 from ..base.errors import ParameterError
 from .mesh_limits import CORNERS, make_refusal, refuse_many_triangles
 
@@ -45,8 +44,6 @@ def find_axes(data: bytes) -> tuple[str, str]:
     comment = COMMENT.search(data[:HEAD])
     return (comment[1].decode(), (comment[2] or b"").decode()) if comment else (UP, "")
 
-
-Indices = NDArray[np.int64]
 
 CUT = "must end with a whole line: the file is cut off"
 #: Bytes that are worked on at a time.

@@ -16,9 +16,8 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Indices
 from ..files.formats import BROKEN_ZIP
 from .mesh_limits import (
     IDENTITY,
@@ -29,7 +28,6 @@ from .mesh_limits import (
     refuse_size,
 )
 
-Indices = NDArray[np.int64]
 #: Part and number of an object.
 Key = tuple[str, str]
 #: An object, and its placement (4, 3).

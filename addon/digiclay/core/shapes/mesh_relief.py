@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Cells, Flags, Floats
+from ..base.arrays import Cells, Flags, Floats, Indices
 from ..mesh_io.mesh_limits import CORNERS, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from ..surface.regions import label_components
@@ -58,7 +58,6 @@ def _evened(value: Floats, hole: Flags, beside: Cells) -> Floats:
     return filled
 
 
-Indices = NDArray[np.int64]
 #: Pairs of a ray and a triangle that are worked on at a time.
 CHUNK = 2_000_000
 #: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to

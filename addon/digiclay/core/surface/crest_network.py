@@ -14,10 +14,8 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Indices
 from .regions import label_components
-
-Pins = NDArray[np.int64]
 
 #: From so many half widths to so many from a junction a branch shows where it goes.
 SHOWS = (1.0, 3.0)
@@ -66,7 +64,7 @@ class Network:
         return np.asarray((stop - start) / max(float(np.hypot(*(stop - start))), 1e-12))
 
 
-def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Network:
+def read_network(beside: Indices, pins: Indices, position: Floats, half: Floats) -> Network:
     """Return the network of a skeleton: pins with three neighbors or more are junctions."""
     wide = dict(zip(pins.tolist(), half.tolist(), strict=True))
     around = _neighbors(beside, pins)
@@ -110,7 +108,7 @@ def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Ne
     return network
 
 
-def _neighbors(beside: Pins, pins: Pins) -> dict[int, list[int]]:
+def _neighbors(beside: Indices, pins: Indices) -> dict[int, list[int]]:
     """Return for each pin of a skeleton those it is joined to: corners only where no side leads there."""
     there = np.isin(beside[pins], pins)
     if there.shape[1] == 8:
@@ -178,7 +176,12 @@ class Chain:
 
 
 def find_chains(
-    beside: Pins, pins: Pins, position: Floats, half: Floats, pitch: float, off: Callable[[Floats], Floats]
+    beside: Indices,
+    pins: Indices,
+    position: Floats,
+    half: Floats,
+    pitch: float,
+    off: Callable[[Floats], Floats],
 ) -> list[Chain]:
     """Return the lines of a skeleton's pins (s,); `half` (s,), m, is half the feature's width there."""
     network = read_network(beside, pins, position, half)

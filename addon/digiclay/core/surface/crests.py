@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Indices
 from .crest_network import SADDLE, Chain, find_chains, find_stretch, measure_run, place_along, reaches_out
 from .formed import Lattice, measure_distance
 from .skeleton import find_skeleton, measure_half_width
@@ -290,8 +289,6 @@ def smooth(line: Floats, times: int, closed: bool) -> Floats:
     return line
 
 
-Pins = NDArray[np.int64]
-
 #: Where a line is too low for more half widths than so many, there is a ridge between two mounds.
 NOTCH = 1.5
 
@@ -344,7 +341,9 @@ class Ridge(NamedTuple):
     half: float
 
 
-def find_ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: float) -> tuple[Ridge, ...]:
+def find_ridges(
+    lattice: Lattice, pins: Indices, off: Floats, height: Floats, least: float
+) -> tuple[Ridge, ...]:
     """Return the ridges and mounds of a feature that are parted by saddles, with their crests."""
     own = np.zeros(len(off))
     own[pins] = off[pins]

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats, Indices
 from ..base.quantity import Parameters, quantity
 from .crest_network import find_stretch, measure_run
 from .crests import Crest, Ridge, find_ridges
@@ -151,9 +150,6 @@ def _line(run: Floats, off: Floats, closed: bool) -> Floats | None:
     return np.asarray(height[i[best]] + slope[best] * (run - at[i[best]]))
 
 
-Indices = NDArray[np.int32]
-
-
 @dataclass(frozen=True)
 class Finding(Parameters):
     """Criteria of a feature."""
@@ -200,7 +196,7 @@ class Feature:
 
     kind: str
     number: int
-    pins: NDArray[np.int64]
+    pins: Indices
     region: Region
     apart: Region
     extreme: float
@@ -289,8 +285,8 @@ def _of_kind(
 
 
 def _shared_out(
-    grid: SurfaceGrid, every: list[FeaturePart], pins: NDArray[np.int64], region: Region, smallest: int
-) -> Iterator[tuple[FeaturePart, NDArray[np.int64], Region, Region]]:
+    grid: SurfaceGrid, every: list[FeaturePart], pins: Indices, region: Region, smallest: int
+) -> Iterator[tuple[FeaturePart, Indices, Region, Region]]:
     """Give each part with pins enough its pins, its piece of a region, and this apart from the others."""
     place = grid.formed.position[pins]
     while len(every) > 1:
@@ -317,7 +313,7 @@ def _nearer(region: Region, every: list[FeaturePart]) -> Floats:
     return np.asarray(away[:-1].min(axis=0) - away[-1])
 
 
-def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
+def _by_label(label: Faces) -> dict[int, Indices]:
     """Return for each label from 0 on where it stands, ascending."""
     order = np.argsort(label, kind="stable")
     names, starts, counts = np.unique(label[order], return_index=True, return_counts=True)

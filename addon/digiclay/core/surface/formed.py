@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats, Indices
 from ..base.errors import OutputError, ParameterError
 from ..model.layout import find_neighbors
 from .skin_mesh import check_heights, find_grid_shape
@@ -45,7 +45,7 @@ class Formed:
     height: Floats
     former: Floats
     force: Floats
-    mode: NDArray[np.int64]
+    mode: Indices
     rows: int
     columns: int
 
@@ -78,7 +78,7 @@ class Formed:
         """Distance between rows, m."""
         return float(abs(self.position[self.columns, 1] - self.position[0, 1]))
 
-    def nearest(self, place: Floats) -> NDArray[np.int64]:
+    def nearest(self, place: Floats) -> Indices:
         """Return the pin in the nearest row that is nearest to each of some places, m, shape (k, 2)."""
         across = self.position[self.columns, 1] - self.position[0, 1]
         along = self.position[1, 0] - self.position[0, 0]
@@ -106,8 +106,6 @@ def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | flo
     return Formed.of(history["position"], history["height"][row], before, *arrays)
 
 
-Pins = NDArray[np.int64]
-
 #: Steps a pitch with which a distance is looked for.
 STEPS = 2
 #: Pairs of a place and a step that are looked at at once.
@@ -125,7 +123,7 @@ class Lattice:
     """
 
     formed: Formed
-    neighbor: Pins
+    neighbor: Indices
 
     @classmethod
     def of(cls, formed: Formed) -> Lattice:
@@ -185,8 +183,6 @@ def measure_distance(
     return distance
 
 
-Indices = NDArray[np.int32]
-
 #: Code of the mode at a vertex that belongs to no pin, such as one of the base.
 NO_PIN = -1
 #: Triangles, or vertices, that are worked on at once: a few MB, however large the body.
@@ -219,11 +215,11 @@ class Body:
 
     name: str
     vertices: Floats
-    faces: Indices
+    faces: Faces
     values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
-    group: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
-    vertex_group: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+    group: Faces = field(default_factory=lambda: np.empty(0, np.int32))
+    vertex_group: Faces = field(default_factory=lambda: np.empty(0, np.int32))
     closed: bool = True
 
 

@@ -11,15 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats, Indices
 from ..model.layout import list_steps
 from .formed import Formed
 from .skin_mesh import BASE_THICKNESS, find_base_level, take_corners
-
-Indices = NDArray[np.int32]
-Codes = NDArray[np.int64]
 
 #: Half the width of a bridge, in pitches along x and rows along y.
 BRIDGE = 0.05
@@ -45,10 +41,10 @@ class Parts:
     """
 
     corner: Floats
-    start: Codes
-    end: Codes
-    pin: Codes
-    twin: Codes
+    start: Indices
+    end: Indices
+    pin: Indices
+    twin: Indices
 
 
 def make_parts(formed: Formed) -> Parts:
@@ -70,7 +66,7 @@ def make_parts(formed: Formed) -> Parts:
 
 def make_pins_solid(
     formed: Formed, base: float | None = None, base_thickness: float = BASE_THICKNESS
-) -> tuple[Floats, Indices, Codes]:
+) -> tuple[Floats, Faces, Indices]:
     """Return vertices (v, 3), m, first the middles of tops, faces (f, 3) and their pins of the closed bed."""
     level = find_base_level(formed.height, base=base, base_thickness=base_thickness)
     steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
@@ -93,7 +89,7 @@ def make_pins_solid(
     return vertices, np.concatenate([top, bottom, walls]), np.concatenate([made.pin, made.pin, whose])
 
 
-def _following(pin: Codes) -> Codes:
+def _following(pin: Indices) -> Indices:
     """Return for each side the next one of its part."""
     following = np.arange(1, len(pin) + 1)
     last = np.flatnonzero(np.diff(pin, append=-1) != 0)
@@ -101,7 +97,9 @@ def _following(pin: Codes) -> Codes:
     return following
 
 
-def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -> tuple[Indices, Codes]:
+def _walls(
+    made: Parts, steps: Indices, own: Indices, ahead: Indices, ground: Indices
+) -> tuple[Faces, Indices]:
     """Return the triangles of the walls a part has above its neighbors, and their pins."""
     # The vertices of a corner are numbered in the order of their heights: a wall uses consecutive ones.
     other = np.where(made.twin >= 0, steps[made.pin[made.twin]], 0)
@@ -117,14 +115,14 @@ def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -
     return np.concatenate([one, two]), made.pin[side][np.concatenate([i, j])]
 
 
-def _counted(counts: Codes) -> tuple[Codes, Codes]:
+def _counted(counts: Indices) -> tuple[Indices, Indices]:
     """Return each index repeated by its count, and the number of the repetition."""
     index = np.repeat(np.arange(len(counts)), counts)
     first = np.cumsum(counts) - counts
     return index, np.arange(len(index)) - first[index]
 
 
-def _squares(formed: Formed) -> tuple[Floats, Codes]:
+def _squares(formed: Formed) -> tuple[Floats, Indices]:
     """Return corners and loops of an aligned bed: where four parts meet are two corners, mostly the same."""
     rows, columns = formed.rows, formed.columns
     place = formed.position.reshape(rows, columns, 2)
@@ -158,7 +156,7 @@ def _squares(formed: Formed) -> tuple[Floats, Codes]:
     return corners, loops if step_x * step_y > 0.0 else loops[:, ::-1]
 
 
-def _hexagons(formed: Formed) -> tuple[Floats, Codes]:
+def _hexagons(formed: Formed) -> tuple[Floats, Indices]:
     """Return corners and loops of a bed whose rows are shifted by half a pitch."""
     rows, columns = formed.rows, formed.columns
     pitch = formed.position[1, 0] - formed.position[0, 0]

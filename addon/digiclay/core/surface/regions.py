@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats
 from .skin_mesh import measure_areas
-
-Indices = NDArray[np.int32]
 
 #: The contour keeps this share of an edge away from both its ends, so that no triangle is without area.
 #: At a pitch of 3 mm it is 3 µm.
@@ -36,7 +33,7 @@ class Region:
     position: Floats
     former: Floats
     off: Floats
-    faces: Indices
+    faces: Faces
 
     @property
     def _plan(self) -> Floats:
@@ -53,14 +50,14 @@ class Region:
         """Volume between the skin now and before, m³."""
         return float(self._plan @ self.off[self.faces].mean(axis=1))
 
-    def outline(self) -> Indices:
+    def outline(self) -> Faces:
         """Return the edges that bound the region, shape (e, 2), its inside to their left."""
         edges = self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
         there, back = edges @ [len(self.position), 1], edges @ [1, len(self.position)]
         return edges[~np.isin(there, back)].astype(np.int32)
 
 
-def label_components(count: int, edges: Indices) -> Indices:
+def label_components(count: int, edges: Faces) -> Faces:
     """Return for each of `count` points the least point it is joined to by edges, shape (e, 2)."""
     label = np.arange(count, dtype=np.int32)
     while True:
@@ -72,7 +69,7 @@ def label_components(count: int, edges: Indices) -> Indices:
             label = label[label]
 
 
-def cut(position: Floats, former: Floats, off: Floats, faces: Indices, threshold: float) -> Region:
+def cut(position: Floats, former: Floats, off: Floats, faces: Faces, threshold: float) -> Region:
     """Return what of some triangles lies where `off` is above the threshold."""
     values, pieces, whole = _clipped(np.column_stack([position, former, off]), faces, off, threshold)
     values[whole:, 3] = threshold
@@ -92,7 +89,7 @@ def divide(region: Region, nearer: Floats, gap: float = 0.0) -> tuple[Region | N
     return parts[0], parts[1]
 
 
-def _clipped(values: Floats, faces: Indices, by: Floats, level: float) -> tuple[Floats, Indices, int]:
+def _clipped(values: Floats, faces: Faces, by: Floats, level: float) -> tuple[Floats, Faces, int]:
     """Return points and faces where a value is above a level, and how many of the points are corners."""
     inside = by > level
     count = inside[faces].sum(axis=1)

@@ -14,12 +14,10 @@ import heapq
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Flags, Floats
+from ..base.arrays import Flags, Floats, Indices
 from ..model.layout import SQUARE
 
-Pins = NDArray[np.int64]
 #: A hollow is a hole when it is deeper than this share of the lowest way out of it.
 DEEP = 0.25
 #: The end of a line stays when it is higher than this share of the pin it hangs on.
@@ -28,7 +26,7 @@ END = 0.5
 AHEAD = 1.25
 
 
-def measure_half_width(beside: Pins, on_bed: Flags) -> int:
+def measure_half_width(beside: Indices, on_bed: Flags) -> int:
     """Return how many rings of pins can be removed from a feature, one at least."""
     inner, count = np.ones(len(beside), bool), 0
     while inner.any():
@@ -40,7 +38,7 @@ def measure_half_width(beside: Pins, on_bed: Flags) -> int:
     return max(1, count)
 
 
-def average_neighbors(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
+def average_neighbors(beside: Indices, on_bed: Flags, off: Floats, times: int) -> Floats:
     """Return heights averaged with those of the neighbors, the ground's included, some times."""
     count = on_bed.sum(axis=1)
     for _ in range(times):
@@ -49,7 +47,7 @@ def average_neighbors(beside: Pins, on_bed: Flags, off: Floats, times: int) -> F
     return off
 
 
-def find_skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
+def find_skeleton(beside: Indices, on_bed: Flags, off: Floats) -> Indices:
     """Return the pins along the top of a feature, ascending; one at least."""
     # A flat top gets its crest in the middle when it is rounded over its own half width.
     top = average_neighbors(beside, on_bed, off, measure_half_width(beside, on_bed))
@@ -58,7 +56,7 @@ def find_skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
     return _thinned(beside, top, holes)
 
 
-def _hollows(beside: Pins, on_bed: Flags, off: Floats) -> list[int]:
+def _hollows(beside: Indices, on_bed: Flags, off: Floats) -> list[int]:
     """Return the lowest pin of each hollow that is deep enough, by filling them up."""
     inside = np.all((beside >= 0) | ~on_bed, axis=1)
     lower = np.any((beside >= 0) & (off[beside] < off[:, None]), axis=1)
@@ -95,7 +93,7 @@ def _hollows(beside: Pins, on_bed: Flags, off: Floats) -> list[int]:
     return holes
 
 
-def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
+def _thinned(beside: Indices, top: Floats, holes: list[int]) -> Indices:
     """Take pins off, the lowest first."""
     count, ways = beside.shape
     simple, ends = (_SIMPLE[ways], _ENDS[ways])

@@ -20,10 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats
 from ..base.errors import ParameterError
-
-Indices = NDArray[np.int32]
 
 #: Material left under the lowest pin top unless a base is asked for, m. Enough for a
 #: printed part to hold together, without 40 mm of plastic down to the bed's floor.
@@ -49,7 +47,7 @@ def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
     return len(place) // columns, columns
 
 
-def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Indices:
+def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Faces:
     """Return the triangles (f, 3) over pin tops (n,) at positions (n, 2), m, counter-clockwise from above."""
     place, top = check_heights(position, height, rows, columns)
     index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
@@ -65,7 +63,7 @@ def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -
     return faces.reshape(-1, 3)
 
 
-def _triangles(place: Floats, top: Floats, index: Indices) -> Indices:
+def _triangles(place: Floats, top: Floats, index: Faces) -> Faces:
     """Return the triangles between some rows of pins, two for every four of them."""
     # The corners of each cell, around it: a and c are the ends of one diagonal, b and d of the other.
     a, b, c, d = (part.ravel() for part in take_corners(index))
@@ -81,7 +79,7 @@ def make_solid(
     *,
     base: float | None = None,
     base_thickness: float = BASE_THICKNESS,
-) -> tuple[Floats, Indices]:
+) -> tuple[Floats, Faces]:
     """Return vertices (2 n, 3), m, tops first, and faces of the solid over a base: skin, base, walls."""
     place, top = check_heights(position, height, rows, columns)
     level = find_base_level(top, base=base, base_thickness=base_thickness)
@@ -150,7 +148,7 @@ def _first_bad(values: Floats) -> str:
     return f"{values[cell]} at cell {cell}"
 
 
-def _cut_along_ac(place: Floats, top: Floats, *corners: Indices) -> NDArray[np.bool_]:
+def _cut_along_ac(place: Floats, top: Floats, *corners: Faces) -> NDArray[np.bool_]:
     """Return the cells of the skin that are cut from a to c, and not from b to d (rules above)."""
     a, b, c, d = corners
     ac, bd = (np.sum((place[i] - place[j]) ** 2, axis=1) for i, j in ((a, c), (b, d)))
@@ -159,7 +157,7 @@ def _cut_along_ac(place: Floats, top: Floats, *corners: Indices) -> NDArray[np.b
     return np.where(np.abs(ac - bd) <= SAME_LENGTH * (ac + bd), by_height, ac < bd)
 
 
-def measure_areas(place: Floats, faces: Indices) -> Floats:
+def measure_areas(place: Floats, faces: Faces) -> Floats:
     """Return the area of each triangle seen from above, m²; negative when it runs clockwise."""
     a, b, c = (place[faces[:, corner]] for corner in range(3))
     return np.asarray(0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]))
@@ -170,6 +168,6 @@ def take_corners(table: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArr
     return table[:-1, :-1], table[:-1, 1:], table[1:, 1:], table[1:, :-1]
 
 
-def take_outline(table: Indices) -> Indices:
+def take_outline(table: Faces) -> Faces:
     """Return the outer values: along the first row, up the last column, back, and down the first."""
     return np.concatenate([table[0, :-1], table[:-1, -1], table[-1, :0:-1], table[:0:-1, 0]])

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Faces, Floats
 from ..base.spline import interpolate_monotone
 from .formed import NO_PIN, Formed
 from .skin_mesh import make_skin
@@ -80,7 +80,7 @@ def _laid(
 class _Stiffness:
     """The cotangent Laplacian of a flat triangle mesh, applied to heights."""
 
-    def __init__(self, position: Floats, faces: NDArray[np.int32]) -> None:
+    def __init__(self, position: Floats, faces: Faces) -> None:
         starts, ends, weights = [], [], []
         for corner in range(3):
             tip, start, end = (faces[:, (corner + k) % 3] for k in range(3))
@@ -135,7 +135,7 @@ def interpolate_skin(formed: Formed, height: Floats, skin: str, parts: int, cap:
     return relax_membrane(formed, place_points(formed, parts), straight, parts, cap).ravel()
 
 
-def find_nearest_pin(formed: Formed, parts: int) -> NDArray[np.int32]:
+def find_nearest_pin(formed: Formed, parts: int) -> Faces:
     """Return the pin whose row and column each point of a skin is nearest to, row by row."""
     row, column = (
         (np.arange((count - 1) * parts + 1) + parts // 2) // parts for count in (formed.rows, formed.columns)
@@ -211,9 +211,6 @@ def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) ->
     return fine
 
 
-Indices = NDArray[np.int32]
-
-
 @dataclass(frozen=True, eq=False)
 class SurfaceGrid:
     """Points of a skin, row by row.
@@ -241,7 +238,7 @@ class SurfaceGrid:
     columns: int
 
     @cached_property
-    def faces(self) -> Indices:
+    def faces(self) -> Faces:
         """Triangles of the skin, counter-clockwise seen from above."""
         return make_skin(self.position, self.height, self.rows, self.columns)
 
@@ -251,7 +248,7 @@ class SurfaceGrid:
         return self.height - self.former
 
     @property
-    def pins(self) -> Indices:
+    def pins(self) -> Faces:
         """Which point each pin top is, shape (n,)."""
         index = np.arange(self.rows * self.columns, dtype=np.int32).reshape(self.rows, self.columns)
         return index[:: self.parts, :: self.parts].ravel()
