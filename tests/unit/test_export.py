@@ -1,4 +1,4 @@
-"""Mesh files: what was written is what other readers find; exports that cannot be leave nothing half-written."""
+"""Mesh files: what was written is what other readers find; a failed export leaves nothing half-written."""
 
 from __future__ import annotations
 

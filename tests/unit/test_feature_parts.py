@@ -1,14 +1,9 @@
-"""What a person would call a ridge, a mound, a ring, a crossing: shapes with known answers.
-
-With DIGICLAY_PICTURES=DIR pictures of all shapes, with the lines that are found, are written there.
-"""
+"""What a person would call a ridge, a mound, a ring, a crossing: shapes with known answers."""
 
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -193,7 +188,6 @@ def find_faults(name: str, found: list[Feature], slack: float = 0.0) -> list[str
 def test_a_shape_is_found_as_what_it_is(name: str, arrangement: str, pitch: float) -> None:
     bed = formed(name, arrangement, pitch)
     found = find(fit_skin(bed, "bilinear", 1, 1e-3))
-    draw(name, arrangement, pitch, bed, found)
     # The crest of a ridge that runs to the edge ends at the outermost pins, up to a pitch inside it.
     assert not find_faults(name, found, pitch if name == "ridge to the edge" else 0.0)
 
@@ -250,25 +244,3 @@ def test_a_mound_on_a_ridge_is_as_high_as_it_is_and_the_ridge_no_higher_than_its
     assert height["ridge"] < 16.0
     (crest,) = next(one.crests for one in found if one.form == "ridge")
     assert np.ptp(crest[:, 2]) < 1e-3  # it goes on under the mound, level
-
-
-def draw(name: str, arrangement: str, pitch: float, bed: Formed, found: list[Feature]) -> None:
-    """Write a picture of a shape, if asked for."""
-    folder = os.environ.get("DIGICLAY_PICTURES")
-    if not folder:
-        return
-    from digiclay.plots.figure import empty, save
-
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    with empty(4.0, 4.4) as figure:
-        axes = figure.add_axes((0.0, 0.0, 1.0, 0.9))
-        x, y = bed.position.T * 1e3
-        axes.tricontourf(x, y, bed.raised * 1e3, levels=20, cmap="Grays_r")
-        for number, one in enumerate(found):
-            axes.plot(*(bed.position[one.pins].T * 1e3), ".", color=f"C{number}", markersize=2)
-            for crest in one.crests:
-                axes.plot(*(crest[:, :2].T * 1e3), color=f"C{number + 1}")
-        axes.set(aspect="equal")
-        axes.set_axis_off()
-        axes.set_title(f"{name}\n" + ", ".join(one.form for one in found), fontsize=9)
-        save(figure, Path(folder) / f"{name} {arrangement} {pitch}.png".replace(" ", "_"))

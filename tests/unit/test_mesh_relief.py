@@ -188,15 +188,10 @@ def scan(*holes: tuple[float, float, float], size: float = 60.0) -> trimesh.Trim
     return trimesh.Trimesh(np.column_stack([x, y, ground(x, y)]), faces, process=False)
 
 
-def scanned(mesh: trimesh.Trimesh) -> ShapeMesh:
-    """Return a mesh of trimesh's as a scanned."""
-    return make_shape_mesh("scan.stl", mesh.vertices, mesh.faces, "z", 1e-3)
-
-
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_hole_of_a_scan_is_as_high_as_what_is_around_it(arrangement: str) -> None:
     bed = make_grid(Layout(25, 25, 3e-3, arrangement))
-    found = scanned(scan((5.0, -8.0, 5.0), (-20.0, 14.0, 2.5))).tops(bed, IN_PLACE)
+    found = shape(scan((5.0, -8.0, 5.0), (-20.0, 14.0, 2.5))).tops(bed, IN_PLACE)
     assert found.covered.all()
     assert not found.overhang.any()
     missed = np.count_nonzero(np.hypot(bed.x * 1e3 - 5.0, bed.y * 1e3 + 8.0) < 4.0)
@@ -210,7 +205,7 @@ def test_a_hole_in_the_top_of_a_solid_is_filled_though_its_inside_is_seen_throug
     plate = trimesh.creation.box((80.0, 80.0, 2.0))
     lower = plate.submesh([np.flatnonzero(plate.face_normals[:, 2] < 0.5)], append=True)
     bed = make_grid(Layout(25, 25, 3e-3))
-    found = scanned(trimesh.util.concatenate([top, lower])).tops(bed, IN_PLACE)
+    found = shape(trimesh.util.concatenate([top, lower])).tops(bed, IN_PLACE)
     assert found.filled > 5
     assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.1
 
@@ -236,7 +231,7 @@ def turned(share: float) -> trimesh.Trimesh:
 )
 def test_what_is_no_small_hole_stays_as_it_is(mesh: trimesh.Trimesh, bare: Any) -> None:
     bed = make_grid(Layout(25, 25, 3e-3))
-    found = scanned(mesh).tops(bed, IN_PLACE)
+    found = shape(mesh).tops(bed, IN_PLACE)
     assert found.filled == 0
     assert not found.covered[bare(bed.x * 1e3, bed.y * 1e3)].any()
     if len(mesh.faces) == 28_800:  # the whole ground

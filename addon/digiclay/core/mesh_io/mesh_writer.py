@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, BinaryIO
@@ -116,9 +116,8 @@ def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = U
     first = 1
     for body in bodies:
         file.write(f"o {body.name}\n".encode())
-        for some in split_pieces(len(body.vertices)):
-            block = body.vertices[some] @ (axes * factor)
-            file.write(((line * len(block)) % tuple(block.ravel().tolist())).encode())
+        pieces = split_pieces(len(body.vertices))
+        _write_rows(file, line, (body.vertices[some] @ (axes * factor) for some in pieces))
         if body.groups:
             for number, name in enumerate(("rest", *body.groups)):
                 file.write(f"g {name}\n".encode())
@@ -130,9 +129,14 @@ def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = U
 
 def _faces(file: BinaryIO, faces: Faces, first: int) -> None:
     """Write triangles whose vertex 0 is number `first` of the file."""
-    for some in split_pieces(len(faces)):
-        block = faces[some].astype(np.int64) + first
-        file.write((("f %d %d %d\n" * len(block)) % tuple(block.ravel().tolist())).encode())
+    pieces = split_pieces(len(faces))
+    _write_rows(file, "f %d %d %d\n", (faces[some].astype(np.int64) + first for some in pieces))
+
+
+def _write_rows(file: BinaryIO | IO[bytes], line: str, pieces: Iterable[NDArray[Any]]) -> None:
+    """Write each row of some tables as a line of text."""
+    for rows in pieces:
+        file.write(((line * len(rows)) % tuple(rows.ravel().tolist())).encode())
 
 
 FLOAT, UNSIGNED = 5126, 5125
@@ -239,14 +243,10 @@ def _mesh(part: IO[bytes], body: Body, factor: float) -> None:
     number = "%.6f" if factor > 1.0 else "%.9f"
     vertex = f'<vertex x="{number}" y="{number}" z="{number}"/>\n'
     part.write(b"<vertices>\n")
-    for some in split_pieces(len(body.vertices)):
-        block = body.vertices[some] * factor
-        part.write(((vertex * len(block)) % tuple(block.ravel().tolist())).encode())
+    _write_rows(part, vertex, (body.vertices[some] * factor for some in split_pieces(len(body.vertices))))
     part.write(b"</vertices>\n<triangles>\n")
     triangle = '<triangle v1="%d" v2="%d" v3="%d"/>\n'
-    for some in split_pieces(len(body.faces)):
-        faces = body.faces[some]
-        part.write(((triangle * len(faces)) % tuple(faces.ravel().tolist())).encode())
+    _write_rows(part, triangle, (body.faces[some] for some in split_pieces(len(body.faces))))
     part.write(b"</triangles>\n")
 
 

@@ -14,9 +14,13 @@ import numpy as np
 
 from ..base.arrays import Floats, Indices
 from .crest_network import SADDLE, Chain, find_chains, find_stretch, measure_run, place_along, reaches_out
-from .formed import Lattice, measure_distance
+from .formed import Lattice
 from .skeleton import find_skeleton, measure_half_width
 
+#: Steps a pitch with which a distance is looked for.
+STEPS = 2
+#: Pairs of a place and a step that are looked at at once.
+CHUNK = 1 << 20
 #: As high as, to this share of the way up.
 LEVEL = 0.1
 #: Directions in which a half width is looked for.
@@ -54,8 +58,27 @@ class Field:
         return np.nan_to_num(self.lattice.at(self.off, position))
 
     def falls(self, position: Floats, direction: Floats, level: Floats) -> Floats:
-        """Return how far it is to where the feature falls to a level, m."""
-        return measure_distance(self.lattice, self.off, position, direction, level, self.most)
+        """Return distances (k,), m, along unit vectors to where the feature falls to levels; inf: nowhere."""
+        step = self.lattice.pitch / STEPS
+        steps = np.arange(1, int(np.ceil(self.most / step)) + 1) * step
+        distance, rows = np.full(len(position), np.inf), max(1, CHUNK // len(steps))
+        for start in range(0, len(position), rows):
+            part = slice(start, start + rows)
+            here = position[part, None] + steps[:, None] * direction[part, None]
+            above = np.column_stack(
+                [self.lattice.at(self.off, position[part]), self.lattice.at(self.off, here)]
+            )
+            above -= level[part, None]
+            fallen = above < 0.0  # not where the bed has ended: NaN
+            first = np.argmax(fallen, axis=1)
+            row = np.arange(len(first))
+            over, under = above[row, np.maximum(first - 1, 0)], above[row, first]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                reached = np.where(first > 0, step * (first - 1 + over / (over - under)), 0.0)
+            ended = np.isnan(above)
+            out = ended.any(axis=1) & (ended.argmax(axis=1) < first)
+            distance[part] = np.where(fallen.any(axis=1) & ~out, reached, np.inf)
+        return distance
 
     def half_widths(self, position: Floats) -> Floats:
         """Return how far it is at least to where the feature falls to half its height at places, m."""
@@ -324,7 +347,7 @@ class Crest:
 
 
 class Ridge(NamedTuple):
-    """Connected part of a feature: lines that meet, or the top of a mound.
+    """Part of a feature: lines that meet, or a mound.
 
     Attributes
     ----------

@@ -34,26 +34,7 @@ POINTS = 40
 CHUNK = 1 << 21
 
 
-@dataclass(frozen=True, eq=False)
-class FeaturePart:
-    """Ridge with its crests, or mound.
-
-    Attributes
-    ----------
-    crests : tuple of Crest
-        The longest first.
-    core : ndarray (m, 2)
-        Places along its top, m.
-    reach : float
-        How far it reaches about them, m.
-    """
-
-    crests: tuple[Crest, ...]
-    core: Floats
-    reach: float
-
-
-def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
+def find_parts(ridge: Ridge, least: float) -> tuple[Ridge, ...]:
     """Return the parts of a ridge: itself, and the mounds on it that rise by `least`, m, or more."""
     crests, cores = [], []
     mounds: list[tuple[Floats, float]] = []
@@ -73,20 +54,19 @@ def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
                 mounds.append((middle, away))
         cores.append(crest.points[on_ridge, :2])
     if not mounds:
-        return (FeaturePart(ridge.crests, ridge.core, ridge.half),)
-    core = np.concatenate(cores)
-    on_discs = [FeaturePart((), middle[None], away + ridge.half) for middle, away in mounds]
-    return (FeaturePart(tuple(crests), core, ridge.half), *on_discs)
+        return (ridge,)
+    on_discs = [Ridge((), middle[None], away + ridge.half) for middle, away in mounds]
+    return (Ridge(tuple(crests), np.concatenate(cores), ridge.half), *on_discs)
 
 
-def measure_distances(places: Floats, every: tuple[FeaturePart, ...] | list[FeaturePart]) -> Floats:
-    """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k)."""
+def measure_distances(places: Floats, every: list[Ridge]) -> Floats:
+    """Return how far places (k, 2) are from each part, less half its width, m, shape (parts, k)."""
     away = np.empty((len(every), len(places)))
     for number, part in enumerate(every):
         rows = max(1, CHUNK // len(part.core))
         for start in range(0, len(places), rows):
             x, y = np.moveaxis(places[start : start + rows, None] - part.core, -1, 0)
-            away[number, start : start + rows] = np.hypot(x, y).min(axis=1) - part.reach
+            away[number, start : start + rows] = np.hypot(x, y).min(axis=1) - part.half
     return away
 
 
@@ -285,8 +265,8 @@ def _of_kind(
 
 
 def _shared_out(
-    grid: SurfaceGrid, every: list[FeaturePart], pins: Indices, region: Region, smallest: int
-) -> Iterator[tuple[FeaturePart, Indices, Region, Region]]:
+    grid: SurfaceGrid, every: list[Ridge], pins: Indices, region: Region, smallest: int
+) -> Iterator[tuple[Ridge, Indices, Region, Region]]:
     """Give each part with pins enough its pins, its piece of a region, and this apart from the others."""
     place = grid.formed.position[pins]
     while len(every) > 1:
@@ -307,7 +287,7 @@ def _shared_out(
         yield every[0], pins if rest is region else pins[owner == 0], rest, others or rest
 
 
-def _nearer(region: Region, every: list[FeaturePart]) -> Floats:
+def _nearer(region: Region, every: list[Ridge]) -> Floats:
     """Return how much nearer the points of a region are to the last part than to the others, m, (k,)."""
     away = measure_distances(region.position, every)
     return np.asarray(away[:-1].min(axis=0) - away[-1])

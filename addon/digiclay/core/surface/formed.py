@@ -106,12 +106,6 @@ def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | flo
     return Formed.of(history["position"], history["height"][row], before, *arrays)
 
 
-#: Steps a pitch with which a distance is looked for.
-STEPS = 2
-#: Pairs of a place and a step that are looked at at once.
-CHUNK = 1 << 20
-
-
 @dataclass(frozen=True, eq=False)
 class Lattice:
     """Pins and their neighbors.
@@ -157,30 +151,6 @@ class Lattice:
         on_bed &= (across >= -slack) & (across <= bed.columns - 1 + slack)
         share = np.clip(up, 0.0, 1.0)
         return np.where(on_bed, parts[0] * (1.0 - share) + parts[1] * share, np.nan)
-
-
-def measure_distance(
-    lattice: Lattice, values: Floats, position: Floats, direction: Floats, level: Floats, most: float
-) -> Floats:
-    """Return distances (k,), m, along unit vectors to where values (n,) fall to levels; inf beyond `most`."""
-    step = lattice.pitch / STEPS
-    steps = np.arange(1, int(np.ceil(most / step)) + 1) * step
-    distance, rows = np.full(len(position), np.inf), max(1, CHUNK // len(steps))
-    for start in range(0, len(position), rows):
-        part = slice(start, start + rows)
-        here = position[part, None] + steps[:, None] * direction[part, None]
-        above = np.column_stack([lattice.at(values, position[part]), lattice.at(values, here)])
-        above -= level[part, None]
-        falls = above < 0.0  # not where the bed has ended: NaN
-        first = np.argmax(falls, axis=1)
-        row = np.arange(len(first))
-        over, under = above[row, np.maximum(first - 1, 0)], above[row, first]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            reached = np.where(first > 0, step * (first - 1 + over / (over - under)), 0.0)
-        ended = np.isnan(above).argmax(axis=1)
-        out = np.isnan(above).any(axis=1) & (ended < first)
-        distance[part] = np.where(falls.any(axis=1) & ~out, reached, np.inf)
-    return distance
 
 
 #: Code of the mode at a vertex that belongs to no pin, such as one of the base.

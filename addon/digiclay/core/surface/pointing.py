@@ -65,15 +65,11 @@ def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Flo
 
 def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tuple[float, float]:
     """Return when a ray enters and leaves a box; it never does where the first is after the last."""
-    first, last = 0.0, math.inf
-    for start, speed, near, far in zip(origin, direction, low, high, strict=True):
-        if abs(speed) < PARALLEL:
-            if not near <= start <= far:
-                return 1.0, 0.0
-            continue
-        times = sorted(((near - start) / speed, (far - start) / speed))
-        first, last = max(first, times[0]), min(last, times[1])
-    return first, last
+    parallel = np.abs(direction) < PARALLEL
+    if np.any(parallel & ((origin < low) | (origin > high))):
+        return 1.0, 0.0
+    times = np.sort((np.stack([low, high]) - origin)[:, ~parallel] / direction[~parallel], axis=0)
+    return float(times[0].max(initial=0.0)), float(times[1].min(initial=math.inf))
 
 
 def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
