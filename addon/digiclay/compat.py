@@ -47,10 +47,7 @@ def shader_nodes(owner: Any) -> Any:
 
 
 def node_setting(modifier: Any, name: str) -> Any:
-    """Return what a geometry nodes modifier sets an input of its tree to.
-
-    `modifier` bpy.types.NodesModifier; `name`: of the input.
-    """
+    """Return what a geometry nodes modifier sets an input of its tree to."""
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):  # from 5.2 on; before that the modifier itself is the dictionary
         return getattr(modifier.properties.inputs, identifier).value
@@ -58,10 +55,7 @@ def node_setting(modifier: Any, name: str) -> Any:
 
 
 def read_stored(owner: Any, name: str) -> dict[str, Any]:
-    """Return all that is stored in a property group of an object, nested; what was never set is not in it.
-
-    `owner` bpy.types.ID; `name`: of the group.
-    """
+    """Return all that is stored in a property group of an object, nested; what was never set is not in it."""
     # From 5.0 on these values are kept apart from the custom properties.
     kept = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
     group = kept.get(name) if kept is not None else None
@@ -69,10 +63,7 @@ def read_stored(owner: Any, name: str) -> dict[str, Any]:
 
 
 def set_node_setting(modifier: Any, name: str, value: Any) -> None:
-    """Set an input of a geometry nodes modifier's tree, for the object that has the modifier.
-
-    `modifier` bpy.types.NodesModifier; `name`: of the input; `value`: of the input's kind.
-    """
+    """Set an input of a geometry nodes modifier's tree, for the object that has the modifier."""
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
         getattr(modifier.properties.inputs, identifier).value = value
@@ -82,10 +73,7 @@ def set_node_setting(modifier: Any, name: str, value: Any) -> None:
 
 
 def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
-    """Insert a keyframe for an input of a geometry nodes modifier's tree, at its present value.
-
-    `modifier` bpy.types.NodesModifier; `name`: of the input.
-    """
+    """Insert a keyframe for an input of a geometry nodes modifier's tree, at its present value."""
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
         getattr(modifier.properties.inputs, identifier).keyframe_insert("value", frame=frame)

@@ -139,11 +139,8 @@ class Preferences(bpy.types.AddonPreferences):
         """Draw the preferences."""
         column = self.layout.column()
         column.use_property_split = True
-        column.prop(self, "redraw_rate")
-        column.prop(self, "most_periods")
-        column.prop(self, "palette")
-        column.prop(self, "take_press_tool")
-        column.prop(self, "overlay_corner")
+        for name in ("redraw_rate", "most_periods", "palette", "take_press_tool", "overlay_corner"):
+            column.prop(self, name)
         column.separator()
         row = column.row(align=True)
         row.prop(self, "methods_folder")
@@ -156,21 +153,18 @@ class Preferences(bpy.types.AddonPreferences):
         warning = column.column()
         warning.alert = True
         warning.label(text="Every Python file in this folder is run with all your rights:", icon="ERROR")
-        said = "choose a folder that only you can write to, with code that you have read."
-        warning.label(text=said, icon="BLANK1")
+        advice = "choose a folder that only you can write to, with code that you have read."
+        warning.label(text=advice, icon="BLANK1")
         column.prop(self, "run_own_methods")
-        found = own_folder.read_present()
-        for name in found.names:
+        present = own_folder.read_present()
+        for name in present.names:
             column.label(text=title(name), icon="CHECKMARK", translate=False)
-        for line in found.refused:
+        for line in present.refused:
             column.label(text=line, icon="CANCEL", translate=False)
 
 
 def get(context: Any) -> Any:
-    """Return the user's preferences; where the package is used without being enabled, the defaults.
-
-    Returns with the same attributes.
-    """
+    """Return the user's preferences; where the package is used without being enabled, the defaults."""
     entry = context.preferences.addons.get(__package__)
     return Choices() if entry is None or entry.preferences is None else entry.preferences
 

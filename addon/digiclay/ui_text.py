@@ -14,18 +14,12 @@ _translate: Callable[[str], str] = _keep
 
 
 def set_translator(translate: Callable[[str], str] = _keep) -> None:
-    """Set the function by which `localize` translates.
-
-    `translate`: from a text in English to one in the language of the interface; English when left out.
-    """
+    """Set the function by which `localize` translates."""
     global _translate
     _translate = translate
 
 
 def localize(text: str, *values: object) -> str:
-    """Return a text in the language of the interface, with values in its places.
-
-    `text`: English, with places as for `str.format`; the section *messages* of the catalogs has it.
-    """
+    """Return a text in the language of the interface, with values in its places."""
     translated = _translate(text)
     return translated.format(*values) if values else translated

@@ -18,25 +18,16 @@ from . import form, view
 #: Pitch below which the skin is drawn, and above which pins are drawn again, pixels at a UI scale of 1.
 SMALL, LARGE = 3.0, 4.0
 #: The draw handler that looks for changed views; without a window there is none.
-_HANDLES: list[Any] = []
+_handle: Any = None
 
 
 def choose_far(pitch: float, far: bool) -> bool:
-    """Return whether pins are too small to be drawn.
-
-    `pitch`: in the view that shows them largest, pixels; 0 where no view shows them; `far`: whether they were
-    too small before.
-    """
+    """Return whether pins are too small to be drawn."""
     return 0.0 < pitch < (LARGE if far else SMALL)
 
 
 def measure_pitch(to_clip: Floats, to_view: Floats, pitch: float, height: float) -> float:
-    """Return the size of a pitch at the middle of a bed, seen from the front, pixels; 0 behind the eye.
-
-    `to_clip` (4, 4), from the bed's space to that of the picture; `to_view` (4, 4), the window matrix: from
-    the space of the eye to that of the picture; `pitch`: in the world, Blender units; `height`: of the
-    region, pixels.
-    """
+    """Return the size of a pitch at the middle of a bed, seen from the front, pixels; 0 behind the eye."""
     depth = float(to_clip[3, 3])
     return pitch * float(to_view[1, 1]) * height / 2.0 / depth if depth > 0.0 else 0.0
 
@@ -95,13 +86,16 @@ def _look() -> None:
 
 def register() -> None:
     """Look at every view that is drawn from now on."""
+    global _handle
     if not bpy.app.background:
-        _HANDLES.append(bpy.types.SpaceView3D.draw_handler_add(_look, (), "WINDOW", "POST_PIXEL"))
+        _handle = bpy.types.SpaceView3D.draw_handler_add(_look, (), "WINDOW", "POST_PIXEL")
 
 
 def unregister() -> None:
     """Stop looking."""
-    while _HANDLES:
-        bpy.types.SpaceView3D.draw_handler_remove(_HANDLES.pop(), "WINDOW")
+    global _handle
+    if _handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+        _handle = None
     if bpy.app.timers.is_registered(follow):
         bpy.app.timers.unregister(follow)

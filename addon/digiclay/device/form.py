@@ -60,10 +60,7 @@ def read_kind(bed: Any) -> str:
 
 
 def set_kind(bed: Any, kind: str) -> None:
-    """Give a bed one of the skins `skin_lattice.KINDS`.
-
-    Raises DigiclayError: on another word, or for a bed without a skin.
-    """
+    """Give a bed one of the skins `skin_lattice.KINDS`."""
     set_node_setting(_require_skin(bed), MEMBRANE, bool(_index(kind, KINDS, "skin")))
 
 

@@ -31,8 +31,5 @@ COLORS = (
 
 
 def level(force: NDArray[np.float64], top: float = TOP) -> NDArray[np.int64]:
-    """Return the level of each force: 0 without force, 1 to 12 for `COLORS`.
-
-    `force` (n,), N; below 0 counts as none; `top`: from this force on all have the last level, N, above 0.
-    """
+    """Return the level of each force: 0 without force, 1 to 12 for `COLORS`."""
     return np.asarray(np.clip(np.ceil(force / top * len(COLORS)), 0, len(COLORS)), np.int64)

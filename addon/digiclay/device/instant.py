@@ -79,11 +79,7 @@ class Instant:
 
     @classmethod
     def of(cls, history: Mapping[str, Any], index: int = -1, **sizes: Any) -> Instant:
-        """Take one row of a history.
-
-        `history`: as in ``history.npz``; `index`: the row; negative rows count from the last one; `sizes`:
-        `pitch`, `actuator` and `finger`, where they are not the defaults.
-        """
+        """Take one row of a history."""
         missing = [name for name in ARRAYS if name not in history]
         if missing:
             raise OutputError(f"The history has no {missing[0]}: it must be a history.npz of `digiclay run`.")
@@ -97,10 +93,7 @@ class Instant:
     def at_rest(
         cls, layout: Layout, actuator: Actuator | None = None, finger: Fingertip | None = None
     ) -> Instant:
-        """Return a bed nobody has touched yet, the fingertip above its center.
-
-        `actuator`: by default `Actuator()`; `finger`: by default `Fingertip()`.
-        """
+        """Return a bed nobody has touched yet, the fingertip above its center."""
         actuator, finger = actuator or Actuator(), finger or Fingertip()
         bed = make_grid(layout)
         rest = actuator.rest_height
@@ -132,11 +125,7 @@ def pick_pose(poses: Floats) -> Floats:
 
 
 def read(path: Path, index: int = -1) -> Instant:
-    """Read an instant of a finished run.
-
-    `path`: the ``history.npz`` in a run's folder; sizes come from the ``scene.toml`` beside it; `index`: the
-    row; negative rows count from the last one. Raises OutputError when there is no readable run.
-    """
+    """Read an instant of a finished run."""
     if path.name != "history.npz":
         raise OutputError(f"{path} is not the history.npz of a run's folder.")
     run = finished_run.read_run(path.parent, *ARRAYS)

@@ -30,14 +30,9 @@ LEAST = 1e-3
 
 
 def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
-    """Make the node group that puts a pin on every vertex, an arrow where arrows are on, and the housing.
-
-    Stretching one mesh costs half of drawing rod and cap apart. A cap is stretched with its
-    rod, from a flat one on a low pin to a round one on a high pin.
-
-    `deck`: height the rods reach down to, Blender units; `length`: length of the pins in the collections,
-    Blender units; `unit`: Blender units of a millimeter of the device.
-    """
+    """Make the node group that puts a pin on every vertex, an arrow where arrows are on, and the housing."""
+    # Stretching one mesh costs half of drawing rod and cap apart. A cap is stretched with its
+    # rod, from a flat one on a low pin to a round one on a high pin.
     tree = bpy.data.node_groups.new("Digital Clay Pins", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
@@ -89,11 +84,7 @@ def _add_settings(tree: Any) -> None:
 
 
 def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]:
-    """Add the nodes that tell whether pins, skin, and both are drawn.
-
-    `tree` bpy.types.NodeTree; `settings` bpy.types.Node, the tree's input node; `row`: where in the tree they
-    stand.
-    """
+    """Add the nodes that tell whether pins, skin, and both are drawn."""
     form = settings.outputs[FORM]
     automatic, pins, skin, both = (
         number(tree, "COMPARE", 0, row + step, form, float(step), 0.5) for step in range(4)
@@ -109,11 +100,7 @@ def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]
 
 
 def _skin(tree: Any, sources: Sources, settings: Any, both: Any, row: float) -> Any:
-    """Add the nodes of the skin, clear where pins are drawn under it; return its geometry.
-
-    `tree` bpy.types.NodeTree; `settings` bpy.types.Node, the tree's input node; `both` bpy.types.NodeSocket,
-    whether pins and skin are drawn; `row`: where in the tree they stand.
-    """
+    """Add the nodes of the skin, clear where pins are drawn under it; return its geometry."""
     names = []
     for step, name in enumerate(KINDS):
         names.append(node(tree, "FunctionNodeInputString", -3, row + step))
@@ -144,11 +131,7 @@ def _stretch(tree: Any, deck: float, length: float) -> Any:
 
 
 def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
-    """Add the nodes that choose a pin by the force on it; return its place among the pins.
-
-    `tree` bpy.types.NodeTree; `top` bpy.types.NodeSocket, force of the last level, N; `first`: place of the
-    pin that nothing presses; the levels of `heat.level` come behind it; `row`: where in the tree they stand.
-    """
+    """Add the nodes that choose a pin by the force on it; return its place among the pins."""
     force = attribute(tree, "force", "FLOAT", 0, row + 1)
     per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLORS)), top)
     levels = number(tree, "CEIL", 2, row + 1, number(tree, "MULTIPLY", 1, row + 1, force, per_newton))
@@ -159,13 +142,7 @@ def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
 
 
 def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: float, row: float) -> Any:
-    """Add the nodes that draw the arrows beside the pins.
-
-    `tree` bpy.types.NodeTree; `arrow` bpy.types.Object, an arrow of length 1 that points down and ends at the
-    origin; `settings` bpy.types.Node, the tree's input node; `pins` bpy.types.NodeSocket, the pins, drawn
-    with and without arrows; `unit`: Blender units of a millimeter of the device; `row`: where in the tree
-    they stand. Returns pins and arrows, or pins alone where arrows are off.
-    """
+    """Add the nodes that draw the arrows beside the pins."""
     force = attribute(tree, "force", "FLOAT", 1, row + 1)
     pressed = node(tree, "FunctionNodeCompare", 3, row - 0.4)
     pressed.data_type, pressed.operation = "FLOAT", "GREATER_THAN"

@@ -6,31 +6,21 @@ from typing import Any
 
 
 def node(tree: Any, kind: str, column: float, row: float) -> Any:
-    """Add a node at a place of a coarse grid, so that whoever opens the tree can read it.
-
-    `tree` bpy.types.NodeTree; `kind`: Blender's name of the node; `column`, `row`: place in the grid.
-    """
+    """Add a node at a place of a coarse grid, so that whoever opens the tree can read it."""
     made = tree.nodes.new(kind)
     made.location = (220.0 * column, -180.0 * row)
     return made
 
 
 def socket(tree: Any, name: str, kind: str, default: Any, description: str) -> None:
-    """Add a setting to a tree, which each object that uses the tree has for itself.
-
-    `tree` bpy.types.NodeTree; `name`, `kind`: of the setting, and Blender's name of its type.
-    """
+    """Add a setting to a tree, which each object that uses the tree has for itself."""
     made = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind)
     made.default_value = default
     made.description = description
 
 
 def attribute(tree: Any, name: str, kind: str, column: float, row: float) -> Any:
-    """Add a node that reads an attribute of the vertices; return its output.
-
-    `tree` bpy.types.NodeTree; `name`: of the attribute; `kind`: its data type, as Blender names it; `column`,
-    `row`: place in the grid.
-    """
+    """Add a node that reads an attribute of the vertices; return its output."""
     made = node(tree, "GeometryNodeInputNamedAttribute", column, row)
     made.data_type = kind
     made.inputs["Name"].default_value = name
@@ -38,11 +28,7 @@ def attribute(tree: Any, name: str, kind: str, column: float, row: float) -> Any
 
 
 def number(tree: Any, operation: str, column: float, row: float, *values: Any) -> Any:
-    """Add a node that reckons with numbers or with outputs of other nodes; return its output.
-
-    `tree` bpy.types.NodeTree; `operation`: Blender's name of the operation; `column`, `row`: place in the
-    grid; `values` float or bpy.types.NodeSocket.
-    """
+    """Add a node that reckons with numbers or with outputs of other nodes; return its output."""
     made = node(tree, "ShaderNodeMath", column, row)
     made.operation = operation
     for place, value in zip(made.inputs, values, strict=False):
@@ -54,13 +40,8 @@ def number(tree: Any, operation: str, column: float, row: float, *values: Any) -
 
 
 def switch(tree: Any, kind: str, column: float, row: float, on: Any, off: Any, then: Any) -> Any:
-    """Add a node that hands on `then` where `on` holds and `off` (may be None) else; return its output.
-
-    What is not handed on is not worked out either: that is how a part that is off costs nothing.
-
-    `tree` bpy.types.NodeTree; `kind`: of what is handed on; `column`, `row`: place in the grid; `on`, `off`,
-    `then` bpy.types.NodeSocket.
-    """
+    """Add a node that hands on `then` where `on` holds and `off` (may be None) else; return its output."""
+    # What is not handed on is not worked out either: that is how a part that is off costs nothing.
     made = node(tree, "GeometryNodeSwitch", column, row)
     made.input_type = kind
     tree.links.new(on, made.inputs["Switch"])

@@ -32,10 +32,7 @@ HEAD = 0.36
 
 
 def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None = None) -> Any:
-    """Make an object of data (None: an empty), marked with its role.
-
-    `data` bpy.types.ID or None; `collection` bpy.types.Collection.
-    """
+    """Make an object of data (None: an empty), marked with its role."""
     made = bpy.data.objects.new(name, data)
     made[ROLE] = role
     made.parent = parent
@@ -44,10 +41,7 @@ def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None 
 
 
 def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
-    """Return the material of a part, as the user may have changed it, or make it.
-
-    `color` (float, float, float), sRGB, 0 to 1; `roughness`, `alpha`: 0 to 1.
-    """
+    """Return the material of a part, as the user may have changed it, or make it."""
     found = next((m for m in bpy.data.materials if m.get(ROLE) == name), None)
     if found is not None:
         return found
@@ -85,10 +79,7 @@ class Sources(NamedTuple):
 
 
 def make_sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
-    """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m.
-
-    `length`, `deck`, `rim`: length of the pins, floor and upper edge of the housing, m.
-    """
+    """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m."""
     segments = 28 if len(instant.height) <= MANY else 12
     shape = primitives.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
     mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
@@ -133,13 +124,9 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
 
 
 def make_fingertip(collection: Any, bed: Any) -> Any:
-    """Make the fingertip: an empty that is moved, and in it an ellipsoid to see and to click on.
-
-    The empty carries the pose alone. Its scale is locked: the finger's size is a parameter
-    of the device, kept in the ellipsoid's scale.
-
-    `collection` bpy.types.Collection; `bed` bpy.types.Object, its parent.
-    """
+    """Make the fingertip: an empty that is moved, and in it an ellipsoid to see and to click on."""
+    # The empty carries the pose alone. Its scale is locked: the finger's size is a parameter
+    # of the device, kept in the ellipsoid's scale.
     made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=bed)
     bed[FINGER] = made
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True

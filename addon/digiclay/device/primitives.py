@@ -14,10 +14,7 @@ Shape = tuple[Floats, list[tuple[int, ...]]]
 
 
 def loft(rings: Sequence[Floats], first: bool = False, last: bool = False) -> Shape:
-    """Join rings of points, each going round counter-clockwise seen from above, bottom to top.
-
-    `rings` (m, 3) or (1, 3), a ring of one point is a pole; `first`, `last`: close that end with a face.
-    """
+    """Join rings of points, each going round counter-clockwise seen from above, bottom to top."""
     starts = np.cumsum([0] + [len(ring) for ring in rings])
     faces: list[tuple[int, ...]] = []
     for low, high, a, b in zip(starts, starts[1:], rings, rings[1:], strict=False):
@@ -46,11 +43,7 @@ def _revolve(profile: Sequence[tuple[float, float]], segments: int) -> Shape:
 
 
 def rod(radius: float, length: float, segments: int = 24, dome: float = 0.4) -> Shape:
-    """Return a pin, its top at the origin and its rod below, the cap a flat dome.
-
-    `radius`, `length`: in the unit wanted; `segments`: points round the rod; `dome`: height of the cap over
-    the radius.
-    """
+    """Return a pin, its top at the origin and its rod below, the cap a flat dome."""
     turns = np.linspace(0.0, math.pi / 2, 2 + segments // 4)
     cap = [(radius * math.cos(t), radius * dome * (math.sin(t) - 1.0)) for t in turns[:-1]]
     return _revolve([(radius, -length), *cap, (0.0, 0.0)], segments)
@@ -63,20 +56,13 @@ def ball(segments: int = 64) -> Shape:
 
 
 def arrow(radius: float, segments: int = 16) -> Shape:
-    """Return an arrow of length 1 that points down and ends at the origin, its head of a radius.
-
-    `radius`: of its head; `segments`: around it.
-    """
+    """Return an arrow of length 1 that points down and ends at the origin, its head of a radius."""
     shaft = 0.4 * radius
     return _revolve([(0.0, 0.0), (radius, 0.3), (shaft, 0.3), (shaft, 1.0), (0.0, 1.0)], segments)
 
 
 def housing(half: tuple[float, float], wall: float, bottom: float, deck: float, rim: float) -> Shape:
-    """Return an open box with rounded corners: the case the pins stand in.
-
-    `half`: half of the inner width along x and along y; `wall`: thickness of the wall; `bottom`, `deck`,
-    `rim`: heights of the underside, of the floor inside, and of the wall's top.
-    """
+    """Return an open box with rounded corners: the case the pins stand in."""
     bevel = 0.22 * wall
     round_edge = [
         (bevel * (1.0 - math.sin(t)), rim + bevel * (math.cos(t) - 1.0))

@@ -92,10 +92,7 @@ def choose_parts(count: int) -> int:
 
 
 def make_lattice(instant: Instant, parts: int) -> SkinLattice:
-    """Return the points and weights of a skin over a bed, with sides down to the floor.
-
-    `instant`: for the positions and the size of the pins; `parts`: points a pitch.
-    """
+    """Return the points and weights of a skin over a bed, with sides down to the floor."""
     x, y = instant.position.T
     rows, columns = find_grid_shape(instant.position)
     starts, spacing = x[::columns], float(y[columns] - y[0]) if rows > 1 else instant.pitch
@@ -130,10 +127,7 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
 
 
 def interpolate(lattice: SkinLattice, height: Floats, kind: str) -> Floats:
-    """Return the heights of a skin, as the geometry nodes of a bed work them out, m.
-
-    `height` (n,), of the pins, m; `kind`: one of `KINDS`. Returns (m,), 0 at the lower edge.
-    """
+    """Return the heights of a skin, as the geometry nodes of a bed work them out, m."""
     for step in (lattice.along, lattice.across):
         before, after = height - height[step.previous], height[step.following] - height
         product, total = np.maximum(before * after, 0.0), before + after

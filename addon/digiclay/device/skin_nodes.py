@@ -29,10 +29,7 @@ class SkinMeshes(NamedTuple):
 
 
 def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
-    """Make the meshes of a skin.
-
-    `deck`: height of the lower edge of its sides, m; `material` bpy.types.Material.
-    """
+    """Make the meshes of a skin."""
     pins = _points("Digital Clay Skin Pins", lattice.along.previous.size)
     _write_neighbors(pins, lattice.along)
     rows = _points("Digital Clay Skin Rows", lattice.across.previous.size)
@@ -53,11 +50,7 @@ def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
 
 
 def skin_nodes(tree: Any, sources: Any, pins: Any, kind: Any, row: float) -> Any:
-    """Add the nodes that stretch a skin over pins; return its geometry.
-
-    `tree` bpy.types.NodeTree; `sources` SkinMeshes, objects of the meshes; `pins` bpy.types.NodeSocket,
-    points of the pins; `kind` bpy.types.NodeSocket, name of the skin; `row`: where in the tree they stand.
-    """
+    """Add the nodes that stretch a skin over pins; return its geometry."""
     names = [_prefixed(tree, words, kind, row + step) for step, words in enumerate(WEIGHTS)]
     height = _separate_height(tree, row + 3)
     index = node(tree, "GeometryNodeInputIndex", 1, row + 2).outputs["Index"]

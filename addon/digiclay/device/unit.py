@@ -1,12 +1,13 @@
 """Unit of a bed and its fingertip after copy, delete and hide.
 
-Blender copies, deletes and hides the objects that are selected, not those that belong to them. Here is told
-what is missing or left over then, and it is put right; when that happens is up to the timer below.
+Blender copies, deletes and hides the objects that are selected, not those that belong to them. The first part
+here finds what is missing or left over then and puts it right; the second, a timer, decides when.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from .. import bridge
@@ -79,11 +80,7 @@ def mark_parts() -> frozenset[int]:
 
 
 def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
-    """Return what is to be put right.
-
-    `known`: uids of the objects that were there before: to what a user has done to those, nothing is added;
-    `mended`: uids of those of them that may be again as they had come, since undo has gone back to that.
-    """
+    """Return what is to be put right."""
     bare = [
         bed for bed in _beds() if view.fingertip_of(bed) is None and _lacks_part(bed, FINGER, known, mended)
     ]
@@ -110,10 +107,7 @@ def repair(found: Faults) -> None:
 
 
 def give_fingertip(bed: Any, scene: Scene) -> str:
-    """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one.
-
-    `bed` bpy.types.Object.
-    """
+    """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one."""
     if view.fingertip_of(bed) is not None:
         return ""
     tip = bed.get(FINGER)
@@ -167,11 +161,9 @@ def _beds() -> list[Any]:
 
 
 def _lacks_part(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) -> bool:
-    """Return whether an object without a part of its own is to get one.
-
-    A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
-    part the user has deleted, or taken off it, is not.
-    """
+    """Return whether an object without a part of its own is to get one."""
+    # A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
+    # part the user has deleted, or taken off it, is not.
     part, new = owner.get(held), owner.session_uid not in known
     if part is None:
         return held == FINGER and (new or (FINGER not in owner and owner.session_uid in mended))
@@ -279,7 +271,7 @@ def _is_in_layer(layer: Any, thing: Any) -> bool:
     return bool(layer.objects.get(thing.name) == thing)
 
 
-#: Time until it is looked again whether whoever is at work has done, s.
+#: Time until the next look while an operator is under way, s.
 AGAIN = 0.1
 #: Operators with one of these push an undo step when they are done; until then nothing is to be changed.
 STEPS = {"UNDO", "UNDO_GROUPED", "MACRO"}
@@ -288,33 +280,51 @@ STEPS = {"UNDO", "UNDO_GROUPED", "MACRO"}
 #: its ellipsoid.
 PASSES = 3
 
-#: Uids of the objects that are known, None before the first look; what came last, undo or redo; and whether
-#: there is anything to look at.
-_KNOWN: list[frozenset[int] | None] = [None]
-_CAME, _PENDING = [""], [False]
-#: Uids of what had come with something missing, or where it does not belong.
-_MENDED: set[int] = set()
+
+@dataclass
+class Watch:
+    """Memory of what beds have been looked at.
+
+    Attributes
+    ----------
+    known : frozenset of int or None
+        Uids of the objects seen; None before the first look.
+    mended : set of int
+        Uids of what had come with something missing, or where it does not belong.
+    came : str
+        What came last, "undo" or "redo", or an empty text.
+    pending : bool
+        Whether there is anything to look at.
+    """
+
+    known: frozenset[int] | None = None
+    mended: set[int] = field(default_factory=set)
+    came: str = ""
+    pending: bool = False
+
+
+_watch = Watch()
 
 
 def settle() -> None:
     """Look until nothing has come since."""
-    while _PENDING[0]:
-        _PENDING[0] = False
+    while _watch.pending:
+        _watch.pending = False
         repair_beds()
 
 
 def repair_beds() -> None:
     """Put right what is missing or left over; after undo or redo, go on past a step with such."""
-    came, _CAME[0] = _CAME[0], ""
-    if _KNOWN[0] is not None:
+    came, _watch.came = _watch.came, ""
+    if _watch.known is not None:
         # In a step that undo has come back to, what was put right since is as it had come.
-        found = find_faults(_KNOWN[0], frozenset(_MENDED) if came else frozenset())
+        found = find_faults(_watch.known, frozenset(_watch.mended) if came else frozenset())
         if any(found):
             if came and _repeat_step(came):
                 return
             _repair(found)
             bpy.ops.ed.undo_push(message="Complete Beds")
-    _KNOWN[0] = mark_parts()
+    _watch.known = mark_parts()
     follow_visibility()
     follow_selection()
 
@@ -322,7 +332,7 @@ def repair_beds() -> None:
 def _repair(found: Faults) -> None:
     """Put right what was found, and what that has left over."""
     for _ in range(PASSES):
-        _MENDED.update(thing.session_uid for thing in (*found.bare, *found.strewn))
+        _watch.mended.update(thing.session_uid for thing in (*found.bare, *found.strewn))
         repair(found)
         found = find_faults(mark_parts())
         if not any(found):
@@ -334,15 +344,12 @@ def _repeat_step(came: str) -> bool:
     operator = getattr(bpy.ops.ed, came)
     if operator.poll():
         operator()
-    return bool(_CAME[0])
+    return bool(_watch.came)
 
 
 @bpy.app.handlers.persistent
 def note_change(scene: Any, graph: Any = None) -> None:
-    """Look soon: objects, or what is shown of them, may have come or gone.
-
-    `scene` bpy.types.Scene; `graph` bpy.types.Depsgraph, optional.
-    """
+    """Look soon: objects, or what is shown of them, may have come or gone."""
     if graph is None or graph.id_type_updated("SCENE"):
         _repair_soon()
 
@@ -350,34 +357,34 @@ def note_change(scene: Any, graph: Any = None) -> None:
 @bpy.app.handlers.persistent
 def note_undo(*_: Any) -> None:
     """Look soon at what undo has come to."""
-    _CAME[0] = "undo"
+    _watch.came = "undo"
     _repair_soon()
 
 
 @bpy.app.handlers.persistent
 def note_redo(*_: Any) -> None:
     """Look soon at what redo has come to."""
-    _CAME[0] = "redo"
+    _watch.came = "redo"
     _repair_soon()
 
 
 @bpy.app.handlers.persistent
 def note_load(*_: Any) -> None:
     """Look soon at what another file has: it stays as it is."""
-    _KNOWN[0], _CAME[0] = None, ""
-    _MENDED.clear()
+    _watch.known, _watch.came = None, ""
+    _watch.mended.clear()
     _repair_soon()
 
 
 def _repair_soon() -> None:
     """Have a look when Blender is done with what it does now."""
-    _PENDING[0] = True
+    _watch.pending = True
     if not bpy.app.background and not bpy.app.timers.is_registered(_repair_when_idle):
         bpy.app.timers.register(_repair_when_idle)
 
 
 def _repair_when_idle() -> float | None:
-    """Look, unless somebody is at work."""
+    """Look, unless an operator is under way."""
     windows = bpy.context.window_manager.windows
     if not windows:
         return None
@@ -430,4 +437,4 @@ def unregister() -> None:
     for handler, function in _pairs():
         if function in handler:
             handler.remove(function)
-    _KNOWN[0], _CAME[0], _PENDING[0] = None, "", False
+    _watch.known, _watch.came, _watch.pending = None, "", False

@@ -63,13 +63,7 @@ def picked_pins(bed: Any) -> tuple[int, ...]:
 
 
 def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
-    """Add a bed and its fingertip to a collection.
-
-    `instant`: what to show at first; `collection` bpy.types.Collection, where the objects go; `lowest`:
-    lowest pin top the housing must have room for, m; the instant's own when left out, so that a still shows
-    the formed surface and not the rods under it. Returns the bed; the fingertip is its child. Its origin is
-    the center of the bed's floor.
-    """
+    """Add a bed and its fingertip to a collection."""
     cells = bridge.points("Digital Clay", len(instant.height))
     bed = parts.marked(cells, cells.name, BED, collection)
     bed.modifiers.new(MODIFIER, "NODES").node_group = _make_tree(instant, lowest)
@@ -93,37 +87,28 @@ def _make_tree(instant: Instant, lowest: float | None = None) -> Any:
 
 
 def add_modifier(bed: Any, instant: Instant) -> None:
-    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays.
-
-    `bed` bpy.types.Object; `instant`: for the sizes of the housing and the pins.
-    """
+    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
     require_modifier(bed).node_group = _make_tree(instant, 0.0)
 
 
 def hold_parts(bed: Any) -> None:
-    """Have what a bed is drawn with stay out of the scene when the bed is appended to another file.
-
-    Blender puts an appended collection of objects that stand in no scene into the scene, unless an
-    empty instances it. The fingertip is one; it shows nothing of it, since its instancing is off.
-    """
+    """Have what a bed is drawn with stay out of the scene when the bed is appended to another file."""
+    # Blender puts an appended collection of objects that stand in no scene into the scene, unless an
+    # empty instances it. The fingertip is one; it shows nothing of it, since its instancing is off.
     tip = fingertip_of(bed)
     if tip is not None:
         tip.instance_collection = sources_of(bed)
 
 
 def show(bed: Any, instant: Instant) -> None:
-    """Show another instant of the same bed, its fingertip's pose included. `bed` bpy.types.Object."""
+    """Show another instant of the same bed, its fingertip's pose included."""
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
 
 
 def show_state(bed: Any, system: System, state: State) -> None:
-    """Show the pins of a running session; the fingertip is the user's and stays where it is.
-
-    Forces are gathered and written only while something drawn tells them.
-
-    `bed` bpy.types.Object.
-    """
+    """Show the pins of a running session; the fingertip is the user's and stays where it is."""
+    # Forces are gathered and written only while something drawn tells them.
     shown: dict[str, NDArray[Any]] = {"mode": state.mode()}
     if wants_force(bed):
         shown["force"] = state.row(system.rows.force)
@@ -131,10 +116,7 @@ def show_state(bed: Any, system: System, state: State) -> None:
 
 
 def color_by(bed: Any, what: str) -> None:
-    """Color the pins by what they do ("mode") or by the force on them ("force").
-
-    `bed` bpy.types.Object. Raises DigiclayError: on another word, or when the bed's modifier is gone.
-    """
+    """Color the pins by what they do ("mode") or by the force on them ("force")."""
     if what not in COLORINGS:
         raise DigiclayError(f"view.color_by must be one of {', '.join(COLORINGS)} (got {what!r}).")
     set_node_setting(require_modifier(bed), COLOR_BY_FORCE, what == "force")
@@ -156,15 +138,12 @@ def shows_force(bed: Any) -> bool:
 
 
 def scale_colors(bed: Any, top: float) -> None:
-    """Set the force from which on a pin has the last color, N. `bed` bpy.types.Object; `top`, N."""
+    """Set the force from which on a pin has the last color, N."""
     set_node_setting(require_modifier(bed), TOP_FORCE, _positive("top color", top, "N"))
 
 
 def show_arrows(bed: Any, on: bool) -> None:
-    """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so.
-
-    `bed` bpy.types.Object.
-    """
+    """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so."""
     set_node_setting(require_modifier(bed), ARROWS, bool(on))
     tip = fingertip_of(bed)
     ball = ellipsoid(tip) if tip is not None else None
@@ -183,7 +162,7 @@ def arrow_length(bed: Any) -> float:
 
 
 def scale_arrows(bed: Any, length: float) -> None:
-    """Set the length of the arrow of 1 N, m of the device. `bed` bpy.types.Object; `length`, m."""
+    """Set the length of the arrow of 1 N, m of the device."""
     set_node_setting(require_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
 
 

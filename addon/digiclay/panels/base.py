@@ -32,7 +32,7 @@ class Panel:
 
 
 def draw_lines(layout: Any, words: str, icon: str) -> None:
-    """Draw words on as many lines as they need. `layout` bpy.types.UILayout; `icon`: of the first line."""
+    """Draw words on as many lines as they need."""
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(words, LINE)):

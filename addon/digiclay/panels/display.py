@@ -156,7 +156,6 @@ class DisplayPanel(Panel, bpy.types.Panel):
     bl_order = 30
 
     def draw(self, context: Any) -> None:
-        """Draw the panel."""
         bed, layout = bed_of(context), self.layout
         layout.enabled = not is_edited(context)
         layout.use_property_split = True

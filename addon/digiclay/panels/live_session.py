@@ -21,7 +21,6 @@ class Session(Panel, bpy.types.Panel):
     bl_order = 10
 
     def draw(self, context: Any) -> None:
-        """Draw what can be done, and how it goes."""
         bed = bed_of(context)
         session, column = running.find(bed), self.layout.column(align=True)
         if session is None:

@@ -49,7 +49,6 @@ class Presets(bpy.types.Menu):
     bl_label = "Presets"
 
     def draw(self, context: Any) -> None:
-        """Draw one entry a preset."""
         for name in PRESETS:
             self.layout.operator("digiclay.preset_apply", text=title(name)).preset = name
         own = own_presets.names()
@@ -105,7 +104,6 @@ class Control(Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Draw the choice of the method."""
         settings = bed_of(context).digiclay
         row = self.layout.row()
         row.active, row.enabled = settings.use_control, not is_edited(context)
@@ -118,12 +116,7 @@ class Control(Panel, bpy.types.Panel):
 
 
 def section_panel(section: str, parent: str, order: int, words: str = "", closed: bool = True) -> type:
-    """Make the sub-panel of a part.
-
-    `section`: of `core.scene.schema.SECTIONS`. A part a scene may leave out has a switch in the header;
-    `parent`: `bl_idname` of the panel it stands in; `order`: place among the others; `words`: its heading,
-    where that is not the section's name; `closed`: whether it is closed until somebody opens it.
-    """
+    """Make the sub-panel of a part."""
 
     class Section(Panel, bpy.types.Panel):
         bl_idname = f"DIGICLAY_PT_part_{section}"
@@ -164,10 +157,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
 
 
 def in_use(settings: Any, section: str) -> bool:
-    """Return whether a part is simulated: neither it nor the one it belongs to is switched off.
-
-    `settings` bpy.types.PropertyGroup; `section`: of the scene file.
-    """
+    """Return whether a part is simulated: neither it nor the one it belongs to is switched off."""
     needed = NEEDS.get(section)
     switches = [name for name in (section, needed) if name in OPTIONAL]
     return all(getattr(settings, f"use_{name}") for name in switches)

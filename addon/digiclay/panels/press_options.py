@@ -31,10 +31,7 @@ class Popover:
             self.draw_settings(layout.column(), settings)
 
     def draw_settings(self, column: Any, settings: Any) -> None:
-        """Draw the tool's settings that it holds.
-
-        `column` bpy.types.UILayout; `settings` bpy.types.OperatorProperties, settings of the Press tool.
-        """
+        """Draw the tool's settings that it holds."""
         raise NotImplementedError
 
 
@@ -45,10 +42,6 @@ class StrokeOptions(Popover, bpy.types.Panel):
     bl_idname = "DIGICLAY_PT_press_stroke"
 
     def draw_settings(self, column: Any, settings: Any) -> None:
-        """Draw them.
-
-        `column` bpy.types.UILayout; `settings` bpy.types.OperatorProperties, settings of the Press tool.
-        """
         draw_presets(column)  # a narrow header has them here alone
         column.prop(settings, "path")
         row = column.column()
@@ -64,10 +57,6 @@ class PenOptions(Popover, bpy.types.Panel):
     bl_idname = "DIGICLAY_PT_press_pen"
 
     def draw_settings(self, column: Any, settings: Any) -> None:
-        """Draw them.
-
-        `column` bpy.types.UILayout; `settings` bpy.types.OperatorProperties, settings of the Press tool.
-        """
         column.prop(settings, "use_pressure")
         row = column.column()
         row.enabled = settings.use_pressure

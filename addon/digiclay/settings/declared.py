@@ -38,20 +38,25 @@ Update = Callable[[Any, Any], None]
 def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type:
     """Make the property group of a part; `updates` of its fields are called with group and context."""
     properties = {field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)}
-    content = {"__annotations__": properties, "__module__": __name__, "__doc__": kind.__doc__}
+    return make_group(name, kind.__doc__ or "", properties)
+
+
+def make_group(name: str, words: str, properties: dict[str, Any]) -> type:
+    """Make a property group of properties."""
+    content = {"__annotations__": properties, "__module__": __name__, "__doc__": words}
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
 
 
 def whole(field: dataclasses.Field[Any], get: Callable[[Any], float], put: Update) -> Any:
     """Make the property of twice a parameter, computed by `get` and taken by `put`; no keyframes."""
-    known: Quantity = field.metadata["quantity"]
-    known = dataclasses.replace(known, doc=known.whole, symbol=f"2 {known.symbol}")
+    quantity: Quantity = field.metadata["quantity"]
+    quantity = dataclasses.replace(quantity, doc=quantity.whole, symbol=f"2 {quantity.symbol}")
     default: Any = field.default
-    unit, power = unit_of(known.unit, default)
+    unit, power = unit_of(quantity.unit, default)
     return bpy.props.FloatProperty(
-        **_numbers(known, 2.0 * default, power),
+        **_numbers(quantity, 2.0 * default, power),
         name=f"{title(field.name)} ({unit})",
-        description=_tooltip(known, 2.0 * default, unit, power),
+        description=_tooltip(quantity, 2.0 * default, unit, power),
         get=get,
         set=put,
         options=set(),
@@ -65,30 +70,30 @@ def title(name: str) -> str:
 
 def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
     """Make the property of one parameter."""
-    known: Quantity = field.metadata["quantity"]
+    quantity: Quantity = field.metadata["quantity"]
     default = field.default
-    unit, power = unit_of(known.unit, default)
-    label = f"Half {title(field.name)}" if known.whole else title(field.name)
-    said: dict[str, Any] = {
+    unit, power = unit_of(quantity.unit, default)
+    label = f"Half {title(field.name)}" if quantity.whole else title(field.name)
+    options: dict[str, Any] = {
         "name": f"{label} ({unit})" if unit else label,
-        "description": _tooltip(known, default, unit, power),
+        "description": _tooltip(quantity, default, unit, power),
         "update": update,
     }
-    if known.choices:
-        items = [(choice, title(choice), "") for choice in known.choices]
-        return bpy.props.EnumProperty(items=items, default=default, **said)
+    if quantity.choices:
+        items = [(choice, title(choice), "") for choice in quantity.choices]
+        return bpy.props.EnumProperty(items=items, default=default, **options)
     if isinstance(default, bool):
-        return bpy.props.BoolProperty(default=default, **said)
+        return bpy.props.BoolProperty(default=default, **options)
     if isinstance(default, int):
-        low, high = known.at_least or 0, min(known.at_most or INT_MAX, INT_MAX)
-        return bpy.props.IntProperty(default=default, min=int(low), max=int(high), **said)
+        low, high = quantity.at_least or 0, min(quantity.at_most or INT_MAX, INT_MAX)
+        return bpy.props.IntProperty(default=default, min=int(low), max=int(high), **options)
     if isinstance(default, float):
-        return bpy.props.FloatProperty(**_numbers(known, default, power), **said)
+        return bpy.props.FloatProperty(**_numbers(quantity, default, power), **options)
     if isinstance(default, tuple):
-        return bpy.props.StringProperty(default=format_list(default, power), **said)
+        return bpy.props.StringProperty(default=format_list(default, power), **options)
     if field.name in SHAPED:
-        said |= {"search": _shapes, "search_options": {"SUGGESTION"}}
-    return bpy.props.StringProperty(default=default, **said)
+        options |= {"search": _shapes, "search_options": {"SUGGESTION"}}
+    return bpy.props.StringProperty(default=default, **options)
 
 
 def format_list(values: tuple[float, ...], power: int) -> str:
@@ -96,16 +101,14 @@ def format_list(values: tuple[float, ...], power: int) -> str:
     return ", ".join(repr(to_shown(value, power)).removesuffix(".0") for value in values)
 
 
-def _numbers(known: Quantity, default: float, power: int) -> dict[str, Any]:
+def _numbers(quantity: Quantity, default: float, power: int) -> dict[str, Any]:
     """Return default, range, and how a number is shown and dragged."""
     start = to_shown(default, power)
-    least = to_shown(EXTENTS[known.unit][0], power)
+    least = to_shown(EXTENTS[quantity.unit][0], power)
     inside = max(INSIDE * (abs(start) or 1.0), (1.0 + INSIDE) * least)
     reach = REACH * (abs(start) or 0.1)
-    low, high = (
-        _bound(known.at_least, known.above, power, inside),
-        _bound(known.at_most, known.below, power, -inside),
-    )
+    low = _bound(quantity.at_least, quantity.above, power, inside)
+    high = _bound(quantity.at_most, quantity.below, power, -inside)
     decimals = len(f"{start:.6f}".rstrip("0").partition(".")[2])
     return {
         "default": start,
@@ -125,16 +128,16 @@ def _bound(closed: float | None, opened: float | None, power: int, inside: float
     return None if opened is None else to_shown(float(opened), power) + inside
 
 
-def _tooltip(known: Quantity, default: object, unit: str, power: int) -> str:
+def _tooltip(quantity: Quantity, default: object, unit: str, power: int) -> str:
     """Return meaning, symbol, bounds and default of a parameter; Blender adds the full stop."""
 
     def value(number: float) -> str:
         plain = isinstance(default, int)
         return f"{number if plain else to_shown(float(number), power):.6g} {unit}".rstrip()
 
-    parts = [known.doc[0].upper() + known.doc[1:]]
-    parts += [f"symbol {known.symbol}"] if known.symbol else []
-    parts += [f"{word.replace('_', ' ')} {value(number)}" for word, number in known.list_bounds()]
+    parts = [quantity.doc[0].upper() + quantity.doc[1:]]
+    parts += [f"symbol {quantity.symbol}"] if quantity.symbol else []
+    parts += [f"{word.replace('_', ' ')} {value(number)}" for word, number in quantity.list_bounds()]
     if isinstance(default, tuple):
         parts.append(f"separated by commas, by default {format_list(default, power)} {unit}".rstrip())
     elif isinstance(default, (int, float)):
@@ -152,10 +155,7 @@ Notes = dict[str, tuple[Any, Any]]
 
 
 def write(group: Any, part: Parameters) -> Notes:
-    """Write a part's parameters into its property group; return what the properties cannot hold.
-
-    `group` bpy.types.PropertyGroup.
-    """
+    """Write a part's parameters into its property group; return what the properties cannot hold."""
     notes: Notes = {}
     for name, field in _fields(type(part)).items():
         value = getattr(part, name)
@@ -167,10 +167,7 @@ def write(group: Any, part: Parameters) -> Notes:
 
 
 def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
-    """Write one parameter, in SI, into its property.
-
-    `group` bpy.types.PropertyGroup; `kind`: class of the part; `name`: of the parameter; `value`: SI.
-    """
+    """Write one parameter, in SI, into its property."""
     power = _power(_fields(kind)[name])
     if isinstance(value, tuple):
         value = format_list(value, power)
@@ -182,19 +179,12 @@ def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
 
 
 def reset(group: Any, kind: type[Parameters], name: str) -> None:
-    """Write one parameter's default into its property.
-
-    `group` bpy.types.PropertyGroup; `kind`: class of the part; `name`: of the parameter.
-    """
+    """Write one parameter's default into its property."""
     assign(group, kind, name, _fields(kind)[name].default)
 
 
 def read(group: Any, kind: type[Parameters], notes: Notes, section: str) -> dict[str, Any]:
-    """Return a part's parameters in SI, as a scene file's section would give them.
-
-    `group` bpy.types.PropertyGroup; `kind`: the part's parameters; `notes`: from `write`; `section`: what
-    messages call the part. Raises ParameterError: on a list that cannot be read as numbers.
-    """
+    """Return a part's parameters in SI, as a scene file's section would give them."""
     values = {}
     for name, field in _fields(kind).items():
         kept = getattr(group, name)

@@ -63,18 +63,14 @@ UNNAMED = "paper"
 
 #: Bore of the cylinders, as a share of the pitch, where a preset's would overlap.
 BORE = 2 / 3
+#: Lengths of a blister.
+LENGTHS = ("radius", "edge_radius", "flat_radius", "sigma")
 
 
 def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> Scene:
-    """Return the scene of a preset, with another plan of the bed, another method and another size of finger.
-
-    In Method I the blister rises from each cell's own height: the paper's strokes do not cross, those of a
-    sculptor do.
-
-    `preset`: one of the core's presets, or the name of the user's own; `method`: a preset of the user's own
-    keeps its gains when it is of this method; `share`: size of fingertip and blister, as a share of the
-    preset's. Raises DigiclayError when the preset cannot be read, or does not go together with the layout.
-    """
+    """Return the scene of a preset, with another plan of the bed, method and size of the fingertip."""
+    # In Method I the blister rises from each cell's own height: the paper's strokes do not cross, those of a
+    # sculptor do.
     control = {"layout": {"arrangement": layout.arrangement}, "control": {"method": method}}
     if preset in PRESETS:
         scene = resolve({"preset": preset, **control})
@@ -98,13 +94,10 @@ def change_layout(scene: Scene, layout: Layout) -> Scene:
 
 
 def change_finger(scene: Scene, before: Fingertip, finger: Fingertip) -> Scene:
-    """Return a scene with another fingertip, and with a blister in proportion to its width.
-
-    `before`: its present one.
-    """
+    """Return a scene with another fingertip, and with a blister in proportion to its width."""
     blister = scene.blister
     if blister is not None:
-        blister = fit_blister(_scale_blister(blister, finger.width / before.width), scene.layout)
+        blister = fit_blister(scale_blister(blister, finger.width / before.width), scene.layout)
     fingers = tuple(replace(one, fingertip=finger) for one in scene.fingers)
     return replace(scene, fingers=fingers, blister=blister)
 
@@ -114,17 +107,15 @@ def _scale_finger(scene: Scene, share: float) -> Scene:
     return replace(
         scene,
         fingers=tuple(_scale_tip(finger, share) for finger in scene.fingers),
-        blister=scene.blister and _scale_blister(scene.blister, share),
+        blister=scene.blister and scale_blister(scene.blister, share),
         control=scene.control and _scale_control(scene.control, share),
     )
 
 
 def _scale_tip(finger: Finger, share: float) -> Finger:
-    """Return a finger with a tip of another size, of the same pulp.
-
-    As many pins as before are under it, and each has a smaller area: its share of the law of a flat plate
-    goes with the square of the size.
-    """
+    """Return a finger with a tip of another size, of the same pulp."""
+    # As many pins as before are under it, and each has a smaller area: its share of the law of a flat plate
+    # goes with the square of the size.
     tip, contact = finger.fingertip, finger.contact
     if tip is not None:
         tip = replace(tip, length=tip.length * share, width=tip.width * share, height=tip.height * share)
@@ -134,17 +125,15 @@ def _scale_tip(finger: Finger, share: float) -> Finger:
 
 
 def _scale_control(control: ControlParameters, share: float) -> ControlParameters:
-    """Return a control for a finger of another size, on pins of another bore, behind the same valves.
-
-    The pins' areas go with the square of the size: so do all forces, and the pins' speeds with its inverse.
-    The flow goes with the square of the opening, which is the gain times the force. So a gain that goes with
-    the inverse of the size leaves the finger's speed at a given share of the set point what it was. Heights
-    are those of the clay, and stay.
-    """
+    """Return a control for a finger of another size, on pins of another bore, behind the same valves."""
+    # The pins' areas go with the square of the size: so do all forces, and the pins' speeds with its inverse.
+    # The flow goes with the square of the opening, which is the gain times the force. So a gain that goes
+    # with the inverse of the size leaves the fingertip's speed at a given share of the set point what it was.
+    # Heights are those of the clay, and stay.
     factors = {"N": share**2, "N/m": share**2, "N s/m": share**2, "1/N": 1.0 / share, "m2/s": share**2}
-    known = list_quantities(control)
-    change = {name: factors[one.unit] for name, one in known.items() if one.unit in factors}
-    change |= {name: share for name in ("radius", "travel", "jump") if name in known}
+    quantities = list_quantities(control)
+    change = {name: factors[kind.unit] for name, kind in quantities.items() if kind.unit in factors}
+    change |= {name: share for name in ("radius", "travel", "jump") if name in quantities}
     return replace(control, **{name: getattr(control, name) * factor for name, factor in change.items()})
 
 
@@ -153,15 +142,9 @@ def fit_blister(blister: Blister, layout: Layout) -> Blister:
     widest = max(layout.columns * layout.pitch, layout.rows * layout.row_spacing) / 2
     if blister.radius <= widest:
         return blister
-    return _scale_blister(blister, widest / blister.radius)
+    return scale_blister(blister, widest / blister.radius)
 
 
-def _scale_blister(blister: Blister, share: float) -> Blister:
+def scale_blister(blister: Blister, share: float) -> Blister:
     """Return a blister of another size, in the same proportions."""
-    return replace(
-        blister,
-        radius=blister.radius * share,
-        edge_radius=blister.edge_radius * share,
-        flat_radius=blister.flat_radius * share,
-        sigma=blister.sigma * share,
-    )
+    return replace(blister, **{name: share * getattr(blister, name) for name in LENGTHS})

@@ -12,13 +12,11 @@ from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..roles import fingertip_of
 from .declared import assign, read
-from .devices import fit_blister
+from .devices import LENGTHS, fit_blister, scale_blister
 from .shown_units import SHOWN, to_si
 
 #: Least and largest size, m: narrower than that a finger falls between pins, wider than that no hand is.
 SMALLEST, LARGEST = 1e-3, 0.2
-#: Lengths of a blister.
-LENGTHS = ("radius", "edge_radius", "flat_radius", "sigma")
 
 
 def read_finger(settings: Any) -> Fingertip:
@@ -65,24 +63,17 @@ def _pose(tip: Any) -> Any | None:
 
 
 def _scale_blister(settings: Any, before: Fingertip, after: Fingertip) -> None:
-    """Scale the blister with the width of the finger, no wider than the bed.
-
-    One that the bed has limited remembers the width of the finger that it suits, so that a palm and then
-    a fingertip again leave it as it was.
-    """
+    """Scale the blister with the width of the finger, no wider than the bed."""
+    # One that the bed has limited remembers the width of the finger that it suits, so that a palm and then
+    # a fingertip again leave it as it was.
     blister = Blister(**read(settings.blister, Blister, {}, "blister"))
     layout = Layout(**read(settings.layout, Layout, {}, "layout"))
-    limited = settings.blister_suits > 0.0 and fit_blister(_scale(blister, 1.01), layout).radius < 1.001 * (
-        blister.radius
-    )
+    limited = settings.blister_suits > 0.0 and fit_blister(
+        scale_blister(blister, 1.01), layout
+    ).radius < 1.001 * (blister.radius)
     suited = 1e-3 * settings.blister_suits if limited else before.width
-    wanted = _scale(blister, after.width / suited)
+    wanted = scale_blister(blister, after.width / suited)
     fitted = fit_blister(wanted, layout)
     settings.blister_suits = 1e3 * after.width * fitted.radius / wanted.radius if fitted != wanted else 0.0
     for name in LENGTHS:
         assign(settings.blister, Blister, name, getattr(fitted, name))
-
-
-def _scale(blister: Blister, share: float) -> Blister:
-    """Return a blister with all its lengths scaled."""
-    return replace(blister, **{name: share * getattr(blister, name) for name in LENGTHS})

@@ -17,17 +17,14 @@ from ..core.scene.toml_table import PRESETS
 from ..roles import fingertip_of
 from ..ui_text import localize
 from . import finger_size
-from .declared import WHOLE, Update, assign, group, read, reset, title, whole
+from .declared import WHOLE, Update, assign, group, make_group, read, reset, title, whole
 
 #: Blender keeps no reference to the texts of a list that is made on demand: this one does.
 OFFERED: list[tuple[str, str, str, int]] = []
 
 
 def method_of(settings: Any) -> str:
-    """Return the name of a bed's control method, whether or not it is known here.
-
-    `settings` bpy.types.PropertyGroup.
-    """
+    """Return the name of a bed's control method, whether or not it is known here."""
     name: str = settings.own_method or settings.method
     return name
 
@@ -48,10 +45,7 @@ def method_property(settings: Any) -> str:
 
 
 def list_offered(settings: Any, context: Any) -> list[tuple[str, str, str, int]]:
-    """Return the methods to choose from, and the bed's own where that is not known here.
-
-    `settings` bpy.types.PropertyGroup; `context` bpy.types.Context.
-    """
+    """Return the methods to choose from, and the bed's own where that is not known here."""
     added = list_added()
     offered = [(name, localize(title(name)), "") for name in METHODS]
     offered += [(name, title(name), method.describe()) for name, method in added.items()]
@@ -69,7 +63,7 @@ def place_of(settings: Any) -> int:
 
 
 def choose(settings: Any, place: int) -> None:
-    """Set the method by its place among those offered. `settings` bpy.types.PropertyGroup."""
+    """Set the method by its place among those offered."""
     name = list_offered(settings, None)[place][0]
     if name in METHODS:
         settings.method = name
@@ -174,12 +168,6 @@ def use_properties() -> dict[str, Any]:
             default=section not in UNASKED,
         )
     return switches
-
-
-def make_group(name: str, words: str, properties: dict[str, Any]) -> type:
-    """Make a property group of properties."""
-    content = {"__annotations__": properties, "__module__": __name__, "__doc__": words}
-    return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
 
 
 def pointers(groups: dict[str, type]) -> dict[str, Any]:

@@ -13,17 +13,17 @@ from ..ui_text import localize
 from .declared import group, title
 from .groups import CONTROL, name_pointer
 
-#: What is told of a folder whose place depends on the file that is open.
+#: Refusal of a folder whose place depends on the file that is open.
 RELATIVE = "Own Methods must be a full path (got {!r}): choose the folder again, after the .blend was saved."
 
 #: What is loaded, and the groups of the methods' parameters; Blender's classes are of the process as well.
-_PRESENT: list[FolderMethods] = [FolderMethods()]
+_present = FolderMethods()
 _GROUPS: dict[str, type] = {}
 
 
 def read_present() -> FolderMethods:
     """Return what is loaded, and what was refused."""
-    return _PRESENT[0]
+    return _present
 
 
 def is_full(folder: str) -> bool:
@@ -37,19 +37,17 @@ def find_full_path(folder: str) -> str:
 
 
 def load(folder: str) -> None:
-    """Run the files of a folder, in place of those that were loaded before.
-
-    `folder`: a full path; empty: none.
-    """
+    """Run the files of a folder, in place of those that were loaded before."""
+    global _present
     clear()
     if not folder:
         return
     if not is_full(folder):
-        _PRESENT[0] = FolderMethods((), (localize(RELATIVE, folder),))
+        _present = FolderMethods((), (localize(RELATIVE, folder),))
         return
-    found = load_folder(Path(folder))
-    names, refused = [], list(found.refused)
-    for name in found.names:
+    loaded = load_folder(Path(folder))
+    names, refused = [], list(loaded.refused)
+    for name in loaded.names:
         try:
             _register_group(name)
         except (TypeError, ValueError, RuntimeError, OverflowError) as error:  # what Blender cannot hold
@@ -57,18 +55,19 @@ def load(folder: str) -> None:
             refused.append(f"{name}: Blender must be able to hold its parameters (got {one_line(error)}).")
         else:
             names.append(name)
-    _PRESENT[0] = FolderMethods(tuple(names), tuple(refused))
+    _present = FolderMethods(tuple(names), tuple(refused))
 
 
 def clear() -> None:
     """Take back what was loaded; beds keep the name and the parameters of their method."""
-    for name in read_present().names:
+    global _present
+    for name in _present.names:
         remove_method(name)
     for name, kind in _GROUPS.items():
         delattr(CONTROL, name_pointer(name))
         bpy.utils.unregister_class(kind)
     _GROUPS.clear()
-    _PRESENT[0] = FolderMethods()
+    _present = FolderMethods()
 
 
 def _register_group(name: str) -> None:

@@ -44,10 +44,7 @@ def path(name: str) -> Path:
 
 
 def save(name: str, scene: Scene) -> Path:
-    """Save a scene as a preset, in place of one of the same name.
-
-    Raises OutputError when a preset cannot have that name, or its file cannot be written.
-    """
+    """Save a scene as a preset, in place of one of the same name."""
     file = path(name)
     partial = file.with_suffix(".partial")
     try:

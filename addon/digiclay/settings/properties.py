@@ -26,11 +26,7 @@ _NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
 
 
 def relabel(error: ParameterError) -> ParameterError:
-    """Return an error of the core with its owner, field, rule and value as the panels show them.
-
-    ``layout.pitch must be at least actuator.bore, 0.002 m (got 0.001 m)`` becomes
-    ``Layout: Pitch must be at least Actuator: Bore, 2 mm (got 1 mm)``.
-    """
+    """Return an error of the core with its owner, field, rule and value as the panels show them."""
 
     def labeled(found: re.Match[str]) -> str:
         return f"{title(found[1])}: {title(found[2])}" if found[2] in _known(found[1]) else found[0]
@@ -78,10 +74,7 @@ def read_stored_settings(bed: Any) -> StoredSettings:
 
 
 def scene_of(bed: Any) -> Scene:
-    """Return the scene a bed's settings describe; the finger's path is one press in the middle.
-
-    `bed` bpy.types.Object. Raises ParameterError: its owner and field are those of the panels.
-    """
+    """Return the scene a bed's settings describe; the finger's path is one press in the middle."""
     scene = read_scene(bed)
     reason = find_layout_mismatch(bed, scene.layout)
     if reason:
@@ -100,10 +93,7 @@ def read_scene(bed: Any) -> Scene:
 
 
 def table_of(bed: Any) -> dict[str, Any]:
-    """Return a bed's settings as the tables of a scene file.
-
-    Raises ParameterError: on a list that cannot be read; its owner is the section.
-    """
+    """Return a bed's settings as the tables of a scene file."""
     settings = bed.digiclay
     method, notes = method_of(settings), _notes(settings)
     formed = find_method(method).blister is not None  # refuses one that is not known here
@@ -124,10 +114,7 @@ def table_of(bed: Any) -> dict[str, Any]:
 
 
 def write_scene(bed: Any, scene: Scene) -> None:
-    """Write a scene's values into a bed's settings; a part it leaves out keeps its own, unused.
-
-    `bed` bpy.types.Object; `scene`: its name, description and path are not settings of a bed.
-    """
+    """Write a scene's values into a bed's settings; a part it leaves out keeps its own, unused."""
     settings = bed.digiclay
     # These two first: choosing them by hand sets others along with them.
     settings.preset = scene.preset
@@ -151,10 +138,7 @@ def rebuild_reason(bed: Any) -> str:
 
 
 def part_group(settings: Any, section: str) -> Any:
-    """Return the property group of a section; that of the control is its method's.
-
-    `settings` bpy.types.PropertyGroup; `section`: of the scene file.
-    """
+    """Return the property group of a section; that of the control is its method's."""
     if section == "control":
         return find_group(settings)  # None: the method is not known here
     return getattr(settings, section)
@@ -196,7 +180,7 @@ def _printable(name: str) -> str:
 
 
 def find_layout_mismatch(bed: Any, layout: Layout) -> str:
-    """Return why a bed is not the one a layout describes, or an empty text. `bed` bpy.types.Object."""
+    """Return why a bed is not the one a layout describes, or an empty text."""
     pins, wanted = len(bed.data.vertices), layout.rows * layout.columns
     if pins != wanted:
         return f"The bed has {pins} pins, not {wanted}"

@@ -27,32 +27,21 @@ _MEASURED = re.compile(r"(?<![\w.])([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?) (m/s|m2/s|
 
 
 def unit_of(unit: str, default: object) -> tuple[str, int]:
-    """Return the unit a parameter is shown in, and its power of ten per SI unit.
-
-    `unit`: the SI unit of its declaration, empty for a plain number; `default`: its default: a time of a
-    second or more, or of zero, is shown in s.
-    """
+    """Return the unit a parameter is shown in, and its power of ten per SI unit."""
     if unit == "s" and isinstance(default, float) and (default == 0.0 or default >= LONG):
         return "s", 0
     return SHOWN.get(unit, (unit, 0))
 
 
 def to_shown(value: float, power: int) -> float:
-    """Return an SI value in the unit it is shown in, free of the noise of a product: 0.003 m is 3 mm.
-
-    `value`: SI; `power`: of ten, shown units per SI unit.
-    """
+    """Return an SI value in the unit it is shown in, free of the noise of a product: 0.003 m is 3 mm."""
     return float(Decimal(repr(value)).scaleb(power))
 
 
 def to_si(value: float, power: int) -> float:
-    """Return the SI value of a number kept by Blender in 32 bits.
-
-    The number is taken at the seven digits it was meant with: 0.3 mm, kept as 0.300000012, is 0.0003 m.
-    Whatever is not finite is handed on, for the part's own rules to refuse.
-
-    `value`: in the shown unit; `power`: of ten, shown units per SI unit.
-    """
+    """Return the SI value of a number kept by Blender in 32 bits."""
+    # The number is taken at the seven digits it was meant with: 0.3 mm, kept as 0.300000012, is 0.0003 m.
+    # Whatever is not finite is handed on, for the part's own rules to refuse.
     if not math.isfinite(value):
         return value
     return float(Decimal(f"{value:.{DIGITS}g}").scaleb(-power))

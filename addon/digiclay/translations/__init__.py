@@ -36,12 +36,8 @@ def _catalog(language: str) -> dict[str, dict[str, str]]:
 
 @cache
 def translate(text: str, language: str) -> str | None:
-    """Return the translation of a label or a tooltip, or None where the catalog has none.
-
-    A unit in brackets, and what a tooltip adds of a parameter, stay what they are.
-
-    `language`: one of `LANGUAGES`.
-    """
+    """Return the translation of a label or a tooltip, or None where the catalog has none."""
+    # A unit in brackets, and what a tooltip adds of a parameter, stay what they are.
     known = _catalog(language)
     for section in ("labels", "tooltips", "parameters", "messages"):
         if text in known[section]:
