@@ -106,25 +106,29 @@ def test_an_obj_stands_upright_after_its_import_with_the_same_axes(bed, tmp_path
     np.testing.assert_allclose(known, np.column_stack([wanted.position, wanted.height]) * 1e3, atol=1e-4)
 
 
-@pytest.mark.parametrize("file_format", FORMATS)
-def test_every_format_is_written_with_its_ending(bed, tmp_path, file_format):
-    bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), file_format=file_format)
-    assert [path.name for path in tmp_path.iterdir()] == [f"bed{find_suffix(file_format)}"]
-
-
-def test_a_name_gets_the_ending_of_its_format_in_place_of_another(bed, tmp_path):
-    for name in ("one.STL", "two.ascii.stl", "three.part", "four.3mf"):
-        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), file_format="stl")
-    found = sorted(path.name for path in tmp_path.iterdir())
-    assert found == ["four.stl", "one.STL", "three.part.stl", "two.stl"]
-
-
-def test_a_format_nobody_asked_for_is_told_by_the_name(bed, tmp_path):
-    for name in ("one.obj", "two.GLB", "three.ascii.stl", "four.stl", "five.part"):
-        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), kind="surface")
-    found = sorted(path.name for path in tmp_path.iterdir())
-    assert found == ["five.part.stl", "four.stl", "one.obj", "three.ascii.stl", "two.GLB"]
-    assert (tmp_path / "two.GLB").read_bytes()[:4] == b"glTF"
+@pytest.mark.parametrize(
+    ("name", "file_format", "written"),
+    [
+        *(("bed.stl", kind, f"bed{find_suffix(kind)}") for kind in FORMATS),
+        # The ending of another format is replaced by that of the one chosen.
+        ("one.STL", "stl", "one.STL"),
+        ("two.ascii.stl", "stl", "two.stl"),
+        ("three.part", "stl", "three.part.stl"),
+        ("four.3mf", "stl", "four.stl"),
+        # Without a choice the ending tells the format.
+        ("one.obj", None, "one.obj"),
+        ("two.GLB", None, "two.GLB"),
+        ("three.ascii.stl", None, "three.ascii.stl"),
+        ("four.stl", None, "four.stl"),
+        ("five.part", None, "five.part.stl"),
+    ],
+)
+def test_a_file_has_the_ending_of_its_format(bed, tmp_path, name, file_format, written):
+    options = {"file_format": file_format} if file_format else {}
+    bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), kind="surface", **options)
+    assert [path.name for path in tmp_path.iterdir()] == [written]
+    if name == "two.GLB":
+        assert (tmp_path / written).read_bytes()[:4] == b"glTF"
 
 
 def test_each_feature_can_have_a_file_of_its_own(bed, tmp_path):
@@ -135,15 +139,21 @@ def test_each_feature_can_have_a_file_of_its_own(bed, tmp_path):
     assert names == ["grüne Form_boss_1.stl", "grüne Form_crease_1.stl"]
 
 
-def test_a_folder_that_is_not_there_is_told_in_one_line(bed, tmp_path):
-    with pytest.raises(RuntimeError, match=r"Cannot write .*bed\.stl: No such file or directory\.") as caught:
-        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "missing" / "bed.stl"))
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("missing/bed.stl", {}, r"Cannot write .*bed\.stl: No such file or directory\."),
+        (
+            "bed.stl",
+            {"kind": "features", "threshold": 50.0},
+            "There is no feature of at least 3 pins more than 50 mm off",
+        ),
+    ],
+)
+def test_an_export_that_cannot_be_written_is_refused_in_one_line(bed, tmp_path, name, options, message):
+    with pytest.raises(RuntimeError, match=message) as caught:
+        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), **options)
     assert "Traceback" not in str(caught.value)
-
-
-def test_without_features_the_export_says_what_was_looked_for(bed, tmp_path):
-    with pytest.raises(RuntimeError, match=r"There is no feature of at least 3 pins more than 50 mm off"):
-        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "a.stl"), kind="features", threshold=50.0)
     assert not list(tmp_path.iterdir())
 
 

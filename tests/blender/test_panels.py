@@ -26,11 +26,6 @@ def bed() -> Any:
     return bpy.context.object
 
 
-def parts(bed: Any) -> list[Any]:
-    """Return the objects a user can make active: the bed, the fingertip, its ellipsoid."""
-    return [bed, *bed.children_recursive]
-
-
 def in_the_tab() -> list[Any]:
     """Return the panels but for those that open from the header of the tool."""
     drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
@@ -42,26 +37,17 @@ def panel(name: str) -> Any:
     return getattr(bpy.types, f"DIGICLAY_PT_{name}")
 
 
-def test_whichever_part_is_active_the_panels_are_about_its_bed(bed: Any) -> None:
-    assert len(parts(bed)) == 3
-    for part in parts(bed):
-        bpy.context.view_layer.objects.active = part
-        assert bed_of(bpy.context) == bed
-
-
-def test_of_two_beds_the_panels_are_about_the_active_one(bed: Any) -> None:
+def test_the_panels_are_about_the_bed_that_the_active_object_belongs_to(bed: Any) -> None:
     bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
-    other = bpy.context.object
-    assert bed_of(bpy.context) == other
-    bpy.context.view_layer.objects.active = view.fingertip_of(bed)
-    assert bed_of(bpy.context) == bed
-
-
-def test_something_parented_to_a_bed_belongs_to_it(bed: Any) -> None:
+    assert bed_of(bpy.context) == bpy.context.object
     cube = bpy.data.objects["Cube"]
     cube.parent = view.fingertip_of(bed)
-    bpy.context.view_layer.objects.active = cube
-    assert bed_of(bpy.context) == bed
+    for part in (bed, *bed.children_recursive):
+        bpy.context.view_layer.objects.active = part
+        assert bed_of(bpy.context) == bed
+    assert len(bed.children_recursive) == 3  # fingertip, its ellipsoid, the cube
+    assert not panel("start").poll(bpy.context)
+    assert panel("device").poll(bpy.context)
 
 
 @pytest.mark.parametrize("active", ["Cube", None])
@@ -71,11 +57,6 @@ def test_without_a_bed_there_is_only_the_panel_that_offers_one(active: str | Non
         kind.bl_idname for kind in panels.CLASSES if hasattr(kind, "bl_category") and kind.poll(bpy.context)
     ]
     assert shown == ["DIGICLAY_PT_start"]
-
-
-def test_with_a_bed_there_is_no_panel_that_offers_one(bed: Any) -> None:
-    assert not panel("start").poll(bpy.context)
-    assert panel("device").poll(bpy.context)
 
 
 def test_every_part_of_a_scene_has_a_panel() -> None:

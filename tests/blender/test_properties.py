@@ -12,7 +12,7 @@ from digiclay import bridge
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
-from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.scene.scene_source import find, list_samples, load
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
@@ -122,28 +122,25 @@ def test_a_part_that_is_switched_off_is_left_out(section: str) -> None:
     assert properties.scene_of(bed).section(section) is not None
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-def test_choosing_a_preset_gives_the_scene_of_that_preset(preset: str) -> None:
+@pytest.mark.parametrize(
+    ("section", "name", "before", "value", "table"),
+    [
+        *(("", "preset", "viscous", name, {"preset": name}) for name in PRESETS),
+        *(("", "method", "cell_states", name, {"control": {"method": name}}) for name in METHODS),
+        *(
+            ("layout", "arrangement", "hexagonal", name, {"layout": {"arrangement": name}})
+            for name in ARRANGEMENTS
+        ),
+    ],
+)
+def test_a_choice_gives_the_scene_that_a_file_with_it_has(
+    section: str, name: str, before: str, value: str, table: dict[str, Any]
+) -> None:
     bed = thing()
-    bed.digiclay.preset = "viscous"
-    bed.digiclay.preset = preset
-    assert properties.scene_of(bed) == resolve({"preset": preset}, bed.name)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_choosing_a_method_gives_the_scene_of_that_method(method: str) -> None:
-    bed = thing()
-    bed.digiclay.method = "cell_states"
-    bed.digiclay.method = method
-    assert properties.scene_of(bed) == resolve({"control": {"method": method}}, bed.name)
-
-
-@pytest.mark.parametrize("arrangement", ["hexagonal", "aligned", "staggered"])
-def test_choosing_an_arrangement_gives_the_contact_it_needs(arrangement: str) -> None:
-    bed = thing()
-    bed.digiclay.layout.arrangement = "hexagonal"
-    bed.digiclay.layout.arrangement = arrangement
-    assert properties.read_scene(bed) == resolve({"layout": {"arrangement": arrangement}}, bed.name)
+    group = getattr(bed.digiclay, section) if section else bed.digiclay
+    setattr(group, name, before)
+    setattr(group, name, value)
+    assert properties.read_scene(bed) == resolve(table, bed.name)
 
 
 def test_each_method_keeps_parameters_of_its_own() -> None:
@@ -163,19 +160,17 @@ def test_settings_that_do_not_go_together_are_told_in_the_words_of_the_panel() -
         properties.scene_of(bed)
 
 
-@pytest.mark.parametrize("typed", ["", "4; 70", "4, , 70", "four"])
-def test_a_list_that_is_none_is_refused(typed: str) -> None:
+@pytest.mark.parametrize(
+    ("typed", "rule"),
+    [
+        *((typed, "be numbers separated by commas") for typed in ("", "4; 70", "4, , 70", "four")),
+        *((typed, "be (a finite number|at least)") for typed in ("nan, 70", "4, inf, 5", "-4, 70", "0, 70")),
+    ],
+)
+def test_a_list_without_sense_is_refused(typed: str, rule: str) -> None:
     bed = thing()
     bed.digiclay.relaxation.times = typed
-    with pytest.raises(ParameterError, match=r"^Relaxation: Times must be numbers separated by commas"):
-        properties.scene_of(bed)
-
-
-@pytest.mark.parametrize("typed", ["nan, 70, 1400", "4, inf, 5", "-4, 70, 1400", "0, 70, 1400"])
-def test_a_list_of_numbers_out_of_bounds_is_refused(typed: str) -> None:
-    bed = thing()
-    bed.digiclay.relaxation.times = typed
-    with pytest.raises(ParameterError, match=r"^Relaxation: Times must be (a finite number|at least)"):
+    with pytest.raises(ParameterError, match=rf"^Relaxation: Times must {rule}"):
         properties.scene_of(bed)
 
 

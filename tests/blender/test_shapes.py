@@ -176,15 +176,25 @@ def test_a_mesh_made_of_the_clay_is_the_same_clay_when_it_goes_in_again() -> Non
 # Refusals
 
 
-def test_without_an_object_the_button_says_what_to_select() -> None:
+def refused(words: str, operator: Any = None, **options: Any) -> None:
+    """Call an operator, and find the bed as it was."""
+    with pytest.raises(RuntimeError, match=words):
+        (operator or bpy.ops.digiclay.shape_from_object)(**options)
+    made = next(thing for thing in bpy.data.objects if view.is_bed(thing))
+    assert np.ptp(heights(made)) == 0.0
+    assert not made.digiclay.use_shape
+
+
+def test_without_an_object_over_the_bed_the_button_says_what_to_do() -> None:
     bed()
     assert not bpy.ops.digiclay.shape_from_object.poll()
-    with pytest.raises(RuntimeError, match="Select the object first, then the bed"):
-        bpy.ops.digiclay.shape_from_object()
+    refused("Select the object first, then the bed")
+    cube(0.2, 0.2, at=(9, 9, 0))
+    refused("must leave the shape over the bed", fit="placed")
 
 
 @pytest.mark.parametrize(
-    ("vertices", "faces", "said"),
+    ("vertices", "faces", "words"),
     [
         ([], [], "must hold a surface made of faces"),
         ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], "must hold a surface made of faces"),
@@ -192,31 +202,18 @@ def test_without_an_object_the_button_says_what_to_select() -> None:
         ([(0, 0, 0), (1, 0, 0), (1, 0, 1)], [(0, 1, 2)], "must be wider than a line"),
     ],
 )
-def test_an_object_that_is_no_shape_is_refused_and_the_bed_stays(
-    vertices: list[Any], faces: list[Any], said: str
-) -> None:
-    made = bed()
-    object_beside("Odd", vertices, faces)
-    with pytest.raises(RuntimeError, match=said):
-        bpy.ops.digiclay.shape_from_object()
-    assert np.ptp(heights(made)) == 0.0
-    assert not made.digiclay.use_shape
-
-
-def test_an_object_beside_the_bed_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_object_that_is_no_shape_is_refused(vertices: list[Any], faces: list[Any], words: str) -> None:
     bed()
-    cube(0.2, 0.2, at=(9, 9, 0))
-    with pytest.raises(RuntimeError, match="must leave the shape over the bed"):
-        bpy.ops.digiclay.shape_from_object(fit="placed")
+    object_beside("Odd", vertices, faces)
+    refused(words)
 
 
 @pytest.mark.parametrize("name", ["nowhere.stl", "empty.png", "empty.npy", "empty.stl"])
-def test_a_file_that_is_none_is_told(tmp_path: Path, name: str) -> None:
+def test_a_file_that_is_none_is_refused(tmp_path: Path, name: str) -> None:
     bed()
     if name != "nowhere.stl":
         (tmp_path / name).touch()
-    with pytest.raises(RuntimeError, match=name):
-        bpy.ops.digiclay.shape_from_file(filepath=str(tmp_path / name))
+    refused(name, bpy.ops.digiclay.shape_from_file, filepath=str(tmp_path / name))
 
 
 # Pictures by Blender itself

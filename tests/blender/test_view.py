@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -39,16 +40,16 @@ def bed(formed: Instant) -> Any:
     return view.build(formed, bpy.context.scene.collection)
 
 
-def test_the_pins_drawn_stand_where_the_arrays_say(bed: Any, formed: Instant) -> None:
-    tops, _ = drawn_pins(bed)
-    assert tops.shape == (48, 3)
-    np.testing.assert_allclose(tops[:, :2], formed.position, rtol=0, atol=FLOAT32)
-    np.testing.assert_allclose(tops[:, 2], formed.height, rtol=0, atol=FLOAT32)
-
-
-def test_every_pin_drawn_wears_the_material_of_its_mode(bed: Any, formed: Instant) -> None:
-    _, materials = drawn_pins(bed)
-    assert materials == [Mode(int(code)).name.lower() for code in formed.mode]
+def test_the_pins_drawn_stand_where_the_arrays_say_in_the_material_of_their_mode(
+    bed: Any, formed: Instant
+) -> None:
+    later = replace(formed, height=formed.height[::-1], mode=formed.mode[::-1])
+    for instant in (formed, later):
+        view.show(bed, instant)
+        tops, materials = drawn_pins(bed)
+        wanted = np.column_stack([instant.position, instant.height])
+        np.testing.assert_allclose(tops, wanted, rtol=0, atol=FLOAT32)
+        assert materials == [Mode(int(code)).name.lower() for code in instant.mode]
 
 
 def test_the_modes_have_as_many_materials_each_in_its_color(bed: Any) -> None:
@@ -59,21 +60,6 @@ def test_the_modes_have_as_many_materials_each_in_its_color(bed: Any) -> None:
         # Both are stored as float32 numbers up to 1.
         np.testing.assert_allclose(material.diffuse_color, wanted, rtol=0, atol=1e-6)
         np.testing.assert_allclose(shader.inputs["Base Color"].default_value, wanted, rtol=0, atol=1e-6)
-
-
-def test_showing_another_instant_moves_and_recolors_the_pins(bed: Any, formed: Instant) -> None:
-    drawn_pins(bed)
-    later = Instant(
-        position=formed.position,
-        height=formed.height[::-1],
-        mode=formed.mode[::-1],
-        force=formed.force,
-        fingertip=formed.fingertip,
-    )
-    view.show(bed, later)
-    tops, materials = drawn_pins(bed)
-    np.testing.assert_allclose(tops[:, 2], later.height, rtol=0, atol=FLOAT32)
-    assert materials == [Mode(int(code)).name.lower() for code in later.mode]
 
 
 def test_cells_are_read_back_as_they_were_written(bed: Any, formed: Instant) -> None:
@@ -134,11 +120,6 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed: Any, formed: Ins
     assert deck / bridge.SCALE < formed.height.min()
 
 
-def of_the_pins(bed: Any) -> list[str]:
-    """Name the material of every instance drawn for a bed, arrows included."""
-    return drawn_pins(bed)[1]
-
-
 def test_the_fingertip_is_an_empty_and_the_ellipsoid_in_it_cannot_be_picked_by_mistake(bed: Any) -> None:
     tip = view.fingertip_of(bed)
     (ball,) = tip.children
@@ -182,23 +163,34 @@ def test_a_bed_that_is_not_uniformly_scaled_is_refused_with_the_reason(
 
 
 def test_a_bed_sheared_by_its_parent_is_refused(bed: Any) -> None:
-    parent = bpy.data.objects["Cube"]
-    bed.parent = parent
-    parent.scale = (1.0, 2.0, 1.0)
-    bed.rotation_euler = (0.0, 0.0, 0.7853981)
+    bed.parent, bed.rotation_euler = bpy.data.objects["Cube"], (0.0, 0.0, 0.7853981)
+    bed.parent.scale = (1.0, 2.0, 1.0)
     bpy.context.view_layer.update()
     with pytest.raises(DigiclayError, match="sheared"):
         bridge.uniform(bed)
 
 
+@pytest.mark.parametrize(
+    ("change", "value", "message"),
+    [
+        *((view.scale_arrows, value, "must be above 0") for value in (0.0, -1.0, np.nan, np.inf)),
+        *((view.scale_colors, value, "must be above 0") for value in (0.0, -1.0, np.nan, np.inf)),
+        (view.color_by, "height", "mode, force"),
+    ],
+)
+def test_a_display_that_draws_nothing_is_refused(bed: Any, change: Any, value: Any, message: str) -> None:
+    with pytest.raises(DigiclayError, match=message):
+        change(bed, value)
+
+
 def test_every_pin_wears_the_color_of_its_level_of_force(bed: Any, formed: Instant) -> None:
     view.color_by(bed, "force")
-    assert of_the_pins(bed) == [f"force_{level:02d}" for level in heat.level(formed.force)]
+    assert drawn_pins(bed)[1] == [f"force_{level:02d}" for level in heat.level(formed.force)]
     assert len(set(heat.level(formed.force))) == 13
     view.scale_colors(bed, 2.0)
-    assert of_the_pins(bed) == [f"force_{level:02d}" for level in heat.level(formed.force, 2.0)]
+    assert drawn_pins(bed)[1] == [f"force_{level:02d}" for level in heat.level(formed.force, 2.0)]
     view.color_by(bed, "mode")
-    assert of_the_pins(bed) == [Mode(int(code)).name.lower() for code in formed.mode]
+    assert drawn_pins(bed)[1] == [Mode(int(code)).name.lower() for code in formed.mode]
 
 
 def arrows(bed: Any) -> np.ndarray:
@@ -271,19 +263,6 @@ def test_a_running_session_moves_the_pins_and_leaves_the_fingertip_to_the_user(b
     tops, _ = drawn_pins(bed)
     np.testing.assert_allclose(tops[:, 2], system.cell.actuator.rest_height, rtol=0, atol=FLOAT32)
     assert tip.location.x > 0.9
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_scale_of_the_display_that_draws_nothing_is_refused(bed: Any, value: float) -> None:
-    with pytest.raises(DigiclayError, match="must be above 0"):
-        view.scale_arrows(bed, value)
-    with pytest.raises(DigiclayError, match="must be above 0"):
-        view.scale_colors(bed, value)
-
-
-def test_another_coloring_is_refused_with_the_known_ones(bed: Any) -> None:
-    with pytest.raises(DigiclayError, match="mode, force"):
-        view.color_by(bed, "height")
 
 
 def test_a_bed_whose_nodes_were_removed_is_refused_by_name_and_shows_no_forces(bed: Any) -> None:
