@@ -16,7 +16,7 @@ from ..base.modes import Mode
 from ..engine.simulation import repeat_period, simulate_period
 from ..engine.state import ActiveSet, State
 from ..engine.system import System
-from ..metrics.finger_path import CellSums
+from ..metrics.finger_path import CellSums, sum_row
 from ..metrics.summary import compute_metrics_from_sums
 from ..model.fingertip import require_one
 from ..model.layout import Grid
@@ -276,13 +276,9 @@ class Sums:
 
     def _sum(self, held: ActiveSet) -> Floats:
         """Return the numbers of a row of `CellSums`, total to strongest, shape (5, b)."""
-        force = held.block[self._force, : held.near]
-        sums = np.empty((5, force.shape[1]))
-        np.add.reduce(force, out=sums[0])
-        for values, found in zip((*held.quadratic_basis[1:3], held.block[0]), sums[1:4], strict=True):
-            np.einsum("kb,kb->b", values[: held.near], force, out=found)
-        np.maximum.reduce(force, out=sums[4], initial=0.0)
-        return sums
+        near = slice(held.near)
+        x, y = (along[near] for along in held.quadratic_basis[1:3])
+        return sum_row(held.block[self._force, near], x, y, held.block[0, near])
 
 
 def _count_following(held: ActiveSet) -> NDArray[np.intp]:

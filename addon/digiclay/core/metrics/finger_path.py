@@ -74,10 +74,20 @@ def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
     total, height, force, position = (
         np.asarray(history[name], dtype=np.float64) for name in ("total_force", "height", "force", "position")
     )
-    x, y = (force @ position).T
-    lifted = np.einsum("tn,tn->t", force, height)
+    x, y = (np.broadcast_to(along[:, None], force.T.shape) for along in position.T)
+    _, x, y, lifted, strongest = sum_row(force.T, x, y, height.T)
     following = np.count_nonzero(np.asarray(history["mode"]) == Mode.FORCE_FOLLOW, axis=1)
-    return CellSums(total, x, y, lifted, force.max(axis=1), following, height[0], height[-1])
+    return CellSums(total, x, y, lifted, strongest, following, height[0], height[-1])
+
+
+def sum_row(force: Floats, x: Floats, y: Floats, height: Floats) -> Floats:
+    """Return total, x, y, height and strongest of `CellSums`, (5, b), of b rows of k cells, all (k, b)."""
+    sums = np.empty((5, force.shape[1]))
+    np.add.reduce(force, out=sums[0])
+    for values, found in zip((x, y, height), sums[1:4], strict=True):
+        np.einsum("kb,kb->b", values, force, out=found)
+    np.maximum.reduce(force, out=sums[4], initial=0.0)
+    return sums
 
 
 def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:

@@ -53,6 +53,8 @@ __all__ = [
 
 #: All cells.
 ALL = slice(None)
+#: No lag is longer, m.
+FARTHEST = 1e9
 
 #: Every key of `compute_metrics`: its unit and its meaning.
 METRICS: dict[str, tuple[str, str]] = {
@@ -137,8 +139,9 @@ def compute_metrics_from_sums(
     in a ridge. Returns see `compute_metrics`.
     """
     total, weight, felt, rows = sums.total, compute_weights(time), sums.touching, sums.shaping
-    # A finger straight above its blister is a rounding error away from it, not 1e-17 m.
-    behind = np.round(measure_lag(sums, fingertip), 12)
+    # A fingertip straight above its blister is a rounding error away from it, not 1e-17 m; forces in a file
+    # may give distances that cannot be rounded.
+    behind = np.round(np.minimum(measure_lag(sums, fingertip), FARTHEST), 12)
     above = measure_surface_under(sums, fingertip)
     ridge = measure_ridge_errors(position[near], sums.last[near], fingertip, rows)
     each = np.ones(len(ridge))
