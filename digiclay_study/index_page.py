@@ -128,7 +128,7 @@ def _write(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
 
 def _describe(unchanged: float | None, one: Response) -> str:
     """Return an output as a row of the table."""
-    factor, unit = read_unit(FIGURES[one.name][0], one.values)
+    factor, unit = read_unit(FIGURES[one.name].unit, one.values)
     values = one.values * factor
     usual = "–" if unchanged is None else f"{unchanged * factor:.4g}"
     numbers = (values.mean(), values.std(), values.min(), values.max())

@@ -19,10 +19,11 @@ from digiclay.commands.stop import Stop
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.base.quantity import UNITS, Parameters, list_quantities
 from digiclay.core.files.run_folder import write_whole
+from digiclay.core.metrics.metric_table import ERRORS
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.studies.axes import MOST, Point, find_value, place_points
-from digiclay.core.studies.evaluation import ERRORS, Pool, Record, find_figure
+from digiclay.core.studies.evaluation import Pool, Record, find_figure
 from digiclay.core.studies.series import Kind, open_series
 from digiclay.core.studies.sweep_plan import (
     POINTS,

@@ -41,7 +41,7 @@ class Response:
     @property
     def unit(self) -> str:
         """SI unit."""
-        return FIGURES[self.name][0]
+        return FIGURES[self.name].unit
 
 
 def find_excess_losses(records: Sequence[Record], reference: Record) -> Floats:

@@ -38,7 +38,7 @@ def draw_front(
     trials; SI; infinite where there are none; `sound` bool (points,), which keep the fingertip; `front`:
     points of the front; `chosen`: the chosen one of them. Returns its axes, by label: ``front``.
     """
-    units = [read_unit(FIGURES[name][0], values[sound, number]) for number, name in enumerate(names)]
+    units = [read_unit(FIGURES[name].unit, values[sound, number]) for number, name in enumerate(names)]
     shown = values * [factor for factor, _ in units]
     with canvas(9.0, 6.2, title) as (figure, place):
         axes = place("front", 1.0, 0.8, 7.7, 4.55)

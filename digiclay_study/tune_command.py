@@ -203,6 +203,6 @@ def _describe(names: Sequence[str], values: Any) -> str:
     """Return two outputs in the units people read."""
     parts = []
     for name, value in zip(names, values, strict=True):
-        factor, unit = read_unit(FIGURES[name][0], [value])
+        factor, unit = read_unit(FIGURES[name].unit, [value])
         parts.append(f"{name} {value * factor:.4g} {unit}".strip())
     return ", ".join(parts)

@@ -271,8 +271,7 @@ def test_a_history_without_rows_is_refused():
         compute_metrics(case, WHOLE)
 
 
-def test_the_summary_is_json_and_every_key_has_a_unit_and_a_meaning():
+def test_the_summary_is_json_and_has_every_key():
     found = compute_metrics(history(np.full(2001, 0.4)), WHOLE)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert list(found) == list(METRICS)
-    assert all(unit and meaning for unit, meaning in METRICS.values())

@@ -13,6 +13,7 @@ from typing import Any
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import lock_name, read_json, remove_abandoned, resolve_inside, write_whole
+from ..core.metrics.metric_table import ERRORS, METRICS, RUN
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series
@@ -30,16 +31,11 @@ SHOWN = ("film.mp4", "turntable.mp4", "still.png")
 UNDONE, AGAIN = [("not done yet", "")], 30
 #: Seconds to wait for another process that writes the page; and the age from which on jobs write it anew, s.
 PATIENCE, AGE = 20.0, 10.0
-#: What is told of a run: its figure, what it is called, factor and unit.
-FACTS: tuple[tuple[str, str, float, str], ...] = (
-    ("method", "method", 0.0, ""),
-    ("simulated", "simulated", 1.0, "s"),
-    ("run_time", "run time", 1.0, "s"),
-    ("rfd", "force deviation (RFD)", 1e3, "mN"),
-    ("lag_mean", "lag", 1e3, "mm"),
-    ("height_error", "height error, about", 1e6, "µm"),
-    ("force_error", "force error, about", 1e3, "mN"),
-)
+#: Metrics on the card of a run.
+FACTS = {
+    name: (RUN | METRICS | ERRORS)[name]
+    for name in ("simulated", "run_time", "rfd", "lag_mean", "height_error", "force_error")
+}
 
 
 @dataclass(frozen=True)
@@ -136,7 +132,9 @@ class Folder:
         run = self.find_run(job)
         thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
         metrics, timing = (read_json(run / name) or {} for name in ("metrics.json", TIMING))
-        facts = [(said, _format_figure(metrics.get(key), factor, unit)) for key, said, factor, unit in FACTS]
+        facts = [("method", str(metrics.get("method", "")))]
+        for name, metric in FACTS.items():
+            facts.append((metric.label, _format_figure(metrics.get(name), metric.factor, metric.shown)))
         if metrics.get("beyond_a_finger"):
             facts.append(("not to be trusted", metrics["beyond_a_finger"]))
         took = sum(value for value in timing.values() if isinstance(value, float))

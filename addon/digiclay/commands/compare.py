@@ -15,6 +15,7 @@ from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
 from ..core.files.run_folder import check_folder, find_name, write_folder
 from ..core.metrics.finger_path import sum_cells
+from ..core.metrics.metric_table import SPEEDS
 from ..core.model.control_interface import find_set_point
 from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
@@ -43,11 +44,6 @@ for each finished trial; after Ctrl-C the same command continues (docs/suite.md)
 """
 #: Units people read: factor and name.
 READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, "")}
-#: Metrics of `--speed`: unit and meaning.
-SPEEDS: dict[str, tuple[str, str]] = {
-    "largest_drag_speed": ("m/s", "fastest straight level drag of a ridge that is followed"),
-    "largest_lift_speed": ("m/s", "fastest lift straight up that is followed"),
-}
 Metrics = dict[str, float | None]
 #: Methods where none are named.
 DEFAULT = ("virtual_master", "cell_states")
@@ -114,7 +110,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             wanted = find_set_point(scene.set_point, sum_cells(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
             beyond[method] = done.metrics.get("beyond_a_finger", "")
-        units = {name: unit for name, (unit, _) in {**RUN_METRICS, **SPEEDS}.items()}
+        units = {name: metric.unit for name, metric in {**RUN_METRICS, **SPEEDS}.items()}
         known = {"scene": scene.name, "methods": found, "units": units, "beyond_a_finger": beyond}
         said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(said + "\n", encoding="utf-8")
@@ -177,7 +173,7 @@ def table(found: dict[str, Metrics]) -> Iterator[str]:
     names = [name for name in known if name in found[columns[0]]]
     rows = []
     for name in names:
-        factor, unit = READ.get(known[name][0], (1.0, known[name][0]))
+        factor, unit = READ.get(known[name].unit, (1.0, known[name].unit))
         values = (found[method][name] for method in columns)
         rows.append([name, unit, *("–" if value is None else f"{value * factor:.4g}" for value in values)])
     yield from aligned(("metric", "unit", *columns), rows, left=2)

@@ -10,29 +10,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.metrics.metric_table import Metric
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import Record
-from ..core.studies.league import KIND, Interval, Row, Table, find_interval
+from ..core.studies.league import KIND, MEASURES, Interval, Row, Table, find_interval
 from ..core.studies.method_trials import LIMITS, LOW, OUTCOMES
 from .gallery import wrap
 from .progress import table as aligned
 
-#: Columns of the league: measure, heading, factor to the unit shown, that unit, and the one of the CSV.
-COLUMNS: tuple[tuple[str, str, float, str, str], ...] = (
-    ("rfd", "RFD", 1e3, "mN", "N"),
-    ("rfd_jnd_least", "RFD, at least", 1.0, "JND", "1"),
-    ("rfd_jnd_most", "RFD, at most", 1.0, "JND", "1"),
-    ("lag_mean", "lag", 1e3, "mm", "m"),
-    ("ridge_unevenness", "unevenness", 1e3, "mm", "m"),
-    ("ridge_unevenness_touch", "unevenness", 1.0, "spatial resolutions", "1"),
-    ("relief_rms", "relief error", 1e3, "mm", "m"),
-    ("max_total_force", "largest force", 1.0, "N", "N"),
-    ("losses", "losses", 1.0, "", "1"),
-    ("contact_loss_share", "without contact", 1e2, "%", "1"),
-    *((name, name.replace("-", " "), 1e3, "mm/s", "m/s") for name in LIMITS),
-    ("period_cost", "cost of a period", 1e6, "µs", "s"),
-    ("cost_ratio", "cost, ratio", 1.0, "", "1"),
-)
 #: Columns of the table in a terminal.
 PRINTED = (
     "rfd", "lag_mean", "ridge_unevenness", "relief_rms", "max_total_force", "losses", *LIMITS, "cost_ratio",
@@ -105,23 +90,23 @@ def format_trajectories(source: Provenance, table: Table, methods: Sequence[str]
     rows = []
     for name in _list_trajectories(table):
         for method in methods:
-            for measure, (unit, _) in OUTCOMES.items():
+            for measure, metric in OUTCOMES.items():
                 found = find_interval(_select(table, method, name, measure))
                 if found is not None:
-                    rows.append([name, method, measure, unit, *_numbers(found)])
+                    rows.append([name, method, measure, metric.unit, *_numbers(found)])
     return _format_csv(source, head, rows)
 
 
 def format_league(source: Provenance, league: Sequence[Row]) -> str:
     """Return the league as CSV in SI units."""
     head = ["rank", "method"]
-    for name, _, _, _, unit in COLUMNS:
-        head += [f"{name} ({unit})", f"{name}, half width ({unit})"]
+    for name, metric in MEASURES.items():
+        head += [f"{name} ({metric.unit})", f"{name}, half width ({metric.unit})"]
     head += ["trajectories with a greater RFD than the first method", "trajectories"]
     rows = []
     for rank, row in enumerate(league, 1):
         cells: list[Any] = [rank, row.method]
-        for name, *_ in COLUMNS:
+        for name in MEASURES:
             found = row.measures[name]
             cells += ["", ""] if found is None else _numbers(found)[:2]
         rows.append([*cells, _plain(row.worse), row.trajectories])
@@ -130,12 +115,13 @@ def format_league(source: Provenance, league: Sequence[Row]) -> str:
 
 def print_league(league: Sequence[Row]) -> Iterator[str]:
     """Give the lines of the league for a terminal."""
-    columns = [column for column in COLUMNS if column[0] in PRINTED]
-    head = ("method", *(f"{title} {unit}".strip() for _, title, _, unit, _ in columns), "RFD greater on")
+    columns = {name: metric for name, metric in MEASURES.items() if name in PRINTED}
+    shown = (f"{metric.label} {metric.shown}".strip() for metric in columns.values())
+    head = ("method", *shown, "RFD greater on")
     rows = [
         (
             row.method,
-            *(_say_measure(row, name, factor) for name, _, factor, _, _ in columns),
+            *(_say_measure(row, name, metric.factor) for name, metric in columns.items()),
             _worse(row),
         )
         for row in league
@@ -147,11 +133,11 @@ def format_page(
     source: Provenance, league: Sequence[Row], table: Table, failed: Sequence[str], pictures: Sequence[str]
 ) -> str:
     """Return the page. `failed`: a line a failed trial; `pictures`: files beside it."""
-    heads = ["method", *(f"{title} ({unit})" if unit else title for _, title, _, unit, _ in COLUMNS)]
+    heads = ["method", *(metric.title for metric in MEASURES.values())]
     rows = [
         [
             row.method,
-            *(_say_measure(row, name, factor) for name, _, factor, _, _ in COLUMNS),
+            *(_say_measure(row, name, metric.factor) for name, metric in MEASURES.items()),
             _worse(row),
         ]
         for row in league
@@ -165,14 +151,13 @@ def format_page(
         f"{html.escape(source.methods[0])}. JND: just noticeable differences of the set point.</p>"
     )
     lines += [f'<p><img alt="{name}" src="{name}"></p>' for name in pictures]
-    columns = [column for column in COLUMNS if column[0] in SHOWN]
-    for name, title, factor, unit, _ in columns:
-        lines.append(f"<h2>{html.escape(title)}{f' ({unit})' if unit else ''} by trajectory</h2>")
+    for name in SHOWN:
+        lines.append(f"<h2>{html.escape(MEASURES[name].title)} by trajectory</h2>")
         body = []
         for trajectory in _list_trajectories(table):
             found = [find_interval(_select(table, method, trajectory, name)) for method in source.methods]
             if any(found):
-                body.append([trajectory, *(_say(one, factor) for one in found)])
+                body.append([trajectory, *(_say(one, MEASURES[name].factor) for one in found)])
         lines += _table(["trajectory", *source.methods], body)
     if failed:
         lines += ["<h2>Failed trials</h2>", *(f"<p>{html.escape(line)}</p>" for line in failed)]
@@ -229,8 +214,8 @@ def _plain(value: Any) -> Any:
     return "" if value is None else value
 
 
-def _name_units(known: Mapping[str, tuple[str, str]]) -> list[str]:
-    return [name if unit == "1" else f"{name} ({unit})" for name, (unit, _) in known.items()]
+def _name_units(metrics: Mapping[str, Metric]) -> list[str]:
+    return [name if metric.unit == "1" else f"{name} ({metric.unit})" for name, metric in metrics.items()]
 
 
 def _format_csv(source: Provenance, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

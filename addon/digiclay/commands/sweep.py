@@ -12,10 +12,10 @@ from typing import Any
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError
 from ..core.files.run_folder import write_whole
+from ..core.metrics.metric_table import ERRORS
 from ..core.scene.scene_source import Setting, find
 from ..core.studies.axes import Axis, Column, make_columns, make_points, read_axis
 from ..core.studies.evaluation import (
-    ERRORS,
     Record,
     explain_failed_batches,
     find_figure,

@@ -7,19 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from .figure import INK, LINES, MM, canvas, legend_above
+from ..core.session.run_scene import RUN_METRICS
+from .figure import INK, LINES, canvas, legend_above
 
-#: What is drawn: metric, title, factor.
+#: Metrics that are drawn.
 PANELS = (
-    ("rfd_shaping", "RFD while shaping (N)", 1.0),
-    ("force_deviation", "force deviation (N)", 1.0),
-    ("height_deviation", "height deviation (mm)", MM),
-    ("ridge_error", "ridge-height error (mm)", MM),
-    ("lag_max", "largest lag (mm)", MM),
-    ("contact_loss_share", "time without contact (%)", 1e2),
-    ("losses", "finger lost (times)", 1.0),
-    ("run_time", "run time (s)", 1.0),
-)
+    "rfd_shaping", "force_deviation", "height_deviation", "ridge_error", "lag_max", "contact_loss_share",
+    "losses", "run_time",
+)  # fmt: skip
 
 
 def comparison(
@@ -47,12 +42,13 @@ def comparison(
         force.set(xlabel="time (s)", ylabel="total force (N)", ylim=(0.0, None), title="Total force")
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
         legend_above(force)
-        for number, (key, title, factor) in enumerate(PANELS):
+        for number, key in enumerate(PANELS):
+            metric = RUN_METRICS[key]
             row, column = divmod(number, 4)
             bottom = 0.3 + (1 - row) * (high + 0.85)
             axes = place(key, 0.4 + 3.02 * column, bottom, 2.35, high)
-            _bars(axes, [found[method][key] for method in found], list(colors.values()), factor)
-            axes.set_title(title, fontsize=11)
+            _bars(axes, [found[method][key] for method in found], list(colors.values()), metric.factor)
+            axes.set_title(metric.title, fontsize=11)
     return figure
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.metrics.force import find_weber_fractions
-from ..core.studies.league import find_interval
-from .figure import INK, LINES, MM, SHADE, canvas, legend_above
+from ..core.studies.league import MEASURES, find_interval
+from .figure import INK, LINES, SHADE, canvas, legend_above
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.figure import Figure
@@ -18,15 +18,8 @@ if TYPE_CHECKING:  # only named in annotations
 
 #: Marks of the methods, which differ without their colors.
 MARKS = "osD^vP*X<>"
-#: Panels of the league: measure, title, factor.
-PANELS = (
-    ("lag_mean", "lag (mm)", MM),
-    ("ridge_unevenness", "unevenness of ridges (mm)", MM),
-    ("ridge-limit", "speed limit of a ridge drag (mm/s)", MM),
-    ("lift-limit", "speed limit of a lift (mm/s)", MM),
-    ("max_total_force", "largest force (N)", 1.0),
-    ("period_cost", "processor time of a control period (µs)", 1e6),
-)
+#: Panels of the league.
+PANELS = ("lag_mean", "ridge_unevenness", "ridge-limit", "lift-limit", "max_total_force", "period_cost")
 
 
 def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
@@ -88,18 +81,19 @@ def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
 
     `methods`: in the order of their colors.
     """
-    panels = [one for one in PANELS if any(row.measures.get(one[0]) for row in league)]
+    panels = [name for name in PANELS if any(row.measures.get(name) for row in league)]
     lines = -(-len(panels) // 2)
     bar = 0.42 * len(league) + 0.2
     height = lines * (bar + 1.0) + 0.5
     with canvas(13.0, height, "League of methods: means and intervals") as (figure, place):
-        for number, (measure, title, factor) in enumerate(panels):
+        for number, measure in enumerate(panels):
+            metric = MEASURES[measure]
             row, column = divmod(number, 2)
             axes = place(measure, 1.75 + 6.4 * column, 0.5 + (lines - 1 - row) * (bar + 1.0), 4.3, bar)
             for line, one in enumerate(league):
-                _mark_interval(axes, one, measure, -line, methods.index(one.method), factor)
+                _mark_interval(axes, one, measure, -line, methods.index(one.method), metric.factor)
             axes.set_yticks(-np.arange(len(league)), [one.method for one in league])
-            axes.set(ylim=(-len(league) + 0.4, 0.6), title=title)
+            axes.set(ylim=(-len(league) + 0.4, 0.6), title=metric.title)
             low, far = axes.get_xlim()
             axes.set_xlim(0.0, 1.3 * max(far, low, 1e-9))
     return figure

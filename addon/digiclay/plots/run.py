@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.metrics.finger_path import sum_cells
+from ..core.metrics.metric_table import METRICS
 from ..core.metrics.summary import compute_metrics, find_contact_rows
 from ..core.model.control_interface import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
@@ -19,15 +20,8 @@ if TYPE_CHECKING:  # only named in annotations
 
 #: Letter of each chosen cell, in the order in which the finger passes them.
 LETTERS = "ABCDEF"
-#: What the session's picture says in words: label, metric, factor, format.
-FIGURES = (
-    ("RFD in contact", "rfd", 1.0, "{:.3f} N"),
-    ("RFD while shaping", "rfd_shaping", 1.0, "{:.3f} N"),
-    ("largest force", "max_total_force", 1.0, "{:.3f} N"),
-    ("no contact in between", "contact_loss_share", 1e2, "{:.1f} %"),
-    ("mean lag of the force", "lag_mean", MM, "{:.2f} mm"),
-    ("relief formed", "height_range", MM, "{:.1f} mm"),
-)
+#: Metrics in the picture of a session.
+FIGURES = ("rfd", "rfd_shaping", "max_total_force", "contact_loss_share", "lag_mean", "height_range")
 
 
 def session(history: History, out: str | Path, set_point: SetPoint | None) -> Path:
@@ -138,8 +132,9 @@ def _write_figures(axes: Axes, found: dict[str, float | None]) -> None:
     """Write the metrics of a session as text."""
     axes.set_axis_off()
     axes.set_title("In figures")
-    told = [row for row in FIGURES if found["set_point"] is not None or not row[1].startswith("rfd")]
-    for line, (label, name, factor, form) in enumerate(told):
-        value, y = found[name], 0.92 - 0.158 * line
-        axes.text(0.0, y, label, va="top")
-        axes.text(1.0, y, "–" if value is None else form.format(value * factor), va="top", ha="right")
+    names = [name for name in FIGURES if found["set_point"] is not None or not name.startswith("rfd")]
+    for line, name in enumerate(names):
+        value, metric, y = found[name], METRICS[name], 0.92 - 0.158 * line
+        text = "–" if value is None else f"{value * metric.factor:.3g} {metric.shown}"
+        axes.text(0.0, y, metric.label, va="top")
+        axes.text(1.0, y, text, va="top", ha="right")

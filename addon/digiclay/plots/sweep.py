@@ -44,8 +44,8 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
     a point failed or has no such figure. Returns its axes, by label: ``sweep``; with two columns also
     ``scale``.
     """
-    unit, meaning = FIGURES[name]
-    factor, read = read_unit(unit, values)
+    meaning = FIGURES[name].doc
+    factor, read = read_unit(FIGURES[name].unit, values)
     label = f"{name} ({read})" if read else name
     with canvas(9.0, 5.2 if len(columns) == 1 else 6.0) as (figure, place):
         # The meaning is a sentence: it goes above the axes, and the key beside them.

@@ -138,13 +138,6 @@ ABOVE, BELOW = (0.07, 0.10), (0.15, 0.27)
 #: Groove of the finest grating whose direction a fingertip tells, m.
 SPATIAL_RESOLUTION = 0.94e-3
 
-#: Metrics of `perceive`: unit and meaning.
-PERCEPTION: dict[str, tuple[str, str]] = {
-    "rfd_jnd_least": ("1", "RFD over the largest just noticeable difference of the set point"),
-    "rfd_jnd_most": ("1", "RFD over the smallest just noticeable difference of the set point"),
-    "ridge_unevenness_touch": ("1", "ridge_unevenness over the spatial resolution of a fingertip"),
-}
-
 
 @dataclass(frozen=True)
 class Perceived:
@@ -163,8 +156,12 @@ class Perceived:
     resolutions: float | None
 
     def figures(self) -> dict[str, float | None]:
-        """Return the values by the keys of `PERCEPTION`."""
-        return dict(zip(PERCEPTION, (self.least, self.most, self.resolutions), strict=True))
+        """Return the values by the keys of `METRICS`."""
+        return {
+            "rfd_jnd_least": self.least,
+            "rfd_jnd_most": self.most,
+            "ridge_unevenness_touch": self.resolutions,
+        }
 
 
 def find_weber_fractions(force: float) -> tuple[float, float]:

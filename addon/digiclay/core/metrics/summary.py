@@ -26,7 +26,6 @@ from .finger_path import (
     sum_cells,
 )
 from .force import (
-    PERCEPTION,
     compute_contact_loss_share,
     compute_deviation,
     compute_mean,
@@ -37,6 +36,7 @@ from .force import (
     measure_touchdown,
     perceive,
 )
+from .metric_table import METRICS
 
 __all__ = [
     "METRICS",
@@ -55,44 +55,6 @@ __all__ = [
 ALL = slice(None)
 #: No lag is longer, m.
 FARTHEST = 1e9
-
-#: Every key of `compute_metrics`: its unit and its meaning.
-METRICS: dict[str, tuple[str, str]] = {
-    "duration": ("s", "simulated time from the first row to the last"),
-    "set_point": ("N", "total force asked for; one that changes from row to row: its mean while shaping"),
-    "rfd": ("N", "rms over time of (total force - set point) while the finger touches"),
-    "rfd_shaping": ("N", "the same, only while a cell follows the force: without touching down"),
-    "rfd_session": ("N", "the same over the whole session; without contact the force is 0"),
-    "contact_share": ("1", "share of the session's time in which the finger touches"),
-    "contact_loss_share": ("1", "share of the time from first to last contact in which it does not touch"),
-    "lag_mean": ("m", "mean horizontal distance from fingertip to the centroid of the cells' forces"),
-    "lag_max": ("m", "largest such distance"),
-    "force_deviation": ("N", "standard deviation over time of the total force while shaping"),
-    "force_oscillation": (
-        "N",
-        "rms over time of the total force less its moving average over 0.25 s, while shaping",
-    ),
-    "force_overshoot": ("1", "first touch: largest force beyond the set point, as a share of it"),
-    "settling_time": (
-        "s",
-        "first touch: from touching down until the force stays within 10 % of its set point",
-    ),
-    "height_deviation": (
-        "m",
-        "standard deviation over time of the surface's height over the finger, shaping",
-    ),
-    "ridge_offset": ("m", "mean height of what the finger left behind over its path"),
-    "ridge_error": ("m", "rms of the same"),
-    "ridge_unevenness": ("m", "standard deviation of the same"),
-    "max_cell_force": ("N", "largest force on one cell"),
-    "max_total_force": ("N", "largest force on all cells together"),
-    "lowest": ("m", "height of the lowest pin at the end"),
-    "highest": ("m", "height of the highest pin at the end"),
-    "height_range": ("m", "highest less lowest: the relief that was formed"),
-    "raised_volume": ("m3", "volume formed above the initial surface"),
-    "sunk_volume": ("m3", "volume formed below the initial surface"),
-    **PERCEPTION,
-}
 
 
 def compute_cell_area(position: ArrayLike) -> float | None:
@@ -113,8 +75,8 @@ def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None
     """Return every metric of a session.
 
     `history`: the arrays of ``history.npz``: time, height, force, mode, fingertip, total_force and position;
-    `set_point`: force asked for; None where none is. Returns the keys of `METRICS`; SI. None where there is
-    nothing to compute from, never a NaN. Raises ParameterError when the history has no rows.
+    `set_point`: force asked for; None where none is. Returns the keys of `METRICS` in SI units; None where
+    there is nothing to compute from, never a NaN. Raises ParameterError when the history has no rows.
     """
     time = np.asarray(history["time"], dtype=np.float64)
     if not len(time):

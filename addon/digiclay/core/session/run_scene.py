@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError
 from ..engine.simulation import begin, periods
 from ..engine.system import System
-from ..metrics.summary import METRICS, compute_metrics
+from ..metrics.metric_table import ERRORS, METRICS, RUN
+from ..metrics.summary import compute_metrics
 from ..model.fingertip import require_one
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..scene.assembly import assemble
@@ -29,15 +30,8 @@ from .memory_limit import check_memory
 
 History = dict[str, NDArray[Any]]
 
-#: What a run is measured by: the metrics of its history and more, unit and meaning.
-RUN_METRICS: dict[str, tuple[str, str]] = {
-    **METRICS,
-    "losses": ("1", "how often the controller lost the finger, at every lift-off too"),
-    "run_time": ("s", "time the simulation took"),
-    "real_time_factor": ("1", "simulated time over run time"),
-}
-#: Units of the numbers in ``metrics.json``.
-UNITS = {name: unit for name, (unit, _) in RUN_METRICS.items()} | {"simulated": "s", "max_indentation": "m"}
+#: Metrics of every run with a history.
+RUN_METRICS = {**METRICS, **{name: RUN[name] for name in ("losses", "run_time", "real_time_factor")}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +86,7 @@ class Result:
     def with_errors(self, errors: Errors) -> Result:
         """Return the result with its estimated errors among the metrics."""
         found = {f"{name}_error": value for name, value in asdict(errors).items()}
-        units = {name: "m" if name.startswith("height") else "N" for name in found}
+        units = {name: ERRORS[name].unit for name in found}
         return replace(self, metrics={**self.metrics, **found, "units": {**self.metrics["units"], **units}})
 
 
@@ -181,7 +175,8 @@ def report(
         },
         **found,
     }
-    metrics["units"] = {name: UNITS[name] for name in metrics if name in UNITS}
+    units = {**METRICS, **RUN}
+    metrics["units"] = {name: units[name].unit for name in metrics if name in units}
     metrics["losses"] = ended.losses
     return Result(scene, {}, ended.periods, ended.run_time, metrics)
 

@@ -13,7 +13,7 @@ from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
 from ..batch.packing import Findings, describe_structure
 from ..batch.run_together import measure_together
-from ..metrics.summary import METRICS
+from ..metrics.metric_table import ERRORS, METRICS, RUN
 from ..scene.schema import Scene
 from ..session.accuracy import estimate_errors, has_every_command, make_reference
 from ..session.run_scene import Result, run
@@ -34,20 +34,10 @@ Pool = Callable[
     None,
 ]
 
-#: How exact a session is: unit and meaning. It is integrated once more for them, where they are asked for.
-ERRORS: dict[str, tuple[str, str]] = {
-    "height_error": ("m", "largest error of a pin's height, estimated"),
-    "force_error": ("N", "largest error of the force on a cell, estimated"),
-    "total_force_error": ("N", "largest error of the total force, estimated"),
-}
-#: What a session can be judged by: unit and meaning.
-FIGURES: dict[str, tuple[str, str]] = {
-    **{name: (known[0], known[1]) for name, known in METRICS.items()},
-    "simulated": ("s", "simulated time"),
-    "run_time": ("s", "time the simulation took"),
-    "real_time_factor": ("1", "simulated time over the time it took"),
-    **ERRORS,
-}
+#: Metrics by which a session can be judged.
+FIGURES = {
+    **METRICS, **{name: RUN[name] for name in ("simulated", "run_time", "real_time_factor")}, **ERRORS
+}  # fmt: skip
 #: Figures that are others each time.
 TIMES = ("run_time", "real_time_factor")
 #: Short names of figures.

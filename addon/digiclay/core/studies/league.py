@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median, stdev
 
+from ..metrics.metric_table import METHOD, METRICS, Metric
 from .method_trials import LIMITS, RANDOM
 
 #: Of the intervals, and how they are named.
@@ -21,6 +22,14 @@ MEANS = (
     "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "ridge_unevenness", "ridge_unevenness_touch",
     "relief_rms", "contact_loss_share",
 )  # fmt: skip
+#: Measures of a league, in the order of its columns; those of `LIMITS` are speeds.
+MEASURES: dict[str, Metric] = {
+    name: METHOD.get(name) or METRICS.get(name) or Metric("m/s", "", name.replace("-", " "), "mm/s")
+    for name in (
+        "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "ridge_unevenness", "ridge_unevenness_touch",
+        "relief_rms", "max_total_force", "losses", "contact_loss_share", *LIMITS, "period_cost", "cost_ratio",
+    )
+}  # fmt: skip
 
 #: Method, trajectory and seed of a trial.
 Cell = tuple[str, str, int]

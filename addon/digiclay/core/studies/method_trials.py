@@ -13,8 +13,9 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.quantity import find_nearest_name
 from ..metrics.finger_path import sum_cells
-from ..metrics.force import PERCEPTION, find_contact_ends, perceive
-from ..metrics.summary import METRICS, compute_metrics
+from ..metrics.force import find_contact_ends, perceive
+from ..metrics.metric_table import METHOD, METRICS, Metric
+from ..metrics.summary import compute_metrics
 from ..scene.assembly import assemble
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
@@ -45,20 +46,15 @@ LOW, HIGH = 5e-3, 80e-3
 GROUPS = (SESSION, *list_paths(), *PHASES, RANDOM, *LIMITS)
 QUICK = ("ridge-25", "surface", "lift")
 
-#: What is measured of a trial: unit and meaning.
-OUTCOMES: dict[str, tuple[str, str]] = {
-    **{name: METRICS[name] for name in ("set_point", "rfd")},
-    **{name: PERCEPTION[name] for name in ("rfd_jnd_least", "rfd_jnd_most")},
-    **{name: METRICS[name] for name in ("lag_mean", "lag_max", "ridge_unevenness")},
-    "ridge_unevenness_touch": PERCEPTION["ridge_unevenness_touch"],
-    "relief_rms": ("m", "rms deviation of the formed relief from the nominal one"),
-    "relief_largest": ("m", "largest deviation of the formed relief from the nominal one"),
-    "max_total_force": METRICS["max_total_force"],
-    "contact_loss_share": METRICS["contact_loss_share"],
-    "losses": ("1", "how often contact ended though the fingertip rose no faster than a pin can"),
-    "speed_limit": ("m/s", "largest speed that is followed"),
-    "period_cost": ("s", "processor time of a control period, device included"),
-}
+#: Metrics of a trial.
+OUTCOMES: dict[str, Metric] = {
+    name: METHOD.get(name) or METRICS[name]
+    for name in (
+        "set_point", "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "lag_max", "ridge_unevenness",
+        "ridge_unevenness_touch", "relief_rms", "relief_largest", "max_total_force", "contact_loss_share",
+        "losses", "speed_limit", "period_cost",
+    )
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

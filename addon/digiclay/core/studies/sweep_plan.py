@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError
 from ..control.methods import find_method
 from ..files.run_folder import format_json, read_json, write_whole
+from ..metrics.metric_table import ERRORS
 from ..scene.toml_table import format_scene, write_part
 from .axes import Axis, Point
-from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
+from .evaluation import FIGURES, TIMES, Record, evaluate
 from .series import Kind, open_series
 
 #: The file by which a folder is known as a sweep's, and the folder of its points.
@@ -192,7 +193,7 @@ def format_table(
     """
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")
-    units = [*varied, *((name, FIGURES[name][0]) for name in names)]
+    units = [*varied, *((name, FIGURES[name].unit) for name in names)]
     writer.writerow([*(f"{name} ({unit})" if unit else name for name, unit in units), "error"])
     for values, record in zip(rows, records, strict=True):
         figures = record.get("figures", {})
