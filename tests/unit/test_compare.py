@@ -101,5 +101,5 @@ def test_every_panel_has_a_bar_for_every_method() -> None:
     forces = {name: ([0.0, 1.0], [0.0, 0.4], [np.nan, 0.4]) for name in found}
     figure = comparison(found, forces, "scene")
     panels = {axes.get_label(): axes for axes in figure.axes}
-    assert {key: len(panels[key].patches) for key, _, _ in PANELS} == {key: 3 for key, _, _ in PANELS}
+    assert {key: len(panels[key].patches) for key in PANELS} == dict.fromkeys(PANELS, 3)
     assert len(panels["force"].get_legend().get_texts()) == 4  # and the set points
