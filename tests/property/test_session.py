@@ -11,7 +11,7 @@ from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import Trajectory, make_level
 from digiclay.core.model.valve import Fluid, Valve
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.assemble import Record, make_system, one_cell, record, scripted, under, whole
@@ -49,45 +49,27 @@ def shaped(spots: list[tuple[float, float, float]], **parts: object) -> Record:
     return record(bed(control=VirtualMaster(), **parts), finger(spots), COUNT)
 
 
-@settings(max_examples=12)
-@given(points, turns)
-def test_every_number_stays_finite(spots: list[tuple[float, float, float]], turn: tuple[float, ...]) -> None:
-    system = bed(control=VirtualMaster())
-    assert np.isfinite(record(system, tilted(finger(spots), turn), COUNT).rows).all()
-
-
-@settings(max_examples=12)
-@given(points, st.floats(0.0, 100.0))
-def test_pins_stay_within_their_stroke(spots: list[tuple[float, float, float]], rest: float) -> None:
-    system = bed(control=VirtualMaster(), actuator=Actuator(rest_height=rest * 1e-3))
-    shifted = [(x, y, z + rest - 40.0) for x, y, z in spots]
-    height = record(system, finger(shifted), COUNT).height
-    assert height.min() >= 0.0
-    assert height.max() <= 100e-3
-
-
-@settings(max_examples=10)
-@given(points, steppers)
-def test_no_force_pulls(spots: list[tuple[float, float, float]], stepper: str) -> None:
-    assert shaped(spots, stepper=stepper).force.min() >= 0.0
-
-
-@settings(max_examples=12)
-@given(points)
-def test_there_is_no_force_without_contact(spots: list[tuple[float, float, float]]) -> None:
-    system = bed(control=VirtualMaster())
-    path = finger(spots)
+@settings(max_examples=16)
+@given(points, turns, st.floats(0.0, 100.0), steppers)
+@example([(0.0, 0.0, 45.0), (0.0, 0.0, 36.0), (9.0, 3.0, 38.0)], (0.0, 0.0, 0.0), 40.0, "runge_kutta_4")
+def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are_openings(
+    spots: list[tuple[float, float, float]], turn: tuple[float, ...], rest: float, stepper: str
+) -> None:
+    system = bed(stepper, control=VirtualMaster(), actuator=Actuator(rest_height=rest * 1e-3))
+    path = tilted(finger([(x, y, z + rest - 40.0) for x, y, z in spots]), turn)
     run = record(system, path, COUNT)
+    assert np.isfinite(run.rows).all()
+    assert 0.0 <= run.height.min() <= run.height.max() <= 100e-3
+    assert np.abs(run.command).max() <= 1.0
+    assert run.force.min() >= 0.0
     outline = system.cell.touch.fingertip.outline(path.poses(run.time))
     gap = under(outline, system.grid.x, system.grid.y) - run.height
-    # Rounding: the underside is taken over another sum here.
+    # Without contact there is no force. Rounding: the underside is taken over another sum here.
     assert not run.force[gap > 1e-15].any()
-
-
-@settings(max_examples=12)
-@given(points)
-def test_commands_are_openings(spots: list[tuple[float, float, float]]) -> None:
-    assert np.abs(shaped(spots).command).max() <= 1.0
+    outside = np.delete(run.last.rows[0], run.last.active.cells)
+    assert outside.max(initial=0.0) <= run.last.peak
+    near = run.last.active.block[0, : run.last.active.near]
+    assert near.max(initial=0.0) <= max(run.last.active.peak, run.last.peak)
 
 
 @settings(max_examples=12)
@@ -131,15 +113,6 @@ def test_a_session_interrupted_and_gone_on_with_is_the_whole_session(
     whole = record(system, path, COUNT)
     rest = record(system, path, COUNT - when, record(system, path, when).last)
     assert np.array_equal(rest.rows, whole.rows[when:])
-
-
-@settings(max_examples=10)
-@given(points)
-def test_no_pin_is_higher_than_the_peaks(spots: list[tuple[float, float, float]]) -> None:
-    last = shaped(spots).last
-    outside = np.delete(last.rows[0], last.active.cells)
-    assert outside.max(initial=0.0) <= last.peak
-    assert last.active.block[0, : last.active.near].max(initial=0.0) <= max(last.active.peak, last.peak)
 
 
 commands = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)

@@ -44,13 +44,9 @@ def session(method: str, noise: float, seed: int = 0) -> Result:
 
 
 @pytest.mark.parametrize("noise", [0, 1, 2, 5])
-def test_method_i_loses_the_finger_at_lift_off_alone_whatever_the_noise(noise: int) -> None:
-    assert session("virtual_master", noise).metrics["losses"] == 1
-
-
-@pytest.mark.parametrize("noise", [0, 1, 2, 5])
-def test_method_ii_loses_the_finger_at_lift_off_alone_whatever_the_noise(noise: int) -> None:
-    assert session("cell_states", noise).metrics["losses"] == 1
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
+def test_the_finger_is_lost_at_lift_off_alone_whatever_the_noise(method: str, noise: int) -> None:
+    assert session(method, noise).metrics["losses"] == 1
 
 
 def test_noise_does_not_bias_the_force_that_is_held() -> None:

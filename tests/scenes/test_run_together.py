@@ -18,6 +18,8 @@ from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import STACKABLE, moved, sample
 
+#: Settings of a short run, and the key of its step.
+SHORT, STEP = ("simulation.duration=0.4",), "simulation.physics_step"
 #: Sums in another order: a last bit here and there. Heights are centimeters, forces tenths of a newton.
 HEIGHT, FORCE = 1e-12, 1e-10
 
@@ -49,6 +51,14 @@ def assert_as_alone(found: Result, known: Scene) -> None:
     assert found.metrics["losses"] == alone.metrics["losses"]
 
 
+def assert_all_as_alone(scenes: Sequence[Scene]) -> list[Any]:
+    """Check every result of a stack against the session by itself; return the results."""
+    results = together(scenes)
+    for found, one in zip(results, scenes, strict=True):
+        assert_as_alone(found, one)
+    return results
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_and_ends_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
@@ -59,8 +69,7 @@ def test_runs_with_fingers_and_ends_of_their_own_come_to_what_they_come_to_alone
         )
         for i in range(3)
     ]
-    for found, one in zip(together(scenes), scenes, strict=True):
-        assert_as_alone(found, one)
+    assert_all_as_alone(scenes)
 
 
 @pytest.mark.parametrize(
@@ -91,8 +100,7 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
 ) -> None:
     profile = "gaussian" if key == "blister.sigma" else "cone"
     scenes = [sample("tap", f"{key}={value}", f"blister.profile={profile}") for value in values]
-    for found, one in zip(together(scenes), scenes, strict=True):
-        assert_as_alone(found, one)
+    assert_all_as_alone(scenes)
 
 
 @pytest.mark.parametrize("method", ["elastic", "plastic", "cell_states"])
@@ -101,26 +109,40 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
     [("valve.stroke", ("25e-6", "40e-6")), ("actuator.rest_height", ("39e-3", "41e-3"))],
 )
 def test_the_other_methods_hold_on_devices_of_their_own(method: str, key: str, values: Sequence[str]) -> None:
-    scenes = [sample("tap", f"{key}={value}", f"control.method={method}") for value in values]
-    for found, one in zip(together(scenes), scenes, strict=True):
-        assert_as_alone(found, one)
+    assert_all_as_alone([sample("tap", f"{key}={value}", f"control.method={method}") for value in values])
 
 
 @pytest.mark.parametrize(
-    ("name", "key", "values"),
+    ("name", "key", "values", "settings"),
     [
-        ("elastic_press", "control.stiffness", ("10", "20", "40")),
-        ("elastic_press", "control.settling_time", ("20e-3", "40e-3")),
-        ("plastic_press", "control.yield_force", ("0.02", "0.05")),
-        ("plastic_press", "control.damping", ("5", "8")),
+        ("elastic_press", "control.stiffness", ("10", "20", "40"), ("simulation.duration=1.0",)),
+        ("elastic_press", "control.settling_time", ("20e-3", "40e-3"), ("simulation.duration=1.0",)),
+        ("plastic_press", "control.yield_force", ("0.02", "0.05"), ("simulation.duration=1.0",)),
+        ("plastic_press", "control.damping", ("5", "8"), ("simulation.duration=1.0",)),
+        ("tap", "valve.stroke", ("25e-6", "40e-6"), ("simulation.stepper=richardson", *SHORT)),
+        *(
+            (
+                "tap",
+                "control.force_gain",
+                ("3", "5"),
+                (f"simulation.stepper={name}", f"{STEP}={step}", *SHORT),
+            )
+            for name, step in (("richardson", "5e-4"), ("adaptive", "5e-3"), ("runge_kutta_4", "5e-4"))
+        ),
+        ("slow_press", "control.force_gain", ("3", "5"), ("recorder.every=7", "simulation.duration=1.003")),
+        # The cells are chosen anew every 32 periods or sooner: most of their sets have no row of their own.
+        (
+            "plastic_press",
+            "contact.exponent",
+            ("2000", "1990"),
+            ("recorder.every=400", "simulation.duration=6"),
+        ),
     ],
 )
-def test_behaviors_with_parameters_of_their_own_do_what_they_do_alone(
-    name: str, key: str, values: Sequence[str]
+def test_behaviors_steppers_and_recorders_with_parameters_of_their_own_do_what_they_do_alone(
+    name: str, key: str, values: Sequence[str], settings: Sequence[str]
 ) -> None:
-    scenes = [sample(name, f"{key}={value}", "simulation.duration=1.0") for value in values]
-    for found, one in zip(together(scenes), scenes, strict=True):
-        assert_as_alone(found, one)
+    assert_all_as_alone([sample(name, f"{key}={value}", *settings) for value in values])
 
 
 def test_the_papers_session_in_a_stack_is_the_papers_session() -> None:
@@ -137,8 +159,7 @@ def test_pins_pressed_onto_their_end_stops_come_to_what_they_come_to_alone() -> 
     method = ("control.method=elastic", "control.stiffness=5")
     low = [sample("tap", f"actuator.rest_height={rest}", *method) for rest in rests]
     scenes = [moved(one, 0.0, -41e-3) for one in low]
-    for found, one in zip(together(scenes), scenes, strict=True):
-        assert_as_alone(found, one)
+    for found in assert_all_as_alone(scenes):
         pressed = found.history["force"] > 0.0
         assert found.history["height"][pressed].min() == 0.0
 
@@ -154,38 +175,7 @@ def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
         simulation=replace(known.simulation, duration=0.9),
     )
     scenes = [twice, moved(twice, 1e-3, -0.5e-3)]
-    for found, one in zip(together(scenes), scenes, strict=True):
-        assert_as_alone(found, one)
-
-
-def test_richardsons_form_moves_cells_of_their_own_as_alone() -> None:
-    settings = ("simulation.stepper=richardson", "simulation.duration=0.4")
-    scenes = [sample("tap", f"valve.stroke={stroke}", *settings) for stroke in ("25e-6", "40e-6")]
-    assert_as_alone(together(scenes)[1], scenes[1])
-
-
-@pytest.mark.parametrize(
-    ("stepper", "step"), [("richardson", "5e-4"), ("adaptive", "5e-3"), ("runge_kutta_4", "5e-4")]
-)
-def test_any_stepper_can_move_a_stack(stepper: str, step: str) -> None:
-    settings = (f"simulation.stepper={stepper}", f"simulation.physics_step={step}", "simulation.duration=0.4")
-    scenes = [sample("tap", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
-    assert_as_alone(together(scenes)[1], scenes[1])
-
-
-def test_a_recorder_that_leaves_out_rows_leaves_out_the_same() -> None:
-    settings = ("recorder.every=7", "simulation.duration=1.003")
-    scenes = [sample("slow_press", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
-    assert_as_alone(together(scenes)[0], scenes[0])
-
-
-def test_a_recorder_with_few_rows_keeps_what_moved_between_them() -> None:
-    # The cells are chosen anew every 32 periods or sooner: most of their sets have no row of their own.
-    scenes = [
-        sample("plastic_press", f"contact.exponent={exponent}", "recorder.every=400", "simulation.duration=6")
-        for exponent in (2000, 1990)
-    ]
-    assert_as_alone(together(scenes)[0], scenes[0])
+    assert_all_as_alone(scenes)
 
 
 def test_without_a_recorder_there_is_no_history() -> None:
@@ -206,18 +196,13 @@ def blown_up() -> list[Scene]:
     return [moved(known, 0.0, 20e-3), known, moved(known, 1e-3, 20e-3)]
 
 
-def test_a_run_that_diverges_ends_in_its_own_error() -> None:
+def test_a_run_that_diverges_ends_in_its_own_error_and_the_others_go_on() -> None:
     scenes = blown_up()
     with pytest.raises(DivergenceError) as alone:
         run(scenes[1])
-    found = together(scenes)[1]
-    assert isinstance(found, DivergenceError)
-    assert str(found) == str(alone.value)
-
-
-def test_when_a_run_diverges_the_others_go_on() -> None:
-    scenes = blown_up()
     found = together(scenes)
+    assert isinstance(found[1], DivergenceError)
+    assert str(found[1]) == str(alone.value)
     assert_as_alone(found[0], scenes[0])
     assert_as_alone(found[2], scenes[2])
 
@@ -254,3 +239,82 @@ def test_the_run_times_of_a_stack_are_shares_of_it() -> None:
 )
 def test_scenes_of_another_structure_do_not_stand_together(setting: str) -> None:
     assert describe_structure(sample("tap", setting)) != describe_structure(sample("tap"))
+
+
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states", "elastic"])
+@pytest.mark.parametrize(
+    "sensors",
+    [
+        ("sensors.height_step=20e-6", "sensors.force_step=1e-3"),
+        ("sensors.delay=2",),
+        ("sensors.delay=1", "sensors.height_step=5e-6"),
+        ("sensors.observer=valve", "sensors.height_step=1e-6"),
+    ],
+)
+def test_runs_with_sensors_come_to_what_they_come_to_alone(method: str, sensors: Sequence[str]) -> None:
+    known = sample("slow_press", f"control.method={method}", *sensors, "simulation.duration=0.8")
+    scenes = [moved(known, 0.7e-3 * i, -1e-3 * i) for i in range(3)]
+    assert_all_as_alone(scenes)
+
+
+def test_runs_with_sensors_of_their_own_come_to_what_they_come_to_alone() -> None:
+    steps = ("5e-6", "10e-6", "20e-6")
+    scenes = [sample("tap", f"sensors.height_step={step}", f"sensors.force_step={step}") for step in steps]
+    assert_all_as_alone(scenes)
+
+
+#: Noise of three runs: of force, of height, and its seed.
+NOISES = (("1e-3", "5e-6", "1"), ("2e-3", "2e-6", "2"), ("0.5e-3", "20e-6", str(2**62 + 1)))
+
+
+def noisy(name: str, *settings: str) -> list[Scene]:
+    """Return scenes with noise of their own."""
+    keys = ("force_noise", "height_noise", "seed")
+    noises = ([f"sensors.{key}={value}" for key, value in zip(keys, noise, strict=True)] for noise in NOISES)
+    return [sample(name, *settings, *noise) for noise in noises]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
+    scenes = noisy(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
+    # Fingers that come down elsewhere and differently far: other cells of each, and not as many.
+    scenes = [
+        replace(moved(one, 2e-3 * i, -0.2e-3 * i), simulation=replace(one.simulation, duration=1.5 - 0.3 * i))
+        for i, one in enumerate(scenes)
+    ]
+    assert_all_as_alone(scenes)
+
+
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
+@pytest.mark.parametrize(
+    "sensors",
+    [
+        ("sensors.height_step=20e-6", "sensors.force_step=1e-3"),
+        ("sensors.delay=2", "sensors.height_step=5e-6"),
+    ],
+)
+def test_noise_that_is_rounded_or_late_is_that_of_the_run_alone(method: str, sensors: Sequence[str]) -> None:
+    scenes = noisy("slow_press", f"control.method={method}", *sensors, "simulation.duration=0.8")
+    assert_all_as_alone(scenes)
+
+
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states", "viscous"])
+def test_noisy_runs_whose_sets_are_far_apart_come_to_what_they_come_to_alone(method: str) -> None:
+    lengths = ("7e-3", "10e-3", "14e-3")
+    one_by_one = (
+        noisy("tap", f"control.method={method}", f"fingertip.length={length}")[i]
+        for i, length in enumerate(lengths)
+    )
+    scenes = [moved(one, 8e-3 * (i - 1), -0.2e-3 * i) for i, one in enumerate(one_by_one)]
+    assert_all_as_alone(scenes)
+
+
+def test_the_papers_session_with_noise_is_that_session() -> None:
+    scenes = noisy("ridge_mound_valley", "simulation.duration=6")
+    assert_all_as_alone(scenes)
+
+
+def test_runs_that_start_from_a_shape_come_to_what_they_come_to_alone() -> None:
+    known = sample("dome_peaked", "layout.rows=15", "layout.columns=15", "simulation.duration=3.2")
+    scenes = [moved(known, 0.7e-3 * i, -0.5e-3 * i) for i in range(2)]
+    assert_all_as_alone(scenes)

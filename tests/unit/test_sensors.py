@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import ParameterError, SceneError
+from digiclay.core.base.errors import SceneError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
@@ -57,42 +57,26 @@ def field(seed: int = 3) -> tuple[Floats, Floats]:
     return both[:, 0], both[:, 1]
 
 
+@pytest.mark.parametrize(
+    ("moment", "normal", "variance"),
+    # Variance of the mean of n powers of a normal number: 1, 2, 15 and 105 - 9, over n.
+    [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)],
+)
 @pytest.mark.parametrize("kind", [0, 1])
-def test_noise_has_mean_zero(kind: int) -> None:
-    assert abs(field()[kind].mean()) < SURE / np.sqrt(COUNT)
-
-
-@pytest.mark.parametrize("kind", [0, 1])
-def test_noise_has_standard_deviation_one(kind: int) -> None:
-    # The standard error of a variance of normal numbers is sqrt(2 / n).
-    assert abs(field()[kind].var() - 1.0) < SURE * np.sqrt(2.0 / COUNT)
-
-
-@pytest.mark.parametrize(("moment", "normal", "spread"), [(3, 0.0, 15.0), (4, 3.0, 96.0)])
-def test_noise_has_the_higher_moments_of_a_normal_distribution(
-    moment: int, normal: float, spread: float
+def test_noise_has_the_moments_of_a_normal_distribution(
+    kind: int, moment: int, normal: float, variance: float
 ) -> None:
-    # Variance of x³ and of x⁴: 15, and 105 - 9.
-    assert abs((field()[0] ** moment).mean() - normal) < SURE * np.sqrt(spread / COUNT)
+    assert abs((field()[kind] ** moment).mean() - normal) < SURE * np.sqrt(variance / COUNT)
 
 
-@pytest.mark.parametrize(("periods_apart", "cells_apart"), [(0, 1), (0, 25), (1, 0), (1, 1), (2, 0)])
-def test_noise_of_other_cells_and_periods_is_independent(periods_apart: int, cells_apart: int) -> None:
-    noise = field()[0]
-    other = np.roll(noise, (periods_apart, cells_apart), (0, 1))
-    # The mean of n products of independent normal numbers has standard error 1 / sqrt(n).
-    assert abs((noise * other).mean()) < SURE / np.sqrt(COUNT)
-
-
-def test_noise_of_force_and_height_are_independent() -> None:
+def test_noise_of_other_cells_periods_quantities_and_seeds_is_independent() -> None:
     force, height = field()
-    assert abs((force * height).mean()) < SURE / np.sqrt(COUNT)
+    others = [np.roll(force, apart, (0, 1)) for apart in ((0, 1), (0, 25), (1, 0), (1, 1), (2, 0))]
+    for other in (*others, height, field(4)[0]):
+        # The mean of n products of independent normal numbers has standard error 1 / sqrt(n).
+        assert abs((force * other).mean()) < SURE / np.sqrt(COUNT)
     # Box and Muller's radius is shared: the squares must be independent too; each has variance 2.
     assert abs(((force**2 - 1.0) * (height**2 - 1.0)).mean()) < SURE * 2.0 / np.sqrt(COUNT)
-
-
-def test_noise_of_other_seeds_is_independent() -> None:
-    assert abs((field(3)[0] * field(4)[0]).mean()) < SURE / np.sqrt(COUNT)
 
 
 def test_noise_of_a_cell_does_not_depend_on_which_others_are_read() -> None:
@@ -106,18 +90,9 @@ def test_noise_of_a_cell_does_not_depend_on_which_others_are_read() -> None:
 def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed: Any) -> None:
     shape = np.shape(seed)
     drawn = NoiseAhead(seed)
-    for period, cells in [
-        (4, 9),
-        (4, 30),
-        (5, 9),
-        (19, 30),
-        (20, 30),
-        (3, 30),
-        (4, 30),
-        (4, 31),
-        (5, [2, 7]),
-        (5, 9),
-    ]:
+    some = [2, 7]
+    asked = [(4, 9), (4, 30), (5, 9), (19, 30), (20, 30), (3, 30), (4, 30), (4, 31), (5, some), (5, 9)]
+    for period, cells in asked:
         numbers = np.arange(cells) if isinstance(cells, int) else np.array(cells)
         numbers = np.broadcast_to(numbers.reshape(-1, *[1] * len(shape)), (len(numbers), *shape))
         np.testing.assert_array_equal(drawn.draw(period, numbers), draw_normals(seed, period, numbers))
@@ -131,17 +106,13 @@ def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:
     np.testing.assert_array_equal(height, seen.height + 5e-6 * second)
 
 
-def test_readings_are_the_nearest_whole_steps() -> None:
-    sensors, seen = Quantized(PerfectSensors(), 0.25, 0.125), truth(0, [0.3, 0.4, 0.12], [0.3, 0.0, 1.0])
-    force, height = sensors.measure(np.empty((0, 3)), seen)
+def test_readings_are_the_nearest_whole_steps_and_a_step_of_zero_rounds_nothing() -> None:
+    seen, own = truth(0, [0.3, 0.4, 0.12], [0.3, 0.0, 1.0]), np.empty((0, 3))
+    force, height = Quantized(PerfectSensors(), 0.25, 0.125).measure(own, seen)
     # Steps that are powers of two: not even a rounding error is allowed.
     assert force.tolist() == [0.25, 0.5, 0.0]
     assert height.tolist() == [0.25, 0.0, 1.0]
-
-
-def test_a_step_of_zero_rounds_nothing() -> None:
-    seen = truth(0, [0.3], [0.31])
-    assert Quantized(PerfectSensors(), 0.0, 0.125).measure(np.empty((0, 1)), seen)[0] is seen.force
+    assert Quantized(PerfectSensors(), 0.0, 0.125).measure(own, seen)[0] is seen.force
 
 
 def test_noise_is_quantized_too() -> None:
@@ -183,16 +154,11 @@ def readings(sensors: Sensors, truths: Sequence[Truth], skipped: Sequence[int] =
 RAMP = [truth(i, [0.1 * i], [40e-3 + 1e-3 * i]) for i in range(9)]
 
 
-@pytest.mark.parametrize("late", [1, 2, 5])
-def test_readings_are_late_by_whole_periods(late: int) -> None:
+@pytest.mark.parametrize("late", [1, 2, 4, 5])
+def test_readings_are_late_by_whole_periods_and_begin_with_that_of_the_start(late: int) -> None:
     read = readings(Delayed(PerfectSensors(), late, 40e-3), RAMP)
     expected = [[seen.force[0], seen.height[0]] for seen in RAMP]
-    assert read[late:].tolist() == expected[:-late]
-
-
-def test_before_the_first_reading_arrives_there_is_that_of_the_start() -> None:
-    read = readings(Delayed(PerfectSensors(), 4, 40e-3), RAMP)
-    assert read[:4].tolist() == [[0.0, 40e-3]] * 4
+    assert read.tolist() == [[0.0, 40e-3]] * late + expected[:-late]
 
 
 @pytest.mark.parametrize("late", [1, 3])
@@ -219,12 +185,10 @@ def test_measuring_changes_nothing() -> None:
 ALL = ("sensors.force_noise=0.5 mN", "sensors.height_noise=5 um", "sensors.delay=1")
 
 
-def test_the_same_seed_gives_the_same_session_bit_for_bit() -> None:
-    np.testing.assert_array_equal(heights(*ALL), heights(*ALL))
-
-
-def test_another_seed_gives_another_session() -> None:
-    assert np.abs(heights(*ALL) - heights(*ALL, "sensors.seed=1")).max() > 1e-6
+def test_the_seed_makes_the_session() -> None:
+    one = heights(*ALL)
+    np.testing.assert_array_equal(heights(*ALL), one)
+    assert np.abs(one - heights(*ALL, "sensors.seed=1")).max() > 1e-6
 
 
 def test_a_session_taken_up_again_in_the_middle_ends_the_same() -> None:
@@ -248,20 +212,15 @@ def test_a_session_with_coarse_sensors_stays_finite_and_within_the_stroke(method
     assert 0.0 <= history.min() < history.max() <= 100e-3
 
 
-def test_coarse_height_sensors_change_the_session() -> None:
-    assert np.abs(heights("sensors.height_step=0.5 mm") - heights()).max() > 1e-4
-
-
-def test_perfect_sensing_gives_the_session_without_sensors() -> None:
-    np.testing.assert_array_equal(heights("sensors.delay=0"), heights())
+def test_coarse_height_sensors_change_the_session_and_perfect_ones_do_not() -> None:
+    plain = heights()
+    assert np.abs(heights("sensors.height_step=0.5 mm") - plain).max() > 1e-4
+    np.testing.assert_array_equal(heights("sensors.delay=0"), plain)
 
 
 @pytest.mark.parametrize(("setting", "rows"), [("seed=1", 0), ("force_noise=1 mN", 0), ("delay=2", 9)])
 def test_only_a_delay_costs_state_rows(setting: str, rows: int) -> None:
     assert assemble(scene(f"sensors.{setting}")).sensors.rows == rows
-
-
-def test_sensors_are_absent_by_default_and_cost_no_row() -> None:
     plain = scene()
     assert (plain.sensors, assemble(plain).rows.sensors) == (None, 0)
 
@@ -309,9 +268,3 @@ def test_a_wrong_setting_is_told_in_one_line(setting: str, said: str) -> None:
         scene(f"sensors.{setting}")
     assert str(error.value).startswith(said)
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["force_noise", "force_step"])
-def test_an_observer_leaves_no_force_sensor_to_be_inexact(name: str) -> None:
-    with pytest.raises(ParameterError, match=f"{name} must be 0 N with observer = 'valve'"):
-        Sensing(observer="valve", **{name: 1e-3})

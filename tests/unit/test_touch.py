@@ -10,91 +10,80 @@ from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_reach
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.null_parts import Unrelaxed
 from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.touch import MOST, Touch, compute_force, trace_finger
+from digiclay.core.model.touch import MOST, Touch, compute_force, join_paths, trace_finger
 
 from tests.assemble import AWAY, make_system, path, record
 
 ELASTIC, RELAXING = (Touch(Fingertip(), Contact(), pulp) for pulp in (Unrelaxed(), Relaxation()))
 
 
-def test_force_is_the_share_of_tension_less_what_relaxed() -> None:
-    under, filters = np.array([48e-3]), np.array([[0.3], [0.2], [0.1]])
-    expected = 0.34 * (0.125 * np.expm1(2.0) - (0.62 * 0.3 + 0.20 * 0.2 + 0.10 * 0.1))
-    assert compute_force(RELAXING, np.array([49e-3]), under, filters) == pytest.approx(
-        expected, rel=1e-13
-    )  # rounding
+@pytest.mark.parametrize(
+    ("touch", "height", "filters", "force"),
+    [
+        # The share of the tension less what relaxed.
+        (
+            RELAXING,
+            49e-3,
+            [0.3, 0.2, 0.1],
+            0.34 * (0.125 * np.expm1(2.0) - (0.62 * 0.3 + 0.20 * 0.2 + 0.10 * 0.1)),
+        ),
+        (RELAXING, 48.1e-3, [3.0, 2.0, 1.0], 0.0),  # the pulp does not stick
+        (ELASTIC, 47e-3, [], 0.0),  # across a gap
+    ],
+)
+def test_force_is_the_share_of_tension_less_what_relaxed(
+    touch: Touch, height: float, filters: list[float], force: float
+) -> None:
+    found = compute_force(touch, np.array([height]), np.array([48e-3]), np.array(filters).reshape(-1, 1))
+    assert found == pytest.approx(force, rel=1e-13, abs=0.0)  # rounding
 
 
-def test_the_pulp_does_not_stick() -> None:
-    filters = np.array([[3.0], [2.0], [1.0]])
-    assert compute_force(RELAXING, np.array([48.1e-3]), np.array([48e-3]), filters).tolist() == [0.0]
-
-
-def test_there_is_no_force_across_a_gap() -> None:
-    assert compute_force(ELASTIC, np.array([47e-3]), np.array([48e-3]), np.empty((0, 1))).tolist() == [0.0]
-
-
-def near(*poses: tuple[float, float, float]) -> np.ndarray:
-    """Return the cells a level finger may touch while it is at some places, mm; pins stand at 40 mm."""
-    bed, table = (
-        make_grid(Layout()),
-        np.array([[[x * 1e-3, y * 1e-3, z * 1e-3, *LEVEL] for x, y, z in poses]]),
-    )
-    disc = compute_reach(trace_finger(Fingertip(), table).at(0).window, 40e-3)
-    return bed.disc(*disc) if disc else np.empty(0, int)
-
-
-def test_a_finger_above_the_highest_pin_touches_none() -> None:
-    assert near((0, 0, 60), (0, 0, 60)).size == 0
-
-
-def test_a_finger_beside_the_bed_touches_none() -> None:
-    assert near((200, 0, 30), (200, 0, 30)).size == 0
-
-
-def test_a_finger_on_a_pin_may_touch_it_and_not_the_whole_bed() -> None:
-    cells = near((0, 0, 38), (0, 0, 38))
-    assert 312 in cells
-    assert cells.size < 150
+@pytest.mark.parametrize(("x", "z", "most"), [(0, 60, 0), (200, 30, 0), (0, 38, 149)])
+def test_a_level_finger_may_touch_the_cells_below_it_alone(x: float, z: float, most: int) -> None:
+    # Above the highest pin and beside the bed none; on a pin that one, and not the whole bed.
+    pose = np.array([x * 1e-3, 0.0, z * 1e-3, *LEVEL])
+    disc = compute_reach(trace_finger(Fingertip(), np.tile(pose, (1, 2, 1))).at(0).window, 40e-3)
+    cells = make_grid(Layout()).disc(*disc) if disc else np.empty(0, int)
+    assert (312 in cells) == (most > 0)
+    assert cells.size <= most
 
 
 def dragged(periods: int) -> np.ndarray:
     """Return poses (t, 3, 7) of a finger that is dragged and tilted, a period of 5 ms each."""
     moments = np.linspace(0.0, 1.0, 2 * periods + 1)
     turn = 0.2 * moments
-    whole = np.column_stack(
-        [
-            20e-3 * moments,
-            5e-3 * moments**2,
-            38e-3 - 1e-3 * moments,
-            np.cos(turn),
-            np.sin(turn),
-            *np.zeros((2, len(turn))),
-        ]
-    )
+    still = np.zeros((2, len(turn)))
+    way = (20e-3 * moments, 5e-3 * moments**2, 38e-3 - 1e-3 * moments)
+    whole = np.column_stack([*way, np.cos(turn), np.sin(turn), *still])
     return np.stack([whole[2 * i : 2 * i + 3] for i in range(periods)])
 
 
-def test_undersides_worked_out_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
-    poses, places = dragged(70), make_grid(Layout()).compute_basis(np.arange(100, 400))
-    whole = trace_finger(Fingertip(), poses)
-    together = [whole.under(i, places) for i in range(len(poses))]
-    alone = [trace_finger(Fingertip(), poses[i : i + 1]).under(0, places) for i in range(len(poses))]
-    assert np.array_equal(np.array(together), np.array(alone))
+def test_undersides_of_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
+    poses, bed = dragged(70), make_grid(Layout())
+    whole, places = trace_finger(Fingertip(), poses), bed.compute_basis(np.arange(100, 400))
+    alone = [trace_finger(Fingertip(), poses[i : i + 1], i) for i in range(len(poses))]
+    for i, one in enumerate(alone):
+        assert np.array_equal(whole.at(i).under(places), one.at(i).under(places))
+    # Other places in mid way have their own undersides.
+    other = bed.compute_basis(np.arange(50))
+    assert np.array_equal(whole.at(40).under(other), alone[40].at(40).under(other))
 
 
-def test_other_places_in_mid_way_have_their_own_undersides() -> None:
-    bed, coming = make_grid(Layout()), trace_finger(Fingertip(), dragged(8))
-    first, second = bed.compute_basis(np.arange(50)), bed.compute_basis(np.arange(300, 350))
-    coming.under(0, first)
-    fresh = trace_finger(Fingertip(), dragged(8)).under(1, second)
-    assert np.array_equal(coming.under(1, second), fresh)
+def test_undersides_of_a_batch_are_those_of_its_runs() -> None:
+    poses, bed = dragged(8), make_grid(Layout())
+    paths = [trace_finger(Fingertip(), poses + shift, 5) for shift in (0.0, 1e-3)]
+    places = np.stack([bed.compute_basis(np.arange(first, first + 50)) for first in (100, 300)], axis=-1)
+    for several, runs in ((paths, (0, 1)), (paths[:1], (0, 0))):
+        found = join_paths(several).at(7).under(places)
+        for axis, run in enumerate(runs):
+            alone = paths[run].at(7).under(np.ascontiguousarray(places[..., axis]))
+            np.testing.assert_allclose(found[..., axis], alone, rtol=0.0, atol=1e-15)  # sums in another order
 
 
-def test_a_finger_over_a_large_bed_is_worked_out_for_few_periods_at_a_time() -> None:
-    coming = trace_finger(Fingertip(), dragged(8))
+def test_a_finger_over_a_large_bed_is_computed_for_few_periods_at_a_time() -> None:
     many = np.zeros((6, MOST // 6))  # three instants a period: twice as many cells would be all of `MOST`
-    assert coming.under(0, many).base.size <= 2 * 2 * MOST  # R and the tangent of two periods
+    under = trace_finger(Fingertip(), dragged(8)).under(0, many)
+    assert under.base.size <= 2 * 2 * MOST  # R and the tangent of two periods
 
 
 def pressed(x: float, y: float, depth: float) -> np.ndarray:
@@ -104,24 +93,17 @@ def pressed(x: float, y: float, depth: float) -> np.ndarray:
     return run.force[-1].reshape(9, 9)
 
 
-def test_a_finger_on_a_pin_presses_it_hardest() -> None:
+def test_a_finger_presses_the_pins_below_it_and_a_deeper_one_more_of_them() -> None:
     assert np.unravel_index(pressed(3.0, -6.0, 2.0).argmax(), (9, 9)) == (2, 5)
-
-
-def test_a_deeper_press_touches_more_pins() -> None:
     assert (pressed(0, 0, 0.5) > 0).sum() < (pressed(0, 0, 1.5) > 0).sum() < (pressed(0, 0, 2.5) > 0).sum()
 
 
 def test_a_finger_over_the_rim_of_the_bed_presses_what_there_is() -> None:
-    middle, rim = pressed(0, 0, 2.0), pressed(12.0, 0, 2.0)
+    middle, rim, outside = pressed(0, 0, 2.0), pressed(12.0, 0, 2.0), pressed(15.0, 0.0, 3.0)
     # The half on this side of the finger: the same cells, the same path. Rounding of positions of 12 mm.
     assert rim[4, 4:] == pytest.approx(middle[4, :5], abs=1e-12)
-
-
-def test_a_finger_a_pitch_outside_the_bed_still_presses_its_outer_pins() -> None:
-    forces = pressed(15.0, 0.0, 3.0)
-    assert forces[4, 8] > 0.0
-    assert not forces[:, :6].any()
+    assert outside[4, 8] > 0.0  # a pitch beside the bed
+    assert not outside[:, :6].any()
 
 
 @pytest.mark.parametrize("away", [(30, 30, 38), (0, 0, 300)], ids=["aside", "up"])
