@@ -43,9 +43,8 @@ def classify(value: Any) -> Any:
 def merge_parts(parts: Sequence[Part]) -> Part:
     """Return a part that stands for those of all runs; the first one itself where all are alike.
 
-    `parts`: of one `classify`. What is the same in all of them stays as it is; a number that is not becomes
-    an array (b,), and arrays get one axis more, the last; parts within the parts likewise. The rules of
-    parameters are not checked again.
+    What is the same in all, of one `classify`, stays; a number that is not becomes an array (b,), an array
+    gets a last axis, parts within the parts likewise. The rules of parameters are not checked again.
     """
     first: Any = parts[0]
     own = {field.name: _one([getattr(one, field.name) for one in parts]) for field in fields(first)}
@@ -70,11 +69,6 @@ def _one(values: list[Any]) -> Any:
         own = tuple(_one(list(several)) for several in zip(*values, strict=True))
         return first if all(map(operator.is_, own, first)) else own
     return first if all(value is first or value == first for value in values) else np.array(values)
-
-
-def list_numbers(values: Sequence[float]) -> Floats:
-    """Return a number of each run, shape (b,)."""
-    return np.array(values, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,19 +129,13 @@ GROUP = 8
 
 @dataclass(frozen=True, eq=False)
 class BatchStepper:
-    """The runs' own stepper, for the cells of many runs; see `interfaces.Stepper`.
-
-    Attributes
-    ----------
-    alike : bool
-        The cells of all runs are alike, so they are moved as those of one large bed.
-    valve : int
-        From this row on there is what moves a pin without a finger: its opening and its commands.
-    """
+    """The runs' own stepper, for the cells of many runs; see `interfaces.Stepper`."""
 
     stepper: Stepper
     alike: bool
+    """The cells of all runs are alike, so they are moved as those of one large bed."""
     valve: int
+    """From this row on there is what moves a pin without a finger: its opening and its commands."""
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> BatchMovement:
         """Prepare to move one set of cells of all runs; see `interfaces.Stepper`."""
@@ -212,21 +200,16 @@ def _pieces(count: int, runs: int) -> Iterator[slice]:
 
 @dataclass(frozen=True, eq=False)
 class Batch(System):
-    """All that does not change in b sessions on one layout.
-
-    Attributes
-    ----------
-    systems : tuple of System
-        Those of the runs.
-    """
+    """All that does not change in b sessions on one layout."""
 
     systems: tuple[System, ...]
+    """Those of the runs."""
 
 
 def begin(batch: Batch) -> State:
     """Return the state before the sessions."""
     memory = [system.controller.begin() for system in batch.systems]
-    heights = list_numbers([system.cell.actuator.rest_height for system in batch.systems])
+    heights = np.array([system.cell.actuator.rest_height for system in batch.systems], np.float64)
     return make_initial_state(batch.rows, batch.grid.count, heights, memory)
 
 
@@ -325,10 +308,8 @@ def describe_structure(scene: Scene, known: Findings | None = None) -> Any:
     """Return what scenes must have in common to stand in one batch.
 
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
-    The other steppers know no runs, so for them all cells must be alike.
-
-    `known`: of scenes before, with which this one has parts in common. Raises ParameterError when the scene's
-    parts do not go together.
+    The other steppers know no runs, so for them all cells must be alike. `known`: of scenes before.
+    Raises ParameterError when the scene's parts do not go together.
     """
     known = known or Findings()
     physics = tuple(scene.section(name) for name in PHYSICS)
@@ -371,8 +352,7 @@ def _plans(motion: Motion) -> tuple[BernoulliPlan, ...]:
 def make_batch(systems: Sequence[System]) -> Batch:
     """Return the batch of systems of one structure."""
     first, cell = systems[0], merge_parts([system.cell for system in systems])
-    period = list_numbers([system.period for system in systems])
-    fastest = list_numbers([system.fastest for system in systems])
+    period, fastest = np.array([(system.period, system.fastest) for system in systems], np.float64).T
     plan = merge_parts([system.plan for system in systems])
     # Of its stepper a control period uses `prepare` alone.
     stepper = cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start))

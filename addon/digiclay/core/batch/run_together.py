@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,24 +33,17 @@ from .packing import Batch, begin, extend_path, find_diverged, make_batch, make_
 
 @dataclass(frozen=True, eq=False)
 class Play:
-    """Sessions under way, and all it takes to go on.
-
-    Attributes
-    ----------
-    systems : mapping of int to System
-        By the numbers of their runs.
-    runs : tuple of int
-        Whose the last axis is.
-    path : FingerPath or None
-        Of the fingertips, in the coming periods as far as it is computed.
-    """
+    """Sessions under way, and all it takes to go on."""
 
     systems: Mapping[int, System]
+    """By the numbers of their runs."""
     ways: Mapping[int, Trajectory]
     runs: tuple[int, ...]
+    """Whose the last axis is."""
     batch: Batch
     state: State
     path: FingerPath | None = None
+    """Of the fingertips, in the coming periods as far as it is computed."""
 
     @property
     def finger(self) -> FingerPeriod | None:
@@ -80,20 +73,14 @@ def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """The sessions after a control period.
-
-    Attributes
-    ----------
-    over, failed : ndarray of bool (b,)
-        Which have come to their end, and which of them in an error.
-    share : float
-        The time each has taken, s: every period's, divided by the runs that were in the batch.
-    """
+    """The sessions after a control period."""
 
     play: Play
     over: NDArray[np.bool_]
     failed: NDArray[np.bool_]
+    """(b,): Which have come to their end, and which of them in an error."""
     share: float
+    """The time each has taken, s: every period's, divided by the runs that were in the batch."""
 
     def ended(self, index: int) -> Ended:
         """Return how far the run at an index of the last axis has come."""
@@ -102,11 +89,7 @@ class Instant:
 
 
 def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:
-    """Play all sessions to their ends; what is over leaves the batch before the next control period.
-
-    `ends`: each run's last control period; `stopped`: asked after each control period; when it says True, the
-    sessions are given up. Yields after each control period.
-    """
+    """Yield the sessions after each control period; what is at its end leaves before the next one."""
     share = 0.0
     while play.runs:
         started = time.perf_counter()
@@ -165,11 +148,9 @@ class Histories:
         self._recording.observe(now.play.state)
 
     def finish(self, now: Instant, index: int) -> Result:
-        """Return the result of a run; its history is valid until that of another run is requested.
+        """Return the result of a run at its end; its history is valid until that of another is requested.
 
         New memory for every run would take longer than all that is written into it.
-
-        `now`: in which it has come to its end; `index`: where on the last axis the run is.
         """
         run = now.play.runs[index]
         rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
@@ -189,25 +170,18 @@ class Histories:
 
 @dataclass(frozen=True, eq=False)
 class SampledPath:
-    """Fingertip path over a bed, at some times.
-
-    Attributes
-    ----------
-    time : ndarray (t,)
-        s.
-    fingertip : ndarray (t, 7)
-        Lowest point, m, and quaternion.
-    cells : ndarray of int (m,)
-        Those that are the nearest to it at some time, ascending.
-    """
+    """Fingertip path over a bed, at some times."""
 
     time: Floats
+    """(t,): s."""
     fingertip: Floats
+    """(t, 7): Lowest point, m, and quaternion."""
     cells: NDArray[np.intp]
+    """(m,): Those that are the nearest to it at some time, ascending."""
 
 
 def make_path(grid: Grid, trajectory: Trajectory, time: Floats) -> SampledPath:
-    """Compute a fingertip path at times (t,), s. `time` (t,), s."""
+    """Compute a fingertip path at times (t,), s."""
     tip = trajectory.poses(time)
     places = np.unique(tip[:, :2], axis=0)
     nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
@@ -215,17 +189,7 @@ def make_path(grid: Grid, trajectory: Trajectory, time: Floats) -> SampledPath:
 
 
 class Sums:
-    """Sums what the metrics of runs need over their cells, row by row; there are no histories.
-
-    Parameters
-    ----------
-    scenes : mapping of int to Scene
-        By the numbers of their runs.
-    recorder : Recorder or None
-        Theirs; None: one row a control period.
-    play : Play
-        Before the sessions.
-    """
+    """Sums what the metrics of runs need over their cells, row by row; parameters as of `Histories`."""
 
     def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:
         recorder = recorder or Recorder()
@@ -249,10 +213,7 @@ class Sums:
             self._sums[period // self._every, :, self._columns] = self._sum(held).T
 
     def finish(self, now: Instant, index: int) -> Result:
-        """Return the result of a run, without a history.
-
-        `now`: in which it has come to its end; `index`: where on the last axis the run is.
-        """
+        """Return the result of a run at its end, without a history."""
         play, run, period = now.play, now.play.runs[index], now.play.state.period
         scene, column, held = self._scenes[run], self._runs.index(run), play.state.active
         count = 1 - (-period // self._every)
@@ -290,28 +251,14 @@ def _count_following(held: ActiveSet) -> NDArray[np.intp]:
 Outcome = Result | DigiclayError
 
 
-class _Observer(Protocol):
-    """Observer of the sessions after each control period, from which their results come."""
-
-    def observe(self, now: Instant) -> None: ...
-
-    def finish(self, now: Instant, index: int) -> Result: ...
-
-
 @dataclass(frozen=True, eq=False)
 class Monitor:
-    """References that follow sessions through every control period; see `accuracy.ErrorMonitor`.
-
-    Attributes
-    ----------
-    play : Play
-        The references.
-    largest : ndarray (3, b)
-        From `accuracy.compare`, so far.
-    """
+    """References that follow sessions through every control period; see `accuracy.ErrorMonitor`."""
 
     play: Play
+    """The references."""
     largest: Floats
+    """(3, b): From `accuracy.compare`, so far."""
 
 
 def _start(scenes: Mapping[int, Scene]) -> Monitor:
@@ -337,7 +284,7 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
 
 def _run(
     scenes: Sequence[Scene],
-    observer: Callable[[Mapping[int, Scene], Recorder | None, Play], _Observer],
+    observer: type[Histories | Sums],
     stopped: Callable[[], bool] | None,
     *,
     errors: bool = False,
@@ -376,10 +323,10 @@ def run_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes from rest to their ends, all at once.
 
-    `scenes`: of one `packing.describe_structure`; `stopped`: asked after each control period; when it says
-    True, the runs that are not done are given up. Yields `number`: which of the scenes has come to its end;
-    `result`: as `run_scene.run` would return or raise it. Its history is valid until the next result is asked
-    for. Its run time is a share, see `run_together.Instant`.
+    The scenes are of one `packing.describe_structure`. When `stopped`, asked after each control period, says
+    True, the runs that are not done are given up. Yields the number of a scene at its end, and what
+    `run_scene.run` would return or raise; the history is valid until the next result is asked for, and the
+    run time is a share, see `run_together.Instant`.
     """
     return _run(scenes, Histories, stopped)
 
@@ -389,9 +336,7 @@ def measure_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes as `run_together` does, and measure them without ever having their histories.
 
-    `scenes`: of one `packing.describe_structure`, with a recorder; `errors`: estimate their errors too, where
-    `accuracy.has_every_command`; their references, see `accuracy.make_reference`, must be of one structure as
-    well; `stopped`: see `run_together`. Yields `number`; `result`: without a history; its metrics are those
-    it would have with one.
+    The metrics are those with a history. With `errors`, theirs are estimated too, where
+    `accuracy.has_every_command`; references, see `accuracy.make_reference`, must be of one structure as well.
     """
     return _run(scenes, Sums, stopped, errors=errors)

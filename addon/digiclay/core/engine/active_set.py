@@ -28,21 +28,15 @@ KEPT = 32
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Selection of the active cells of a session.
-
-    Attributes
-    ----------
-    period : float or ndarray (b,)
-        Control period, s.
-    fastest : float or ndarray (b,)
-        No pin rises faster, m/s.
-    """
+    """Selection of the active cells of a session."""
 
     grid: Grid
     rows: Rows
     cell: Cell
     period: Any
+    """Control period, s; a number or (b,)."""
     fastest: Any
+    """No pin rises faster, m/s; a number or (b,)."""
 
     #: How much farther than it must the set goes, in pitches, so that it serves for some periods.
     margin = 1.0
@@ -51,10 +45,7 @@ class Selection:
     smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
 
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
-        """Return a state, in the same arrays, whose active cells are all that can change in a period.
-
-        `control`: the disc that the controller will command; of a batch a list of them.
-        """
+        """Return a state, in the same arrays, whose active cells are all that can change in a period."""
         active, window, disc = state.active, finger and finger.window, self.join(control)
         if self.serves(active, state.period, window, disc):
             return state
@@ -165,14 +156,10 @@ class OwnSelection(Selection):
 
     Where fewer are active than in another run, others make up the number; of these nothing is measured
     and nothing is commanded.
-
-    Attributes
-    ----------
-    runs : tuple of Selection
-        The sessions' own.
     """
 
     runs: tuple[Selection, ...]
+    """The sessions' own."""
 
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
         """Return a state whose active cells are those of each session; see `Selection.update`."""

@@ -35,18 +35,16 @@ def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:
 
 
 def step(system: System, state: State, poses: Floats) -> State:
-    """Simulate one control period; the state handed in stays as it is.
+    """Simulate one control period of poses (p, f, 7) at `System.instants`; the state given stays as it is.
 
-    `poses` (p, f, 7), of the fingers at `System.instants`: position of the lowest point, m, and unit
-    quaternion w, x, y, z. Raises DivergenceError when a height, force or opening is no longer finite.
+    Raises DivergenceError when a height, force or opening is no longer finite.
     """
     return advance(system, state.copy(), trace_fingers(system, poses[None])[0])
 
 
 def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
-    """Simulate one control period in the arrays of `state`, which is used up.
+    """Simulate one control period in the arrays of `state`; keep a `State.copy` to come back to it.
 
-    `state`: not to be used again; keep a `State.copy` to come back to it; `finger`: from `trace_fingers`.
     Raises DivergenceError when a height, force or opening is no longer finite.
     """
     after = simulate_period(system, state, finger)
@@ -76,10 +74,8 @@ def simulate_period(system: System, state: State, finger: FingerPeriod | None) -
 def repeat_period(system: System, state: State, finger: FingerPeriod | None, leader: State) -> State:
     """Simulate the control period that a run, or a batch, has just done, under its commands.
 
-    `system`: of the same bed and rows; its controller and sensors are left aside; `state`: before the period;
-    used up; `finger`: FingerPeriod, FingersPeriod or None, the fingertip's path through the period;
-    the fingertips' of a batch; `leader`: after the period. The cells that were active there are so here: the
-    two differ by errors of the integration, and a set of cells has room for far more.
+    The state before the period is used up; `leader` is the one after it, of the same bed and rows. The cells
+    active there are so here: the two differ by errors of the integration, and a set has room for far more.
     """
     if state.active.cells is not leader.active.cells:
         system.selection.release(state)
@@ -110,11 +106,7 @@ def find_divergence(
 
 
 def periods(system: System, trajectories: Sequence[Trajectory], state: State, count: int) -> Iterator[State]:
-    """Simulate control periods along the fingers' trajectories; the arrays of `state` are used up.
-
-    `trajectories`: one a finger; `count`: control periods. Yields after each period; valid until the next one
-    is asked for.
-    """
+    """Yield the state after each control period along the fingers' trajectories, valid until the next one."""
     done = 0
     while done < count:
         chunk = min(CHUNK, count - done)

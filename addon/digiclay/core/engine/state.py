@@ -79,46 +79,32 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class ActiveSet:
-    """Active cells, with their rows outside the bed's array: m of one run, or m of each of b runs.
-
-    Attributes
-    ----------
-    rows : Rows
-        Which row of the block holds what.
-    cells : ndarray of int (m,) or (m, b)
-        Numbers in their own beds: first those the finger may touch, then the others that move or are
-        controlled.
-    near : int
-        Number k of those the finger may touch.
-    block : ndarray (r, m) or (r, m, b)
-        Their rows, see `Rows`.
-    mode : ndarray (m,) or (m, b) of int8
-        Their control modes, `modes.Mode`.
-    quadratic_basis : ndarray (6, m) or (6, m, b)
-        Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product.
-    reach, control : tuple or None
-        Discs of which every cell is in, the finger's and the controller's: center x, y, radius, m; arrays
-        (b,) of b runs.
-    peak : float or ndarray (b,)
-        No pin top in the finger's part is higher while this set is in use, m.
-    until : int
-        Control period by which the set is to be made anew.
-    own : tuple of ActiveSet
-        In a batch whose runs have the sets they have alone: these, of which block, modes and basis are not
-        looked at. Their cells are the first of each run's; others make up the number.
-    """
+    """Active cells, with their rows outside the bed's array: m of one run, or m of each of b runs."""
 
     rows: Rows
+    """Which row of the block holds what."""
     cells: Cells
+    """(m,) or (m, b): Numbers in their own beds: first those the finger may touch, then the others that move
+    or are controlled."""
     near: int
+    """Number k of those the finger may touch."""
     block: Floats
+    """(r, m) or (r, m, b): Their rows, see `Rows`."""
     mode: NDArray[np.int8]
+    """(m,) or (m, b): Their control modes, `modes.Mode`."""
     quadratic_basis: Floats
+    """(6, m) or (6, m, b): Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product."""
     reach: Any
     control: Any
+    """Discs of which every cell is in, the finger's and the controller's: center x, y, radius, m; arrays (b,)
+    of b runs."""
     peak: Any
+    """No pin top in the finger's part is higher while this set is in use, m; a number or (b,)."""
     until: int
+    """Control period by which the set is to be made anew."""
     own: tuple[ActiveSet, ...] = ()
+    """In a batch whose runs have the sets they have alone: these, of which block, modes and basis are not
+    looked at. Their cells are the first of each run's; others make up the number."""
 
     # Parts of the block, all of them views. Each is made once: a set lives for many periods.
 
@@ -190,32 +176,22 @@ class ActiveSet:
 
 
 class State(NamedTuple):
-    """State of a session, or of b sessions, at the start of a control period.
-
-    Attributes
-    ----------
-    period : int
-        Number of control periods done.
-    rows : ndarray (r, n) or (r, n, b)
-        See `Rows`; out of date for the cells in `active`: read it with `row`.
-    modes : ndarray (n,) or (n, b) of int8
-        Control modes; out of date for the cells in `active`: read them with `mode`.
-    aged : ndarray (n,) or (n, b)
-        Time up to which a cell's relaxation has been worked out, s: the pulp over cells
-        out of reach goes on relaxing, and is aged exactly when it is needed again.
-    peak : float or ndarray (b,)
-        No pin top outside `active` is higher than this, m.
-    memory : object
-        The controller's memory.
-    """
+    """State of a session, or of b sessions, at the start of a control period."""
 
     period: int
+    """Number of control periods done."""
     rows: Floats
+    """(r, n) or (r, n, b): See `Rows`; out of date for the cells in `active`: read it with `row`."""
     modes: NDArray[np.int8]
+    """(n,) or (n, b): Control modes; out of date for the cells in `active`: read them with `mode`."""
     aged: Floats
+    """(n,) or (n, b): Time up to which a cell's relaxation has been worked out, s: the pulp over cells out of
+    reach goes on relaxing, and is aged exactly when it is needed again."""
     peak: Any
+    """No pin top outside `active` is higher than this, m; a number or (b,)."""
     active: ActiveSet
     memory: Any
+    """The controller's memory."""
 
     def end_period(self, memory: Any) -> State:
         """Return the state one control period later, with the controller's memory."""

@@ -20,24 +20,7 @@ from .state import ActiveSet, Rows
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Constants of a session.
-
-    Attributes
-    ----------
-    plan : object
-        What the stepper works out once for all periods.
-    period : float, or ndarray (b,) of b runs
-        Control period, s.
-    fastest : float or ndarray (b,)
-        No pin rises faster, m/s.
-    selection : Selection
-        Of the active cells.
-    instants : ndarray (p,)
-        Times into the period at which the finger's pose is needed, first 0, last `period`, s.
-    by_set : bool
-        Whether what becomes of a cell depends on which others are active: in a batch each run then keeps
-        the active set it has alone.
-    """
+    """Constants of a session."""
 
     grid: Grid
     cell: Cell
@@ -45,12 +28,19 @@ class System:
     controller: Controller
     stepper: Stepper
     plan: Any
+    """What the stepper works out once for all periods."""
     period: Any
+    """Control period, s; a number or (b,)."""
     fastest: Any
+    """No pin rises faster, m/s; a number or (b,)."""
     selection: Selection
+    """Of the active cells."""
     instants: Floats
+    """(p,): Times into the period at which the finger's pose is needed, first 0, last `period`, s."""
     rows: Rows
     by_set: bool
+    """Whether what becomes of a cell depends on which others are active: in a batch each run then keeps the
+    active set it has alone."""
 
     def move(self, active: ActiveSet, finger: FingerPeriod | None) -> None:
         """Move active cells through a control period under their queued commands, in place."""
@@ -70,12 +60,7 @@ class System:
 def make_segments(
     stepper: Stepper, cut: float, period: float, count: int
 ) -> tuple[tuple[Segment, ...], Floats]:
-    """Cut a control period into physics steps.
-
-    `cut`: time into the period at which it is cut besides, s; 0: nowhere; `period`: control period, s;
-    `count`: number of steps of equal length. Returns `segments`, and `instants` (p,), when the stepper
-    needs the fingertip's pose, s.
-    """
+    """Return a period's steps, `count` of equal length and cut at a time, s, and its instants (p,), s."""
     times = {round(i * period / count, 15) for i in range(count + 1)}
     if cut:
         times = {t for t in times if abs(t - cut) > 1e-9 * period} | {cut}

@@ -31,15 +31,11 @@ class OrificeAndConduit:
 
     Each branch of the valve gives a line or a quadratic in Q, solved in closed form; the
     smaller flow holds, as without a conduit.
-
-    Attributes
-    ----------
-    resistance : float
-        Of the conduit, Pa s/m³.
     """
 
     valve: Orifice
     resistance: float
+    """Of the conduit, Pa s/m³."""
 
     @property
     def knee(self) -> float:

@@ -16,18 +16,13 @@ LARGEST_EXPONENT = 300.0
 
 
 class ExponentialLaw:
-    """Base of the contact laws ``T(x) = (b/m) (exp(m (x - x0)) - 1)``, whatever their parameters are.
-
-    Attributes
-    ----------
-    stiffness, exponent, offset, share : float
-        b, N/m; m, 1/m; x0, m; share f_d of the force that a cell carries. Parameters or properties.
-    """
+    """Base of the contact laws ``T(x) = (b/m) (exp(m (x - x0)) - 1)``, whatever their parameters are."""
 
     stiffness: float
     exponent: float
     offset: float
     share: float
+    """b, N/m; m, 1/m; x0, m; share f_d of the force that a cell carries. Parameters or properties."""
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)

@@ -14,39 +14,27 @@ NONE: Floats = np.empty(0)
 
 
 class Measurement(NamedTuple):
-    """Measured quantities of some cells.
-
-    Attributes
-    ----------
-    quadratic_basis : ndarray (6, m)
-        Rows 1, x, y, x², x y, y² of where they are, m.
-    height, force : ndarray (m,)
-        As measured, m and N.
-    target : ndarray (m,)
-        Height they are commanded to, m.
-    mode : ndarray (m,) of int8
-    own : ndarray (rows, m)
-        What the controller remembers of each cell; brought up to date in place.
-    cells : ndarray of int (m,)
-        Their numbers in the bed.
-    command : ndarray (m,)
-        Valve command of the period before, 1.
-    sensed : ndarray (rows, m)
-        What the sensors remember of each cell.
-    present : tuple of int
-        In a batch how many of the cells, the first, take part in each run; empty: all do.
-    """
+    """Measured quantities of some cells."""
 
     quadratic_basis: Floats
+    """(6, m): Rows 1, x, y, x², x y, y² of where they are, m."""
     height: Floats
     force: Floats
+    """(m,): As measured, m and N."""
     target: Floats
+    """(m,): Height they are commanded to, m."""
     mode: NDArray[np.int8]
+    """(m,)."""
     own: Floats
+    """(rows, m): What the controller remembers of each cell; brought up to date in place."""
     cells: NDArray[np.intp]
+    """(m,): Their numbers in the bed."""
     command: Floats = NONE
+    """(m,): Valve command of the period before, 1."""
     sensed: Floats = NONE
+    """(rows, m): What the sensors remember of each cell."""
     present: tuple[int, ...] = ()
+    """In a batch how many of the cells, the first, take part in each run; empty: all do."""
 
 
 class Commands(NamedTuple):
@@ -83,18 +71,12 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class SetPoint:
-    """Set point of the total force.
-
-    Attributes
-    ----------
-    force : float
-        F_ref, N.
-    per_cell : bool
-        Whether every cell that follows the finger is asked for it, and not all cells together.
-    """
+    """Set point of the total force."""
 
     force: float
+    """F_ref, N."""
     per_cell: bool = False
+    """Whether every cell that follows the finger is asked for it, and not all cells together."""
 
     def total(self, following: ArrayLike) -> Floats:
         """Return the set point of n following cells, N: F_ref, or per cell n F_ref, NaN at n = 0."""

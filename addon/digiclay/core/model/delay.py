@@ -20,18 +20,13 @@ class Queue:
 
     The queue holds the last `length` commands, oldest first, the newest pushed at the
     start of the period. Until `cut` the valve sees the oldest; after it, the next.
-
-    Attributes
-    ----------
-    length : int
-        Number of commands kept, at least 1.
-    cut : float
-        Time into the period at which the valve goes over to the next command, s; 0 when
-        the dead time is a whole number of periods (then the valve sees the oldest all along).
     """
 
     length: int = 1
+    """Number of commands kept, at least 1."""
     cut: float = 0.0
+    """Time into the period at which the valve goes over to the next command, s; 0 when the dead time is a
+    whole number of periods (then the valve sees the oldest all along)."""
 
     def seen(self, time: float) -> int:
         """Return which command of the queue the valve sees from `time` into the period on."""

@@ -72,11 +72,10 @@ class Fingertip(Parameters):
         return max(axes) ** 2 / min(axes)
 
     def outline(self, poses: Floats) -> Floats:
-        """Work out, for each pose, what its underside needs.
+        """Return what the undersides at poses (k, 7) need, (k, 10).
 
-        `poses` (k, 7), position of the lowest point, m, and unit quaternion w, x, y, z. Returns (k, 10),
-        center x, y, z, m; the matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; the tilt of the
-        mid surface t_x, t_y; the half thickness over the center, m; the smaller eigenvalue of S, 1/m².
+        Center x, y, z, m; matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; tilt of the mid
+        surface t_x, t_y; half thickness over the center, m; smaller eigenvalue of S, 1/m².
         """
         rotation = make_matrices(poses[:, 3:])
         axes = np.array([self.length, self.width, self.height])
@@ -106,8 +105,7 @@ def compute_reaches(outline: Floats) -> Floats:
 def compute_reach(window: Window, peak: Any) -> Discs | None:
     """Return the disc, or that of each of b runs, beyond which the underside is above `peak`, m.
 
-    A paraboloid that nowhere lies above the underside gives a bound for every tilt; it
-    stays one with the smallest base, the largest tilt and the smallest bend of several poses.
+    A paraboloid below the underside bounds every tilt, also with the smallest base and bend of several poses.
     """
     x, y, spread, base, tilt, bend = window
     square = tilt * tilt + 2.0 * bend * (peak - base)
@@ -124,8 +122,8 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
     ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
     tangent, a quadratic form, is the paraboloid that takes over at R = c, and c is in m.
 
-    `outline` (..., p, 10), from `Fingertip.outline`. Returns `forms` (..., 2 p, 6), coefficients of 1, x, y,
-    x², x y, y²: p rows in R, then p rows in the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
+    Of outlines (..., p, 10): `forms` (..., 2 p, 6), coefficients of 1, x, y, x², x y, y², p rows of R, then p
+    rows of the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
     """
     x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = np.moveaxis(outline, -1, 0)
     zero = np.zeros_like(x)

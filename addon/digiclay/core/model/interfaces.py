@@ -119,24 +119,17 @@ class Sensors(Protocol):
 
 
 class Truth(NamedTuple):
-    """True quantities of some cells between two control periods.
-
-    Attributes
-    ----------
-    cells : ndarray of int (m,)
-    period : int
-        Number of control periods done.
-    force, height : ndarray (m,)
-        N, m.
-    command : ndarray (m,)
-        Valve command of the period before.
-    """
+    """True quantities of some cells between two control periods."""
 
     cells: NDArray[np.intp]
+    """(m,)."""
     period: int
+    """Number of control periods done."""
     force: Floats
     height: Floats
+    """(m,): N, m."""
     command: Floats
+    """(m,): Valve command of the period before."""
 
 
 def find_truth(seen: Measurement, period: int) -> Truth:
@@ -168,27 +161,19 @@ class Stepper(Protocol):
         ...
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
-        """Prepare to move a block of cells on, as often as its set of cells serves.
+        """Prepare to move cells on, of which the finger may touch the first k, as often as their set serves.
 
-        `plan`: from `plan`; with the numbers of all runs for cells of many; `rows` (r + q, n) or (r + q, n,
-        b), state rows, see `physics.Cell`, then the commands of the queue, oldest first; `near`: number k of
-        cells, the first, that the finger may touch.
+        Rows (r + q, n[, b]) are those of `physics.Cell`, then the commands of the queue, oldest first.
         """
         ...
 
 
 @dataclass(frozen=True)
 class Segment:
-    """One physics step of a control period.
-
-    Attributes
-    ----------
-    start, length : float
-        Time into the period, and length, s.
-    nodes : tuple of int
-        Which of the period's instants the stepper needs.
-    """
+    """One physics step of a control period."""
 
     start: float
     length: float
+    """Time into the period, and length, s."""
     nodes: tuple[int, ...]
+    """Which of the period's instants the stepper needs."""

@@ -105,17 +105,12 @@ class Layout(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Positions of the cells, and fast search for the cells near a point.
-
-    Attributes
-    ----------
-    x, y : ndarray (n,)
-        Positions of the cells' axes, m; cell ``row * columns + column``.
-    """
+    """Positions of the cells, and fast search for the cells near a point."""
 
     layout: Layout
     x: Floats
     y: Floats
+    """(n,): Positions of the cells' axes, m; cell ``row * columns + column``."""
 
     @property
     def count(self) -> int:

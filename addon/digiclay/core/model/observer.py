@@ -31,31 +31,23 @@ class ValveObserver(Sensors):
     ``F = A (<α P_s> - A ΔH/T) / <α>``: the mean force of the period, weighted with α. It is
     not below 0, for a finger cannot pull. Where the valve is shut, or the pin is at an end
     stop, the motion says nothing, and the last estimate is held.
-
-    Attributes
-    ----------
-    inner : Sensors
-        Without state; its heights are used, its forces are not.
-    period : float
-        Control period, s.
-    length : int
-        Commands on their way to the valve.
-    response : ndarray (nodes + 1, s)
-        Opening at the nodes of a period, then at its end, from the lag's rows and the commands.
-    weights : ndarray (nodes,)
-        Of the nodes; their sum is 1.
-    doubt : float
-        How far the difference of two heights may be off, m: an estimate that is no larger than what this
-        comes to is none.
     """
 
     inner: Sensors
+    """Without state; its heights are used, its forces are not."""
     cell: Cell
     period: float
+    """Control period, s."""
     length: int
+    """Commands on their way to the valve."""
     response: Floats
+    """(nodes + 1, s): Opening at the nodes of a period, then at its end, from the lag's rows and the
+    commands."""
     weights: Floats
+    """(nodes,): Of the nodes; their sum is 1."""
     doubt: float = 0.0
+    """How far the difference of two heights may be off, m: an estimate that is no larger than what this comes
+    to is none."""
 
     @property
     def rows(self) -> int:

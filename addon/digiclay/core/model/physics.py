@@ -50,25 +50,17 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class Speeds:
-    """Speeds of a pin without load behind a fully open valve, m/s.
-
-    Attributes
-    ----------
-    fall, rise : float or ndarray (b,)
-        Its velocity downwards, not above 0, and upwards, not below.
-    """
+    """Speeds of a pin without load behind a fully open valve, m/s."""
 
     fall: Any
     rise: Any
+    """Its velocity downwards, not above 0, and upwards, not below; a number or (b,)."""
 
     def reach(self, height: Floats, under: Floats, time: Floats | float) -> tuple[Floats, Floats]:
         """Return the lowest and the highest that pins can be after some time, (n, ..), m.
 
         A finger that pushes a pin leaves it where they part, and what it does not push goes no faster than
-        its valve lets it: no pin is lower than it was, or than the finger came, by more than such a fall.
-
-        `height` (n, ..), heights before, m; `under` (p, k, ..), undersides of the finger over the first k, m;
-        `time` (b,), s.
+        its valve lets it: no pin is lower than it was, or than the undersides (p, k, ..), m, by more.
         """
         lowest = height.copy()
         near = lowest[: under.shape[1]]

@@ -93,10 +93,8 @@ def draw_normals(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Float
     """Return two independent standard normal numbers a cell, a pure function of the arguments.
 
     A counter is hashed instead of drawing from a generator: what a cell reads does not depend
-    on which others are read, nor on what was read before.
-
-    `seed` int (b,), not negative; `period` int (t,), not negative; `cells` int (m,) or (m, b). Returns
-    `first`, `second` ([t,] m[, b]), by Box and Muller's method; no farther from 0 than 8.6.
+    on which others are read, nor on what was read before. The numbers, ([t,] m[, b]) for seeds (b,),
+    periods (t,) and cells (m[, b]), are Box and Muller's; none is farther from 0 than 8.6.
     """
     periods = np.asarray(period, np.uint64)
     start = _mix(np.array(seed, np.uint64, ndmin=1))
@@ -146,34 +144,35 @@ class NoiseAhead:
 
 
 @dataclass(frozen=True)
-class Noisy(Sensors):
-    """Normal noise, white from cell to cell and from period to period.
-
-    Attributes
-    ----------
-    force, height : float
-        Standard deviations, N and m.
-    """
+class Stateless(Sensors):
+    """Sensors around others that remember nothing of their own."""
 
     inner: Sensors
-    force: float
-    height: float
-    seed: int
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs: none of its own."""
+        """State rows a cell needs: those of the inner sensors."""
         return self.inner.rows
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Bring the rows of the inner sensors up to date."""
+        self.inner.update(own, truth)
+
+
+@dataclass(frozen=True)
+class Noisy(Stateless):
+    """Normal noise, white from cell to cell and from period to period."""
+
+    force: float
+    height: float
+    """Standard deviations, N and m."""
+    seed: int
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return forces and heights with noise; a force may read below 0."""
         force, height = self.inner.measure(own, truth)
         first, second = self._ahead.draw(truth.period, truth.cells)
         return force + self.force * first, height + self.height * second
-
-    def update(self, own: Floats, truth: Truth) -> None:
-        """Nothing of its own to remember."""
-        self.inner.update(own, truth)
 
     @cached_property
     def _ahead(self) -> NoiseAhead:
@@ -182,32 +181,17 @@ class Noisy(Sensors):
 
 
 @dataclass(frozen=True)
-class Quantized(Sensors):
-    """Readings in whole steps, the nearest one (halves: the even one); a step of 0 rounds nothing.
+class Quantized(Stateless):
+    """Readings in whole steps, the nearest one (halves: the even one); a step of 0 rounds nothing."""
 
-    Attributes
-    ----------
-    force, height : float
-        Steps, N and m.
-    """
-
-    inner: Sensors
     force: float
     height: float
-
-    @property
-    def rows(self) -> int:
-        """State rows a cell needs: none of its own."""
-        return self.inner.rows
+    """Steps, N and m."""
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return rounded forces and heights."""
         force, height = self.inner.measure(own, truth)
         return _round_to_step(force, self.force), _round_to_step(height, self.height)
-
-    def update(self, own: Floats, truth: Truth) -> None:
-        """Nothing of its own to remember."""
-        self.inner.update(own, truth)
 
 
 def _round_to_step(values: Floats, step: Any) -> Floats:
@@ -224,18 +208,13 @@ class Delayed(Sensors):
 
     A cell that takes no part is not read, and does not change: its readings of that time are
     made up when they are asked for, so it matters to nobody which cells take part.
-
-    Attributes
-    ----------
-    periods : int
-        How late, at least 1.
-    rest : float
-        Height of every pin at the start, m.
     """
 
     inner: Sensors
     periods: int
+    """How late, at least 1."""
     rest: float
+    """Height of every pin at the start, m."""
 
     @property
     def rows(self) -> int:

@@ -41,23 +41,17 @@ class Touch:
 
 @dataclass(eq=False)
 class FingerPath:
-    """Fingertip path over t control periods, at p instants of each, of a run or of b runs.
-
-    Attributes
-    ----------
-    first : int
-        The first of these periods.
-    forms : ndarray (t, 2 p, 6[, b])
-        From `fingertip.compute_forms`. The last axis is 1 where all runs have one and the same path.
-    join : ndarray (t, 2, p, 1[, b])
-    windows : list of Window, or ndarray (t, 6, b)
-        One a period.
-    """
+    """Fingertip path over t control periods, at p instants of each, of a run or of b runs."""
 
     first: int
+    """The first of these periods."""
     forms: Floats
+    """(t, 2 p, 6[, b]): From `fingertip.compute_forms`. The last axis is 1 where all runs have one and the
+    same path."""
     join: Floats
+    """(t, 2, p, 1[, b])."""
     windows: Any
+    """(t, 6, b): One a period."""
 
     def __post_init__(self) -> None:
         # The undersides computed last: over which places, from which period on.

@@ -65,20 +65,14 @@ class Orifice:
     Laminar branch ``Q = g ΔP`` with ``g = laminar |K|^power``; turbulent branch
     ``Q = a sqrt(ΔP)`` with ``a = turbulent |K|``. The smaller of the two holds: they
     cross once, at ΔP_crit, so Q is continuous and grows with ΔP.
-
-    Attributes
-    ----------
-    laminar : float
-        Conductance of the fully open valve, m³/(s Pa) (equation 7, laminar).
-    turbulent : float
-        Coefficient of the fully open valve, m³/(s sqrt(Pa)) (equation 7, turbulent).
-    power : int
-        Exponent of the opening in the laminar branch: 2, or 1 with ``gap = "opening"``.
     """
 
     laminar: float
+    """Conductance of the fully open valve, m³/(s Pa) (equation 7, laminar)."""
     turbulent: float
+    """Coefficient of the fully open valve, m³/(s sqrt(Pa)) (equation 7, turbulent)."""
     power: int
+    """Exponent of the opening in the laminar branch: 2, or 1 with ``gap = "opening"``."""
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)

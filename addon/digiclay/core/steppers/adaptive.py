@@ -18,6 +18,7 @@ from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
 from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
+from .richardson import bound
 
 #: A block to work in, the map to the finger's underside at the instants of a level's steps, and what moves
 #: the block on.
@@ -32,41 +33,28 @@ PRESSED, FREE = 0.1, 0.001
 
 @dataclass(frozen=True, eq=False)
 class AdaptivePlan:
-    """Constants of all periods.
-
-    Attributes
-    ----------
-    levels : tuple of BernoulliPlan
-        For whole steps, half steps, quarter steps and so on.
-    between : tuple of ndarray (i, p)
-        From the finger's underside at the period's instants to that at the ends and in the middle
-        of a level's steps: exact at the instants, by parabolas between them.
-    allowed, allowed_tension : float
-        Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's
-        filters, N: what so much height makes at first touch, where the pulp is softest.
-    period : float
-        s.
-    """
+    """Constants of all periods."""
 
     levels: tuple[BernoulliPlan, ...]
+    """For whole steps, half steps, quarter steps and so on."""
     between: tuple[Floats, ...]
+    """(i, p): From the finger's underside at the period's instants to that at the ends and in the middle of a
+    level's steps: exact at the instants, by parabolas between them."""
     allowed: float
     allowed_tension: float
+    """Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's
+    filters, N: what so much height makes at first touch, where the pulp is softest."""
     speeds: Speeds
     period: float
+    """s."""
 
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Error within a tolerance, stability of the closed-form step.
-
-    Attributes
-    ----------
-    tolerance : float
-        Error of the heights over a run, m.
-    """
+    """Error within a tolerance, stability of the closed-form step."""
 
     tolerance: float
+    """Error of the heights over a run, m."""
 
     name = "adaptive"
     order = 3
@@ -118,11 +106,7 @@ class Adaptive:
             if not any_true(wide):
                 break
             open_cells, coarse = open_cells[wide], fine[:, wide]
-        # Where the finest two still have little in common the extrapolation lies beyond what there can be.
-        np.clip(rows[0], *plan.speeds.reach(start[0], under, plan.period), out=rows[0])
-        np.clip(rows[0], 0.0, cell.actuator.stroke, out=rows[0])
-        pulp = rows[cell.pulp_rows]
-        np.maximum(pulp, 0.0, out=pulp)
+        bound(cell, rows, plan.speeds.reach(start[0], under, plan.period))
         return find_contact_force(cell, rows, under[-1])
 
 

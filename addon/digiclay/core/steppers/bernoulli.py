@@ -45,62 +45,44 @@ LARGEST_DEVIATION = 1.5
 
 @dataclass(frozen=True, eq=False)
 class BernoulliPlan:
-    """Constants of all periods. Heights under the fingertip are in 1/m, tensions in b/m.
-
-    Attributes
-    ----------
-    segments : tuple of Segment
-        The s physics steps of a period.
-    response : ndarray (g + 1, r)
-        From opening and queued commands to the openings at all g Gauss points, and at the end.
-    moves : ndarray (4 s, 2 g)
-        From conductances at the Gauss points, and the same with the signs of the openings, to
-        what each step has: free rise, m; the same and its chord deviation, in 1/m; decay, see `closed_form`.
-    path : ndarray (3 s + 1, p)
-        From the finger's underside at the period's instants to what each step has, in 1/m: rise
-        and its chord deviation; underside at the start, and at the end of the last.
-    loaded : ndarray (1 + 3 s, 2 g + p + 1)
-        Both together: from conductances, underside and a row of ones to the exponent less m H at the
-        start, with its sign changed; then what each step has: slip, chord deviation
-        and decay.
-    nodes : tuple of slice
-        The Gauss points of each step.
-    weights : ndarray (g,)
-        Their weights, s.
-    mean_loss : tuple of ndarray (2, r + 3)
-        The relaxation's maps, one a step: from filters, N, force (which does not count), ones, and tension,
-        to the tension at which the pulp begins to push, and to one more.
-    propagator : tuple of ndarray (r + 1, r + 5)
-        From these, and the tension on average and at the end, to the filters and the force at its end, N.
-    shares : tuple of float
-        Share of the tension that does push, one a step: the rest is lost within it.
-    laminar : bool
-        No valve without load is turbulent.
-    numbers : tuple of float
-        The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`.
-    limits : ndarray (5,)
-        `closed_form.solve_pressed` holds below all of them: the exponent at the start of a step, at its end
-        and with the chord deviation, where every flow is laminar; the growth, where nothing overflows and
-        what does not push moves no pin; and the chord deviation, see `LARGEST_DEVIATION`.
-    to_load : float
-        Pressure that a unit of tension makes, Pa.
-    """
+    """Constants of all periods. Heights under the fingertip are in 1/m, tensions in b/m."""
 
     cell: Cell
     segments: tuple[Segment, ...]
+    """The s physics steps of a period."""
     response: Floats
+    """(g + 1, r): From opening and queued commands to the openings at all g Gauss points, and at the end."""
     moves: Floats
+    """(4 s, 2 g): From conductances at the Gauss points, and the same with the signs of the openings, to what
+    each step has: free rise, m; the same and its chord deviation, in 1/m; decay, see `closed_form`."""
     path: Floats
+    """(3 s + 1, p): From the finger's underside at the period's instants to what each step has, in 1/m: rise
+    and its chord deviation; underside at the start, and at the end of the last."""
     loaded: Floats
+    """(1 + 3 s, 2 g + p + 1): Both together: from conductances, underside and a row of ones to the exponent
+    less m H at the start, with its sign changed; then what each step has: slip, chord deviation and decay."""
     nodes: tuple[slice, ...]
+    """The Gauss points of each step."""
     weights: Floats
+    """(g,): Their weights, s."""
     mean_loss: tuple[Floats, ...]
+    """(2, r + 3): The relaxation's maps, one a step: from filters, N, force (which does not count), ones, and
+    tension, to the tension at which the pulp begins to push, and to one more."""
     propagator: tuple[Floats, ...]
+    """(r + 1, r + 5): From these, and the tension on average and at the end, to the filters and the force at
+    its end, N."""
     shares: tuple[float, ...]
+    """Share of the tension that does push, one a step: the rest is lost within it."""
     laminar: bool
+    """No valve without load is turbulent."""
     numbers: tuple[float, ...]
+    """The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`."""
     limits: Floats
+    """(5,): `closed_form.solve_pressed` holds below all of them: the exponent at the start of a step, at its
+    end and with the chord deviation, where every flow is laminar; the growth, where nothing overflows and
+    what does not push moves no pin; and the chord deviation, see `LARGEST_DEVIATION`."""
     to_load: float
+    """Pressure that a unit of tension makes, Pa."""
 
 
 def make_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
@@ -174,8 +156,7 @@ def _loaded(moves: Floats, path: Floats, offset: float) -> Floats:
 def _path(segments: tuple[Segment, ...]) -> Floats:
     """Return `BernoulliPlan.path`, in m.
 
-    The chord deviation of a path is its mean above the straight line between its ends, here of the parabola
-    through start, middle and end.
+    A chord deviation is the mean above the line between the ends, here of the parabola through the middle.
     """
     count = len(segments)
     path = np.zeros((3 * count + 1, segments[-1].nodes[-1] + 1))

@@ -118,72 +118,47 @@ def replace_zeros(values: Floats) -> Floats:
 
 
 class StepStart(NamedTuple):
-    """Conditions at the start of a step, for k cells, (k,), or for k cells of b runs, (k, b).
-
-    Attributes
-    ----------
-    openings : ndarray (g, ..)
-        Of the valves, at the step's Gauss points.
-    weights : ndarray (g, 1) or (g, 1, b)
-        Of these points, over the piston's area, s/m².
-    exponent : ndarray
-        At the start of the step, see `closed_form`.
-    deviation : ndarray
-        Chord deviation of the path without load, see `closed_form.solve_crossing`.
-    finger_deviation : ndarray
-        The finger's part in it, with its sign changed.
-    lift : ndarray
-        Rise of the finger, in 1/m.
-    relaxed : ndarray
-        exp(e) at which the pulp begins to push.
-    idle : ndarray of bool
-        Cells that it does not push at the start.
-    """
+    """Conditions at the start of a step, for k cells, (k,), or for k cells of b runs, (k, b)."""
 
     openings: Floats
+    """(g, ..): Of the valves, at the step's Gauss points."""
     weights: Floats
+    """(g, 1) or (g, 1, b): Of these points, over the piston's area, s/m²."""
     exponent: Floats
+    """At the start of the step, see `closed_form`."""
     deviation: Floats
+    """Chord deviation of the path without load, see `closed_form.solve_crossing`."""
     finger_deviation: Floats
+    """The finger's part in it, with its sign changed."""
     lift: Floats
+    """Rise of the finger, in 1/m."""
     relaxed: Floats
+    """exp(e) at which the pulp begins to push."""
     idle: NDArray[np.bool_]
+    """Cells that it does not push at the start."""
 
 
 class LoadedPath(NamedTuple):
-    """Result of a step.
-
-    Attributes
-    ----------
-    rise : ndarray
-        Of the pin, m, but for its stops.
-    end : ndarray
-        Exponent at the end.
-    mean : ndarray
-        Mean of the tension over the step, in units of b/m.
-    """
+    """Result of a step."""
 
     rise: Floats
+    """Of the pin, m, but for its stops."""
     end: Floats
+    """Exponent at the end."""
     mean: Floats
+    """Mean of the tension over the step, in units of b/m."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Valve:
-    """Flow through the valves of a step.
-
-    Attributes
-    ----------
-    openings, weights : ndarray
-        See `StepStart`.
-    pressure : ndarray
-        At the far side of the valve, Pa.
-    """
+    """Flow through the valves of a step."""
 
     cell: Cell
     openings: Floats
     weights: Floats
+    """See `StepStart`."""
     pressure: Floats
+    """At the far side of the valve, Pa."""
 
     def conductance(self, load: Floats) -> Floats:
         """Return the secant conductance under a load, Pa, at each Gauss point."""
@@ -201,8 +176,8 @@ def find_loaded_path(
 ) -> LoadedPath:
     """Return the paths of cells over a step in which some of them are near overflow.
 
-    `m` (b,), the contact's exponent, 1/m; `to_load` (b,), pressure that a unit of tension makes, Pa; `share`
-    (b,), share of the tension that pushes, the rest being lost to relaxation within the step.
+    The contact's exponent m is in 1/m, the pressure `to_load` of a unit of tension in Pa; `share` is that of
+    the tension that pushes, the rest being lost to relaxation within the step.
     """
     valve = _Valve(cell, start.openings, start.weights, cell.supply.pressure(start.openings))
     decay, free = _mid_load(valve, m, to_load * share, start)

@@ -22,17 +22,12 @@ ASTRAY = 0.01
 
 @dataclass(frozen=True, eq=False)
 class ExplicitPlan:
-    """Constants of all periods.
-
-    Attributes
-    ----------
-    segments : tuple of Segment
-        The physics steps of a period.
-    """
+    """Constants of all periods."""
 
     cell: Cell
     queue: Queue
     segments: tuple[Segment, ...]
+    """The physics steps of a period."""
     speeds: Speeds
 
 

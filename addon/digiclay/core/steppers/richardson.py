@@ -20,20 +20,14 @@ from .bernoulli import BernoulliExponential, BernoulliPlan
 
 @dataclass(frozen=True, eq=False)
 class RichardsonPlan:
-    """Constants of all periods.
-
-    Attributes
-    ----------
-    coarse, fine : BernoulliPlan
-        For the steps, and for their halves.
-    period : float
-        s.
-    """
+    """Constants of all periods."""
 
     coarse: BernoulliPlan
     fine: BernoulliPlan
+    """For the steps, and for their halves."""
     speeds: Speeds
     period: float
+    """s."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +70,16 @@ class Richardson:
 
 def extrapolate(cell: Cell, fine: Floats, coarse: Floats, reach: tuple[Floats, Floats]) -> None:
     """Take the leading error out of rows (r, n[, b]), in place, within the heights there can be."""
-    own, pulp = fine[: cell.rows], fine[cell.pulp_rows]
+    own = fine[: cell.rows]
     np.add(own, (own - coarse[: cell.rows]) / 3.0, out=own)
-    # Where the two have little in common the extrapolation lies beyond what there can be.
-    np.clip(fine[0], *reach, out=fine[0])
-    np.clip(fine[0], 0.0, cell.actuator.stroke, out=fine[0])
+    bound(cell, fine, reach)
+
+
+def bound(cell: Cell, rows: Floats, reach: tuple[Floats, Floats]) -> None:
+    """Keep extrapolated rows within what there can be, in place, where two levels have little in common."""
+    height, pulp = rows[0], rows[cell.pulp_rows]
+    np.clip(height, *reach, out=height)
+    np.clip(height, 0.0, cell.actuator.stroke, out=height)
     np.maximum(pulp, 0.0, out=pulp)
 
 
