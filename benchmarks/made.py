@@ -23,10 +23,10 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.session.render_settings import Still
 from digiclay.device import form, view
 from digiclay.device.instant import CLEARANCE, Instant
-from digiclay.live.recorded_strokes import PointerStroke, play_strokes, read_strokes
-from digiclay.live.sculpting import begin_session
 from digiclay.pictures import stage
 from digiclay.pictures.still import add_picture_scene, apply_style, render_picture
+from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
+from digiclay.sessions.sculpting import begin_session
 from digiclay.settings.devices import BEDS, make_scene
 from numpy.typing import NDArray
 

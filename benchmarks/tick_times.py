@@ -18,11 +18,12 @@ from digiclay.compat import bpy, scratch
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, live_session, snapshot
 from digiclay.device import view
-from digiclay.live import bed_state, running, sculpting, tick
-from digiclay.live.stroke import draw
-from digiclay.live.stroke_queue import change_stroke, queue_stroke
+from digiclay.live import bed_state, tick
 from digiclay.operators.add_bed import add, select_only
 from digiclay.plots.figure import empty
+from digiclay.sessions import running, sculpting
+from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.strokes.stroke import draw
 from numpy.typing import NDArray
 
 from .report import BLUE, INK, RED, STYLE, Report, Steps

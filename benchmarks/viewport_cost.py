@@ -19,10 +19,11 @@ from digiclay.compat import bpy, scratch
 from digiclay.core.model.layout import Layout
 from digiclay.device import form, view
 from digiclay.device.instant import Instant, find_ellipsoid
-from digiclay.live import bed_state, running, sculpting, tick
-from digiclay.live.waiting import blocking_reason
+from digiclay.live import bed_state, tick
+from digiclay.live.beds import blocking_reason
 from digiclay.operators.add_bed import add, select_only
 from digiclay.panels import display
+from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.toml_table import resolve
-from digiclay.live import sculpting
-from digiclay.live.running import Running
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
-from digiclay.live import sculpting
-from digiclay.live.running import Running
-from digiclay.live.stroke import Brush, draw
-from digiclay.live.stroke_queue import change_stroke, queue_stroke
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
+from digiclay.strokes.stroke import Brush, draw
 from numpy.typing import NDArray
 
 from tests.hand import TICK, heights

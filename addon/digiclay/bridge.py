@@ -33,10 +33,7 @@ ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np
 
 
 def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: float = 0.6) -> Any:
-    """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad.
-
-    `shape`: lengths in Blender units; `smooth_below`, rad.
-    """
+    """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad."""
     vertices, faces = shape
     made = bpy.data.meshes.new(name)
     made.from_pydata(vertices.tolist(), [], faces)
@@ -100,21 +97,13 @@ def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
 
 
 def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
-    """Put the fingertip to a pose, and give its ellipsoid the size of the finger.
-
-    `tip` bpy.types.Object, the empty, in the space of its bed; `at` (7,), lowest point, m, and quaternion w,
-    x, y, z.
-    """
+    """Put the fingertip to a pose (7,), and give its ellipsoid the size of the finger."""
     move_fingertip(tip, at, finger)
     resize_fingertip(tip, finger)
 
 
 def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
-    """Put the fingertip to a pose; the size of its ellipsoid stays.
-
-    `tip` bpy.types.Object, the empty, in the space of its bed; `at` (7,), lowest point, m, and quaternion w,
-    x, y, z; `finger`: of that size.
-    """
+    """Put the fingertip to a pose (7,), lowest point, m, and quaternion; its ellipsoid's size stays."""
     tip.matrix_parent_inverse.identity()
     tip.rotation_mode = "QUATERNION"
     tip.rotation_quaternion = at[3:]
@@ -123,10 +112,7 @@ def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
 
 
 def resize_fingertip(tip: Any, finger: Fingertip) -> None:
-    """Give the ellipsoid in a fingertip the finger's semi-axes, and the empty a size to be seen about it.
-
-    `tip` bpy.types.Object, the empty.
-    """
+    """Give the ellipsoid in a fingertip the finger's semi-axes, and the empty a size to be seen about it."""
     axes = np.array([finger.length, finger.width, finger.height])
     tip[AXES] = axes.tolist()
     tip.empty_display_size = 1.3 * float(axes.max()) * SCALE
@@ -141,16 +127,10 @@ def finger_of(tip: Any) -> Fingertip:
 
 
 def pose(tip: Any) -> Floats:
-    """Return the pose (7,) of a fingertip in the space of its bed: lowest point, m, and quaternion.
-
-    Reads `matrix_world`, which is live while the user drags the fingertip by whatever means.
-    Only where it is and how it is turned count; its scale does not.
-
-    `tip` bpy.types.Object, the empty, child of its bed; it is the ellipsoid's center. Raises DigiclayError
-    when the bed is not uniformly scaled.
-    """
+    """Return the pose (7,) of a fingertip in its bed's space: lowest point, m, and quaternion."""
     bed = tip.parent
     uniform(bed)
+    # The world's matrix is live while the user drags the fingertip by whatever means.
     local = bed.matrix_world.inverted() @ tip.matrix_world
     center, turn, _ = local.decompose()
     quaternion = np.array(turn.normalized())
@@ -160,11 +140,7 @@ def pose(tip: Any) -> Floats:
 
 
 def uniform(bed: Any) -> float:
-    """Return how much larger than its drawing unit a bed stands in the world.
-
-    Raises DigiclayError when the bed, or what it is parented to, is scaled differently along its axes,
-    sheared, mirrored, or scaled to nothing: lengths in it would mean nothing.
-    """
+    """Return the scale of a bed in the world; raise DigiclayError where lengths in it mean nothing."""
     fault = find_scale_fault(bed)
     if fault:
         raise DigiclayError(fault)
@@ -197,11 +173,17 @@ def _judge_scale(rows: tuple[tuple[float, ...], ...]) -> tuple[float, str]:
     return largest, ""
 
 
-def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
-    """Return an sRGB color in the linear light of Blender's materials.
+def project(context: Any, bed: Any, points: Floats) -> Floats:
+    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
+    to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
+    clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
+    depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
+    size = np.array([context.region.width, context.region.height])
+    return np.asarray((clip[:, :2] / depth + 1.0) / 2.0 * size)
 
-    `color` (float, float, float), sRGB, 0 to 1; `alpha`: 0 to 1.
-    """
+
+def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
+    """Return an sRGB color in the linear light of Blender's materials."""
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return r, g, b, alpha
 

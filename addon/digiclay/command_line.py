@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from .compat import bpy
 
 NAME = "digiclay"
 
-#: What Blender gave for the registered command, and wants back.
-HANDLES: list[object] = []
+
+@dataclass
+class Registered:
+    """Blender's handle of the command; None while it is not registered."""
+
+    handle: object = None
+
+
+COMMAND = Registered()
 
 
 def run(arguments: list[str]) -> int:
@@ -19,10 +28,11 @@ def run(arguments: list[str]) -> int:
 
 def register() -> None:
     """Register the command in Blender."""
-    HANDLES.append(bpy.utils.register_cli_command(NAME, run))
+    COMMAND.handle = bpy.utils.register_cli_command(NAME, run)
 
 
 def unregister() -> None:
     """Undo `register`."""
-    while HANDLES:
-        bpy.utils.unregister_cli_command(HANDLES.pop())
+    if COMMAND.handle is not None:
+        bpy.utils.unregister_cli_command(COMMAND.handle)
+        COMMAND.handle = None

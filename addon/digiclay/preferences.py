@@ -6,9 +6,11 @@ from typing import Any
 
 from .compat import RELATIVE_PATH, bpy
 from .device import palettes
-from .overlay.placement import CORNERS
 from .settings import own_folder
 from .settings.declared import title
+
+#: Corners of a 3D view for the overlay.
+CORNERS = ("top_left", "top_right", "bottom_left", "bottom_right")
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Choices:
     take_press_tool : bool
         Whether the start of a session takes the Press tool in hand.
     overlay_corner : str
-        A key of `overlay.placement.CORNERS`.
+        One of `CORNERS`.
     run_own_methods : bool
         Whether the Python files of the folder are run, when Blender starts and after a change.
     methods_folder : str

@@ -8,7 +8,7 @@ from . import command_line, manual_map, operators, panels, preferences, translat
 from .device import detail, unit
 from .exchange import image_reader
 from .live import handlers
-from .press import brush_presets, tool
+from .press import brush, tool
 from .settings import properties
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
@@ -16,7 +16,7 @@ MODULES: tuple[ModuleType, ...] = (
     properties,
     image_reader,
     preferences,
-    brush_presets,
+    brush,
     operators,
     panels,
     tool,

@@ -14,13 +14,14 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import Mode
 from digiclay.core.session.accuracy import Errors
 from digiclay.device import palettes, view
-from digiclay.live import bed_state, running, sculpting
+from digiclay.live import bed_state
 from digiclay.operators.display import pick_pins
 from digiclay.overlay import views
 from digiclay.overlay.picture import choose_colors
-from digiclay.overlay.placement import lay_out
+from digiclay.overlay.sections import lay_out
 from digiclay.panels import display
 from digiclay.panels.live_session import error_line
+from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -10,9 +10,10 @@ import bpy
 import pytest
 from digiclay import operators
 from digiclay.device import view
-from digiclay.live import handlers, running, tick
-from digiclay.live.stroke_queue import queue_stroke
+from digiclay.live import handlers, tick
 from digiclay.press import tool
+from digiclay.sessions import running
+from digiclay.sessions.stroke_queue import queue_stroke
 
 from tests.blender.at_hand import select
 from tests.blender.session.live import Clock

@@ -58,9 +58,9 @@ def test_the_extension_registers_unregisters_and_registers_again_without_a_trace
 
 def test_the_command_of_blender_s_command_line_is_taken_back() -> None:
     digiclay.register()
-    (handle,) = command_line.HANDLES
+    handle = command_line.COMMAND.handle
     digiclay.unregister()
-    assert command_line.HANDLES == []
+    assert command_line.COMMAND.handle is None
     with pytest.raises(ValueError, match="already been removed"):
         bpy.utils.unregister_cli_command(handle)
 

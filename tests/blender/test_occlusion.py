@@ -8,11 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from digiclay import bridge
 from digiclay.bridge import SCALE
 from digiclay.device import view
-from digiclay.live import running
 from digiclay.press import aim
 from digiclay.roles import ROLE
+from digiclay.sessions import running
 from mathutils import Vector
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
@@ -50,7 +51,7 @@ def bed() -> Any:
 def points_at(context: Any, place: np.ndarray) -> bool:
     """Return whether the pixel of a place of the bed points at the bed."""
     context.view_layer.update()
-    (xy,) = aim.project(context, bed(), place)
+    (xy,) = bridge.project(context, bed(), place)
     return aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
 
 
@@ -161,7 +162,7 @@ def test_in_front_of_all_others_a_bed_is_seen_and_so_is_an_object(context: Any) 
 def test_a_clipping_region_takes_away_what_is_outside_it(context: Any) -> None:
     looking = context.region_data
     cover(context)
-    (xy,) = aim.project(context, bed(), BARE)
+    (xy,) = bridge.project(context, bed(), BARE)
     x, y = int(xy[0]), int(xy[1])
     bpy.ops.view3d.clip_border(xmin=x - 20, xmax=x + 20, ymin=y - 20, ymax=y + 20, wait_for_input=False)
     assert looking.use_clip_planes

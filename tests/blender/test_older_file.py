@@ -14,8 +14,9 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.exchange import formed_bed
-from digiclay.live import bed_state, running, tick
+from digiclay.live import bed_state, tick
 from digiclay.recorded import takes
+from digiclay.sessions import running
 from digiclay.settings import properties
 
 from tests.blender.session.live import FLOAT32, Clock, exact, press, shown

@@ -12,7 +12,8 @@ from digiclay import preferences, translations
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.methods import METHODS, list_added
 from digiclay.core.scene.toml_table import format_scene
-from digiclay.live import running, tick
+from digiclay.live import tick
+from digiclay.sessions import running
 from digiclay.settings import own_folder, properties
 
 from tests.blender.session.live import Clock, exact, move, press

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.device import view
-from digiclay.live import bed_state, running
+from digiclay.live import bed_state
+from digiclay.sessions import running
 
 pytestmark = pytest.mark.usefixtures("extension")
 PRESS = "[[stroke]]\ndepth = 0.003\nwidth = 0.012\nmoves = [[0, -0.006, 0], [0.2, 0.006, 0]]\n"

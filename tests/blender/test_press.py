@@ -14,10 +14,10 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import make_grid
 from digiclay.device import view
-from digiclay.live.stroke import Brush
 from digiclay.press import aim, brush, tool
 from digiclay.press.drape import drape
 from digiclay.settings import properties
+from digiclay.strokes.stroke import Brush
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
 LARGER = 8.0
@@ -79,7 +79,7 @@ def test_the_tool_comes_and_goes_with_the_extension() -> None:
 def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, in_the_view: Any) -> None:
     cells, height = aim.read_surface(bed)
     tops = np.column_stack([cells.positions, height])
-    pixels = aim.project(in_the_view, bed, tops)
+    pixels = bridge.project(in_the_view, bed, tops)
     met = [aim.find_target(in_the_view, tuple(xy)) for xy in pixels]
     assert all(found is not None and found.bed == bed for found in met)
     hit = np.array([found.pin for found in met])
@@ -104,13 +104,13 @@ def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, in_th
     world = bed.matrix_world @ Vector(place[0] * bridge.SCALE)
     theirs = location_3d_to_region_2d(in_the_view.region, in_the_view.region_data, world)
     # A thousandth of a pixel: theirs is reckoned in float32.
-    np.testing.assert_allclose(aim.project(in_the_view, bed, place)[0], theirs, rtol=0, atol=1e-2)
+    np.testing.assert_allclose(bridge.project(in_the_view, bed, place)[0], theirs, rtol=0, atol=1e-2)
 
 
 def test_what_lies_behind_the_eye_is_nowhere_on_the_screen(bed: Any, in_the_view: Any) -> None:
     eye = np.array(bed.matrix_world.inverted() @ in_the_view.region_data.view_matrix.inverted().translation)
     behind = 1.5 * eye[None] / bridge.SCALE
-    assert np.isnan(aim.project(in_the_view, bed, behind)).all()
+    assert np.isnan(bridge.project(in_the_view, bed, behind)).all()
 
 
 def test_a_pixel_beside_the_bed_points_at_nothing(bed: Any, in_the_view: Any) -> None:
@@ -122,7 +122,7 @@ def test_an_unevenly_scaled_bed_is_looked_through_and_pressing_it_says_why(
 ) -> None:
     cells, height = aim.read_surface(bed)
     middle = np.array([[0.0, 0.0, float(height.max())]])
-    xy = tuple(aim.project(in_the_view, bed, middle)[0])
+    xy = tuple(bridge.project(in_the_view, bed, middle)[0])
     assert aim.find_target(in_the_view, xy) is not None
     bed.scale.z *= 1.2
     bpy.context.view_layer.update()
@@ -133,7 +133,7 @@ def test_an_unevenly_scaled_bed_is_looked_through_and_pressing_it_says_why(
 
 def test_a_hidden_bed_is_looked_through(bed: Any, in_the_view: Any) -> None:
     _, height = aim.read_surface(bed)
-    xy = tuple(aim.project(in_the_view, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
+    xy = tuple(bridge.project(in_the_view, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
     bed.hide_set(True)
     assert aim.find_target(in_the_view, xy) is None
 

@@ -9,11 +9,11 @@ from typing import Any
 import bpy
 import pytest
 from digiclay.operators.press_presets import BrushMenu
-from digiclay.press import brush, brush_presets
-from digiclay.press.fingers import FINGERS, find_kind
+from digiclay.press import brush
+from digiclay.press.brush import FINGERS, find_kind
 from digiclay.settings import finger_size
 
-SHIPPED = Path(brush_presets.HOME, "presets", brush_presets.SUBFOLDER)
+SHIPPED = Path(brush.HOME, "presets", brush.SUBFOLDER)
 
 
 @pytest.fixture
@@ -31,13 +31,13 @@ def settings(extension: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def apply(name: str) -> None:
     """Apply a preset as its entry in the menu does."""
-    (folder,) = [Path(path) for path in bpy.utils.preset_paths(brush_presets.SUBFOLDER)][-1:]
+    (folder,) = [Path(path) for path in bpy.utils.preset_paths(brush.SUBFOLDER)][-1:]
     file = next(path for path in (SHIPPED / f"{name}.py", folder / f"{name}.py") if path.is_file())
     bpy.ops.digiclay.press_brush(filepath=str(file), menu_idname=BrushMenu.bl_idname)
 
 
 def test_blender_finds_the_presets_that_come_along(settings: Any) -> None:
-    assert str(SHIPPED) in bpy.utils.preset_paths(brush_presets.SUBFOLDER)
+    assert str(SHIPPED) in bpy.utils.preset_paths(brush.SUBFOLDER)
     assert len(list(SHIPPED.glob("*.py"))) == 6
 
 
@@ -47,7 +47,7 @@ def test_each_preset_sets_a_known_finger_and_every_setting(settings: Any, file: 
     apply(file.stem)
     assert find_kind(finger_size.read_finger(bpy.context.object.digiclay)) in FINGERS.values()
     written = {line.split(" = ")[0] for line in file.read_text().splitlines() if " = " in line}
-    assert set(brush_presets.preset_values(settings)) <= written
+    assert set(brush.preset_values(settings)) <= written
 
 
 def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings: Any, tmp_path: Path) -> None:
@@ -55,9 +55,7 @@ def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings: Any, t
     bpy.context.object.digiclay.size = 11.0
     bpy.ops.digiclay.press_brush_save(name="Of my own")
     (saved,) = [
-        file
-        for path in bpy.utils.preset_paths(brush_presets.SUBFOLDER)
-        for file in Path(path).glob("Of_my_own.py")
+        file for path in bpy.utils.preset_paths(brush.SUBFOLDER) for file in Path(path).glob("Of_my_own.py")
     ]
     assert saved.is_relative_to(tmp_path)
     settings.depth, settings.symmetry, settings.path = 2.0, "NONE", "FREE"

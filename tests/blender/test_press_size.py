@@ -11,7 +11,7 @@ from digiclay import bridge
 from digiclay.core.scene.assembly import assemble
 from digiclay.device import view
 from digiclay.operators.press_adjust import AdjustStrength
-from digiclay.press.fingers import FINGERS, find_kind
+from digiclay.press.brush import FINGERS, find_kind
 from digiclay.settings import finger_size, properties
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -12,8 +12,9 @@ from digiclay import bridge
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.scene.scene_source import load
 from digiclay.device import view
-from digiclay.live import bed_state, running, sculpting, tick
+from digiclay.live import bed_state, tick
 from digiclay.recorded import bake, takes
+from digiclay.sessions import running, sculpting
 from numpy.typing import NDArray
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.session import live_session
-from digiclay.live import bed_state, running, sculpting
+from digiclay.live import bed_state
+from digiclay.sessions import running, sculpting
 
 from benchmarks import tick_times
 from benchmarks.__main__ import main

@@ -13,9 +13,10 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.device import view
 from digiclay.exchange import formed_bed
-from digiclay.live import running, tick
+from digiclay.live import tick
 from digiclay.recorded import bake
 from digiclay.roles import BALL, ROLE
+from digiclay.sessions import running
 from digiclay.settings import properties
 
 from tests.blender.at_hand import added, beds, done, housings, looked, redone, select, undone, whole

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 import pytest
-from digiclay.live import running
+from digiclay.sessions import running
 
 from benchmarks import viewport_cost
 from benchmarks.__main__ import main

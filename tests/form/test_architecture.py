@@ -1,4 +1,4 @@
-"""The layout's rules: packages of the core, their imports, file sizes, no hosts, no machine's paths."""
+"""Rules of the layout: packages and their imports, file sizes, no hosts, no machine's paths."""
 
 from __future__ import annotations
 
@@ -35,6 +35,27 @@ ROOMS = {
     "batch": "base model steppers engine control metrics scene session",
     "studies": "base files model engine mesh_io shapes control metrics scene session batch",
 }
+#: Packages and top modules of the extension: each row imports from those above it only.
+LEVELS = (
+    "core ui_text presets",
+    "compat plugins roles",
+    "bridge",
+    "settings",
+    "device",
+    "preferences strokes",
+    "sessions",
+    "recorded overlay",
+    "live",
+    "press exchange",
+    "panels",
+    "operators",
+    "pictures plots farms",
+    "commands",
+    "cli",
+    "command_line manual_map translations __main__",
+    "registration",
+    "__init__",
+)
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}
 MAX_LINES = 500
@@ -83,21 +104,20 @@ def imports(path: Path, *, inside_functions: bool = True) -> Iterator[tuple[int,
             waiting.extend(ast.iter_child_nodes(node))
 
 
-def core_imports(module: str, path: Path, known: set[str]) -> Iterator[tuple[int, str]]:
-    """Yield (line, module of the core) for what a module of the core imports from the package."""
-    package = ["core", *module.split(".")] if module else ["core"]
-    if path.name != "__init__.py":
-        package = package[:-1]
-    for line, target, names in imports(path):
-        dots = len(target) - len(target.lstrip("."))
-        if not dots:
-            continue
-        tail = target[dots:].split(".") if target[dots:] else []
-        base = [*package[: len(package) - dots + 1], *tail] if dots <= len(package) else ["outside"]
-        for name in names:
-            full = ".".join([*base, name])
-            inner = full.removeprefix("core.") if full.removeprefix("core.") in known else None
-            yield line, inner or ".".join(base[1:] if base[:1] == ["core"] else ["outside", *base])
+def package_imports(package: Path) -> dict[str, set[str]]:
+    """Return what each module of a package imports of it, also inside functions."""
+    parts = {path: path.relative_to(package).with_suffix("").parts for path in package.rglob("*.py")}
+    names = {".".join(own).removesuffix(".__init__"): path for path, own in parts.items()}
+    found: dict[str, set[str]] = {}
+    for name, path in names.items():
+        found[name] = set()
+        for _, target, imported in imports(path):
+            dots = len(target) - len(target.lstrip("."))
+            if dots:
+                base = [*parts[path][: len(parts[path]) - dots], *filter(None, target[dots:].split("."))]
+                known = [".".join([*base, one]) for one in imported]
+                found[name] |= {one if one in names else ".".join(base) for one in known} & names.keys()
+    return found
 
 
 def tracked(*patterns: str) -> list[Path]:
@@ -130,12 +150,10 @@ def test_every_module_of_the_core_is_in_a_package_of_the_table() -> None:
 
 
 def test_a_package_of_the_core_imports_from_those_above_it_that_its_row_names() -> None:
-    modules = core_modules()
     found: dict[str, set[str]] = {name: set() for name in ROOMS}
-    for module, path in modules.items():
-        own = module.split(".")[0]
-        for _, target in core_imports(module, path, set(modules)):
-            found[own or "core"].add(target.split(".")[0])
+    for module, targets in package_imports(CORE).items():
+        if module != "__init__":
+            found[module.split(".")[0]] |= {target.split(".")[0] for target in targets}
     above: list[str] = []
     for name, row in ROOMS.items():
         assert found[name] - {name} == set(row.split()), f"core/{name} has another row"
@@ -143,25 +161,19 @@ def test_a_package_of_the_core_imports_from_those_above_it_that_its_row_names() 
         above.append(name)
 
 
+def test_packages_of_the_extension_import_from_those_above_their_row_of_the_table() -> None:
+    level = {name: number for number, row in enumerate(LEVELS) for name in row.split()}
+    found = package_imports(PACKAGE)
+    assert {module.split(".")[0] for module in found} == set(level)
+    pairs = [(module, target) for module, targets in found.items() for target in targets]
+    tops = {pair: [name.split(".")[0] for name in pair] for pair in pairs}
+    upward = [pair for pair, (own, other) in tops.items() if own != other and level[own] <= level[other]]
+    assert upward == []
+
+
 def test_no_module_has_the_name_of_its_package() -> None:
     names = [name.split(".") for name in core_modules() if "." in name]
     assert [name for name in names if name[-1] in name[:-1]] == []
-
-
-def package_imports(package: Path) -> dict[str, set[str]]:
-    """Return what each module of a package imports of it, also inside functions."""
-    parts = {path: path.relative_to(package).with_suffix("").parts for path in package.rglob("*.py")}
-    names = {".".join(own).removesuffix(".__init__"): path for path, own in parts.items()}
-    found: dict[str, set[str]] = {}
-    for name, path in names.items():
-        found[name] = set()
-        for _, target, imported in imports(path):
-            dots = len(target) - len(target.lstrip("."))
-            if dots:
-                base = [*parts[path][: len(parts[path]) - dots], *filter(None, target[dots:].split("."))]
-                known = [".".join([*base, one]) for one in imported]
-                found[name] |= {one if one in names else ".".join(base) for one in known} & names.keys()
-    return found
 
 
 def find_circle(package: Path) -> list[str]:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from digiclay.core.session import live_session
 from digiclay.core.session.take import replay
-from digiclay.live import sculpting
-from digiclay.live.running import Running
-from digiclay.live.stroke import Brush
-from digiclay.live.sweep import LIMIT, measure_excess_heights
 from digiclay.recorded.takes import read_recording
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.strokes.stroke import Brush
+from digiclay.strokes.sweep import LIMIT, measure_excess_heights
 from numpy.typing import NDArray
 
 from tests.hand import heights

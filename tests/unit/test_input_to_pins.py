@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.session import live_session, snapshot
-from digiclay.live import sculpting
-from digiclay.live.running import Running
-from digiclay.live.stroke import draw
-from digiclay.live.stroke_queue import change_stroke, queue_stroke
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.strokes.stroke import draw
 
 from tests.hand import TICK, Hand, heights, pose, started
 

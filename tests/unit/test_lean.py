@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip, make_matrices
-from digiclay.live import sculpting
-from digiclay.live.stroke import SYMMETRIES, draw, start
-from digiclay.live.stroke_motion import TURN, follow, lean_finger, mirror_turn, turn_toward
-from digiclay.live.stroke_queue import drop_strokes, find_stroke, queue_stroke
+from digiclay.sessions import sculpting
+from digiclay.sessions.stroke_queue import drop_strokes, find_stroke, queue_stroke
+from digiclay.strokes.motion import TURN, follow, lean_finger, mirror_turn, turn_toward
+from digiclay.strokes.stroke import SYMMETRIES, draw, start
 
 from tests.hand import TICK, started
 from tests.unit.test_stroke import AT, CELLS, HEIGHT, PERIOD, path, pressed

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.session import live_session
-from digiclay.live import sculpting
-from digiclay.live.running import Running
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
 from numpy.typing import NDArray
 
 from tests.hand import TICK

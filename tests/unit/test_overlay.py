@@ -18,8 +18,7 @@ from digiclay.overlay.picture import (
     round_axis,
     scale_curve,
 )
-from digiclay.overlay.placement import COMPACT, CORNERS, FULL, Content, find_room, lay_out
-from digiclay.overlay.sections import Readings
+from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Content, Readings, find_room, lay_out
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -153,7 +152,7 @@ def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
     assert lay_out(session(), colors, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
 
 
-@pytest.mark.parametrize("corner", CORNERS)
+@pytest.mark.parametrize("corner", ["bottom_left", "bottom_right", *TAKEN])
 @pytest.mark.parametrize("content", [COMPACT, FULL])
 def test_it_stands_in_the_corner_that_was_chosen(corner: str, content: Content) -> None:
     picture = lay_out(session(), choose_colors(DARK, LIGHT), ROOM, 1.0, content, corner)
@@ -161,7 +160,7 @@ def test_it_stands_in_the_corner_that_was_chosen(corner: str, content: Content) 
     gap = box.x - left if corner.endswith("left") else right - box.x - box.width
     assert gap == 12.0
     gap = top - box.y - box.height if corner.startswith("top") else box.y - bottom
-    assert gap == 12.0 + CORNERS[corner]
+    assert gap == 12.0 + TAKEN.get(corner, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.press.pen import CURVE_ITEMS, FULL_TILT, find_lean, find_share
+from digiclay.press.pointer import CURVE_ITEMS, FULL_TILT, find_lean, find_share
 
 CURVES = [item[0] for item in CURVE_ITEMS]
 

@@ -17,11 +17,11 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import live_session
 from digiclay.core.session.run_scene import run
-from digiclay.live import gestures, sculpting
-from digiclay.live.running import Running
-from digiclay.live.stroke import DEEPEST, Brush, start
-from digiclay.live.tracking import find_tracking
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
 from digiclay.settings.devices import BEDS, make_scene
+from digiclay.strokes.stroke import DEEPEST, Brush, start
+from digiclay.strokes.tracking import find_tracking
 from numpy.typing import NDArray
 
 from tests.hand import TICK, heights
@@ -185,7 +185,7 @@ def test_a_raise_taken_back_in_its_middle_leaves_the_bed_as_before() -> None:
         now += TICK
         session = sculpting.advance(session, session.pose, now, 100)
     assert relief(session).max() > 5.0
-    np.testing.assert_array_equal(heights(gestures.withdraw_stroke(session)), before)
+    np.testing.assert_array_equal(heights(sculpting.withdraw_stroke(session)), before)
 
 
 @pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "push_pull", "force_display"])

@@ -11,11 +11,11 @@ from digiclay.core.base.errors import ParameterError, SceneError, StateError
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.toml_table import resolve
-from digiclay.live.recorded_strokes import PointerStroke, play_strokes, read_strokes
-from digiclay.live.running import Running
-from digiclay.live.sculpting import begin_session
-from digiclay.live.stroke import Brush
+from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
+from digiclay.sessions.running import Running
+from digiclay.sessions.sculpting import begin_session
 from digiclay.settings.devices import BEDS, FIRST, make_scene
+from digiclay.strokes.stroke import Brush
 
 from benchmarks.made import RELIEFS, STROKES, find_relief, make
 from tests.hand import heights

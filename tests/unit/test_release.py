@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from digiclay.press.release import begin_button, read_event
+from digiclay.press.pointer import begin_button, read_event
 
 DOWN, UP = ("LEFTMOUSE", "PRESS"), ("LEFTMOUSE", "RELEASE")
 KEY, KEY_UP = ("Z", "PRESS"), ("Z", "RELEASE")

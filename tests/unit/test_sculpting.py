@@ -10,7 +10,7 @@ import pytest
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import live_session, snapshot
-from digiclay.live import gestures, running, sculpting
+from digiclay.sessions import running, sculpting
 
 from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
 
@@ -64,17 +64,17 @@ def test_rewinding_takes_back_one_gesture_after_the_other() -> None:
     twice = hand.press(once, 9.0)
     assert len(twice.gestures) == 2
     assert np.abs(heights(twice) - first).max() > 1e-3
-    back = gestures.rewind(twice)
+    back = sculpting.rewind(twice)
     np.testing.assert_allclose(heights(back), first, rtol=0, atol=1e-5)  # pins were still coming to rest
-    back = gestures.rewind(back)
+    back = sculpting.rewind(back)
     assert np.array_equal(heights(back), rest)
-    assert gestures.rewind(back) is back
+    assert sculpting.rewind(back) is back
 
 
 def test_rewinding_puts_the_finger_where_the_gesture_began() -> None:
     hand = Hand()
     session = hand.press(hand.press(started(), -9.0), 9.0)
-    assert gestures.rewind(session).pose[2] > 40e-3
+    assert sculpting.rewind(session).pose[2] > 40e-3
 
 
 def test_a_finger_that_moves_on_after_a_rest_makes_another_gesture() -> None:
@@ -95,7 +95,7 @@ def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_fi
     first = heights(session)
     session = hand.move(session, [(x, 38.0) for x in np.linspace(0, 5, 10)])
     assert len(session.gestures) == 2
-    back = gestures.rewind(session)
+    back = sculpting.rewind(session)
     # Put there by 32 bits, the finger is read a little beside; and stands on the pins as it stood.
     back = hand.move(back, [(1e3 * off, 38.0)] * 3)
     assert len(back.gestures) == 1
@@ -103,7 +103,7 @@ def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_fi
     np.testing.assert_allclose(heights(back), first, rtol=0, atol=5e-5)
     again = hand.move(back, [(x, 38.0) for x in np.linspace(1, 5, 10)])
     assert len(again.gestures) == 2
-    back = gestures.rewind(gestures.rewind(again))
+    back = sculpting.rewind(sculpting.rewind(again))
     assert (heights(back) == 40e-3).all()
 
 
@@ -116,7 +116,7 @@ def test_gestures_kept_do_not_grow_in_number() -> None:
 
 def test_a_gesture_goes_on_after_rewinding_it() -> None:
     hand = Hand()
-    session = gestures.rewind(hand.press(started()))
+    session = sculpting.rewind(hand.press(started()))
     session = hand.press(session)
     assert len(session.gestures) == 1
 
@@ -125,10 +125,10 @@ def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
     hand = Hand()
     session = hand.press(started())
     formed = heights(session)
-    back = gestures.reset(session)
+    back = sculpting.reset(session)
     assert (heights(back) == 40e-3).all()
     assert back.state.period == 0
-    assert np.array_equal(heights(gestures.rewind(back)), formed)
+    assert np.array_equal(heights(sculpting.rewind(back)), formed)
 
 
 def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:

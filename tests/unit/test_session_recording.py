@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from digiclay.core.session import live_session, snapshot
 from digiclay.core.session.live_session import simulate_path
-from digiclay.live import gestures, sculpting
+from digiclay.sessions import sculpting
 
 from tests.hand import Hand, started
 
@@ -65,7 +65,7 @@ def test_a_long_recording_copies_itself_seldom() -> None:
 def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
     hand = Hand()
     session = hand.press(sculpting.set_recording(started(), True), -6.0)
-    session = hand.press(gestures.rewind(hand.press(session)), 6.0)
+    session = hand.press(sculpting.rewind(hand.press(session)), 6.0)
     keep = session.recording
     assert keep is not None
     *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
@@ -77,15 +77,15 @@ def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:
     session = hand.press(started())
     (gesture,) = session.gestures
     session = hand.press(sculpting.set_recording(session, True), 6.0)
-    assert gestures.restore_gesture(session, gesture).recording is None
+    assert sculpting.restore_gesture(session, gesture).recording is None
 
 
 def test_a_recording_ends_with_a_reset_that_is_rewound() -> None:
     # Periods are counted anew from a reset on: those before it are not the recording's.
     hand = Hand()
-    session = sculpting.set_recording(gestures.reset(hand.press(started())), True)
+    session = sculpting.set_recording(sculpting.reset(hand.press(started())), True)
     session = hand.press(hand.press(session), 6.0)
     for _ in range(3):
-        session = gestures.rewind(session)
+        session = sculpting.rewind(session)
     assert session.state.period > 0
     assert session.recording is None

@@ -9,8 +9,8 @@ import pytest
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Grid, Layout, make_grid
-from digiclay.live.stroke import Brush, Stroke, draw, start
-from digiclay.live.sweep import LIMIT, find_spike, measure_excess_heights
+from digiclay.strokes.stroke import Brush, Stroke, draw, start
+from digiclay.strokes.sweep import LIMIT, find_spike, measure_excess_heights
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

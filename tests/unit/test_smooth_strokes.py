@@ -11,12 +11,12 @@ from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout
 from digiclay.core.session import live_session, snapshot
 from digiclay.core.session.live_session import simulate_path
-from digiclay.live import gestures, sculpting
-from digiclay.live.running import Running
-from digiclay.live.stroke import SYMMETRIES, Brush, draw, lay_line, lay_path, lay_ring
-from digiclay.live.stroke_queue import change_stroke, queue_stroke
-from digiclay.live.sweep import find_radius
 from digiclay.recorded.takes import read_recording
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.strokes.stroke import SYMMETRIES, Brush, draw, lay_line, lay_path, lay_ring
+from digiclay.strokes.sweep import find_radius
 from numpy.typing import NDArray
 
 from tests.assemble import replayed
@@ -126,9 +126,9 @@ def test_a_smooth_stroke_is_one_gesture_that_is_taken_back_alone() -> None:
     once = heights(session)
     session, _ = finish(queue_smooth(session, (12.0, -6.0), (12.0, 6.0)))
     assert (session.finished_strokes, len(session.gestures)) == (2, 2)
-    back = gestures.rewind(session)
+    back = sculpting.rewind(session)
     np.testing.assert_array_equal(heights(back), once)
-    np.testing.assert_array_equal(heights(gestures.rewind(back)), before)
+    np.testing.assert_array_equal(heights(sculpting.rewind(back)), before)
 
 
 def test_strokes_that_press_and_smooth_are_queued_behind_each_other() -> None:
@@ -149,7 +149,7 @@ def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before() -> None:
     before = heights(session)
     session = go_on(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)), 15)
     assert height_at(session, 0.0, 0.0) < SPIKE - 1e-3
-    back = gestures.withdraw_stroke(session)
+    back = sculpting.withdraw_stroke(session)
     np.testing.assert_array_equal(heights(back), before)
     # No order is left behind.
     np.testing.assert_array_equal(heights(go_on(back, 10)), before)
@@ -168,7 +168,7 @@ def test_undo_shortens_the_orders_of_a_recording_with_its_path() -> None:
     session = sculpting.set_recording(spiked((0.0, 0.0), (-12.0, 0.0)), True)
     once, _ = finish(queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0)))
     twice, _ = finish(queue_smooth(once, (-3.0, 0.0), (3.0, 0.0)))
-    back, _ = finish(queue_smooth(gestures.rewind(twice), (0.0, -3.0), (0.0, 3.0)))
+    back, _ = finish(queue_smooth(sculpting.rewind(twice), (0.0, -3.0), (0.0, 3.0)))
     keep = back.recording
     assert keep is not None
     start = snapshot.load(back.system, keep.start)

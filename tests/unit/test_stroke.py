@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.live.stroke import DEEPEST, SYMMETRIES, Stroke, deepen, draw, start
-from digiclay.live.stroke_motion import APPROACH, DRAG, SPEED, follow
+from digiclay.strokes.motion import APPROACH, DRAG, SPEED, follow
+from digiclay.strokes.stroke import DEEPEST, SYMMETRIES, Stroke, deepen, draw, start
 from numpy.typing import NDArray
 
 CELLS = make_grid(Layout(rows=20, columns=20))

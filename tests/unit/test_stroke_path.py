@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.live.stroke import EVEN_SPEED, lay_line, lay_path, lay_ring, pull, start
+from digiclay.strokes.stroke import EVEN_SPEED, lay_line, lay_path, lay_ring, pull, start
 
 
 def test_a_place_stays_while_the_mouse_is_within_the_string() -> None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.session import live_session
-from digiclay.live import gestures, sculpting
-from digiclay.live.running import Running
-from digiclay.live.stroke import SYMMETRIES, draw
-from digiclay.live.stroke_queue import change_stroke, find_stroke, last_place, queue_stroke
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.sessions.stroke_queue import change_stroke, find_stroke, last_place, queue_stroke
+from digiclay.strokes.stroke import SYMMETRIES, draw
 
 from tests.hand import TICK, heights, started
 
@@ -93,7 +93,7 @@ def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the
         now += TICK
         session = sculpting.advance(session, session.pose, now, 100)
     assert np.abs(heights(session) - before).max() > 1e-4
-    back = gestures.withdraw_stroke(session)
+    back = sculpting.withdraw_stroke(session)
     np.testing.assert_array_equal(heights(back), before)
     assert (back.strokes, len(back.gestures)) == ((), touched)
 
@@ -101,7 +101,7 @@ def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the
 def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
     session = tap(tap(started(), -15.0, 0.0), 15.0, 0.0)
     number = session.strokes[-1].number
-    back = gestures.rewind(session)
+    back = sculpting.rewind(session)
     assert find_stroke(back, number) is None
     done = finish(back)
     assert depth_at(done, -15.0, 0.0) > FORMED
@@ -109,7 +109,7 @@ def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
 
 
 def test_a_reset_forgets_what_the_finger_has_not_finished() -> None:
-    assert gestures.reset(tap(started(), 0.0, 0.0)).strokes == ()
+    assert sculpting.reset(tap(started(), 0.0, 0.0)).strokes == ()
 
 
 def test_a_symmetric_stroke_forms_all_its_images_as_one_gesture() -> None:

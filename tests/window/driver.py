@@ -198,7 +198,7 @@ def rounds(count: int = 3) -> Iterator[float | None]:
 
 def settle(ticks: int = 3) -> Iterator[float | None]:
     """Wait until the sessions have ticked some times, and so taken up whatever has happened."""
-    running = part("live.running")
+    running = part("sessions.running")
     start = max((session.tick for session in running.list_sessions()), default=0)
     for _ in range(100):
         yield 0.1
@@ -211,7 +211,7 @@ def settle(ticks: int = 3) -> Iterator[float | None]:
 def look(name: str) -> None:
     """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
     evaluate()
-    bridge, running = part("bridge"), part("live.running")
+    bridge, running = part("bridge"), part("sessions.running")
     found: dict[str, Any] = {"beds": len(beds()), "said": running.last_message()}
     found["sessions"] = len(running.list_sessions())
     for bed in beds()[:1]:

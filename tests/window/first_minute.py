@@ -64,7 +64,7 @@ def open_tab(blender: Any) -> Iterator[float | None]:
 def start(blender: Any) -> Iterator[float | None]:
     """Press the panel's first button."""
     yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
-    blender.SEEN["started"] = len(blender.part("live.running").list_sessions())
+    blender.SEEN["started"] = len(blender.part("sessions.running").list_sessions())
     blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
 
 
@@ -82,7 +82,7 @@ def draw(blender: Any) -> Iterator[float | None]:
 def stop(blender: Any) -> Iterator[float | None]:
     """End the session."""
     yield from done(blender, "key Escape")
-    blender.SEEN["left"] = len(blender.part("live.running").list_sessions())
+    blender.SEEN["left"] = len(blender.part("sessions.running").list_sessions())
 
 
 #: Steps of the guide's first page: the first sentence of each, and what a hand does.
@@ -103,8 +103,8 @@ def waiting() -> float:
 
 def along(blender: Any) -> float:
     """Return where the finger is along its line, mm; before the line where it begins."""
-    (session,) = blender.part("live.running").list_sessions()
-    dragging = blender.part("live.stroke").DRAGGING
+    (session,) = blender.part("sessions.running").list_sessions()
+    dragging = blender.part("strokes.stroke").DRAGGING
     on_the_way = session.strokes and session.strokes[0].phase == dragging
     return 1e3 * float(session.pose[0]) if on_the_way else -HALF
 

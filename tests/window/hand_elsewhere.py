@@ -54,7 +54,7 @@ def script(blender: Any) -> Iterator[float | None]:
 
 def held_stroke(blender: Any) -> Any:
     """Return the stroke that the hand draws."""
-    (session,) = blender.part("live.running").list_sessions()
+    (session,) = blender.part("sessions.running").list_sessions()
     return session.strokes[-1] if session.strokes and session.strokes[-1].held else None
 
 

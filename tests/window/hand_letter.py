@@ -28,7 +28,7 @@ def draw(blender: Any, stroke: Any) -> str:
 
 def script(blender: Any) -> Iterator[float | None]:
     """Draw stroke by stroke, with the brush of each."""
-    recorded = blender.part("live.recorded_strokes").read_strokes(FILE)
+    recorded = blender.part("recorded.pointer_strokes").read_strokes(FILE)
     add_bed(blender, bed=recorded.bed)
     blender.call(bpy.ops.view3d.view_axis, type="TOP")
     take_tool(blender)

@@ -31,7 +31,7 @@ SPIKE, SPIKES = 12e-3, ((0.0, 0.0), (0.0, 18.0))
 
 def find_session(blender: Any) -> Any:
     """Return the session of the bed."""
-    return blender.part("live.running").find(blender.beds()[0])
+    return blender.part("sessions.running").find(blender.beds()[0])
 
 
 def put_spikes(blender: Any) -> None:
@@ -46,7 +46,7 @@ def put_spikes(blender: Any) -> None:
     kept = blender.part("core.session.snapshot").dump(system, state._replace(peak=float(state.rows[0].max())))
     pose = session.pose.copy()
     pose[2] = 0.08
-    back = blender.part("live.sculpting").restore(session, kept, pose)
+    back = blender.part("sessions.sculpting").restore(session, kept, pose)
     blender.part("live.tick").show(blender.beds()[0], back)
     blender.part("live.tick").place_finger(bpy.context, blender.beds()[0], back)
     blender.call(bpy.ops.ed.undo_push, message="Spikes")

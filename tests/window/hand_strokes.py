@@ -51,7 +51,7 @@ def done(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | Non
 
 def finish(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
     """Wait until the hand is done, and then until the finger is, and the pins have come to rest."""
-    running = blender.part("live.running")
+    running = blender.part("sessions.running")
     yield from done(blender, process)
     yield from blender.until(lambda: not any(session.strokes for session in running.list_sessions()))
     yield from blender.settle(10)
@@ -61,7 +61,7 @@ def note(blender: Any, name: str) -> None:
     """Write down the heights, how many strokes the finger has finished, and how the view is turned."""
     blender.look(name)
     bed = blender.beds()[0]
-    session = blender.part("live.running").find(bed)
+    session = blender.part("sessions.running").find(bed)
     area, _ = blender.view()
     height = blender.part("bridge").read_cells(bed.data)["height"].reshape(bed.digiclay.layout.rows, -1)
     blender.SEEN[name] |= {
@@ -138,7 +138,7 @@ def script(blender: Any) -> Iterator[float | None]:
 
 def message(blender: Any) -> Iterator[float | None]:
     """Draw a stroke after another one, with no key between them, while Blender shows a message."""
-    tip, running = blender.fingertip(), blender.part("live.running")
+    tip, running = blender.fingertip(), blender.part("sessions.running")
     size = tip.scale.copy()
     for scale, waits in ((0.0 * size, True), (size, False)):
         tip.scale = scale
@@ -189,7 +189,7 @@ def navigation(blender: Any) -> Iterator[float | None]:
 
 def pie_menu(blender: Any) -> Iterator[float | None]:
     """Pan in the middle of a stroke; then open the pie menu of the shading, and let go over Solid."""
-    running = blender.part("live.running")
+    running = blender.part("sessions.running")
     start, end = ends(blender)
     middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
     area, _ = blender.view()
@@ -215,7 +215,7 @@ def pie_menu(blender: Any) -> Iterator[float | None]:
 
 def taken_back(blender: Any) -> Iterator[float | None]:
     """Take a stroke back that the finger has not finished, by Ctrl-Z and by Esc."""
-    running = blender.part("live.running")
+    running = blender.part("sessions.running")
     for name, key in (("undone", "ctrl+z"), ("escaped", "Escape")):
         start, end = ends(blender)
         process = hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "sleep 2")

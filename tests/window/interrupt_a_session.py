@@ -34,16 +34,16 @@ def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
     for kind, value, x in ((*move, -15), (press, "PRESS", -15), *way, (press, "RELEASE", -15)):
         blender.event(kind, value, blender.on_the_bed(x, -25.0))  # beside the sidebar
         yield 0.05
-    (session,) = blender.part("live.running").list_sessions()
-    yield from blender.until(lambda: blender.part("live.running").list_sessions()[0].tick > session.tick)
+    (session,) = blender.part("sessions.running").list_sessions()
+    yield from blender.until(lambda: blender.part("sessions.running").list_sessions()[0].tick > session.tick)
     blender.key("TAB", blender.middle())
     yield from blender.settle()
-    strokes = [len(session.strokes) for session in blender.part("live.running").list_sessions()]
+    strokes = [len(session.strokes) for session in blender.part("sessions.running").list_sessions()]
     blender.look("edited")
     blender.shot("session_edited")
     blender.key("ESC", blender.middle())
     yield from blender.settle()
-    left = [len(session.strokes) for session in blender.part("live.running").list_sessions()]
+    left = [len(session.strokes) for session in blender.part("sessions.running").list_sessions()]
     blender.SEEN["strokes"] = [strokes, left]
     blender.key("TAB", blender.middle())
     yield from blender.settle()
@@ -85,7 +85,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.settle()
     blender.look("in another scene")
     blender.SEEN["in another scene"]["waits"] = (
-        blender.part("live.running").list_sessions()[0].blocking_reason
+        blender.part("sessions.running").list_sessions()[0].blocking_reason
     )
     blender.window().scene = scene
     yield from blender.settle()
@@ -115,7 +115,7 @@ def script(blender: Any) -> Iterator[float | None]:
     bpy.ops.ed.undo_push(message="Before")
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.key("DEL", blender.middle())
-    yield from blender.until(lambda: not blender.part("live.running").list_sessions())
+    yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
     blender.look("all deleted")
     blender.key("Z", blender.middle(), ctrl=True)
     yield 1.0

@@ -48,7 +48,7 @@ def script(blender: Any) -> Iterator[float | None]:
         yield from ridge(blender)
         yield from saved(blender, earlier)
         blender.key("ESC", blender.middle())
-        yield from blender.until(lambda: not blender.part("live.running").list_sessions())
+        yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
         yield 1.0
         note(blender, "stopped")
         yield from blender.open_sidebar("Look at Takes")

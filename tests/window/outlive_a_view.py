@@ -72,10 +72,10 @@ def escape(blender: Any) -> Iterator[float | None]:
         at = area.x + area.width // 2, area.y + area.height // 2
         blender.event("MOUSEMOVE", "NOTHING", at)
         yield from blender.until(loop.is_aside)
-        before = modal(), len(blender.part("live.running").list_sessions())
+        before = modal(), len(blender.part("sessions.running").list_sessions())
         blender.key("ESC", at)
         yield 0.5
-        after = len(blender.part("live.running").list_sessions())
+        after = len(blender.part("sessions.running").list_sessions())
         yield session_loop.MOMENT
         blender.SEEN[f"Esc over {name}"] = [*before, after, modal(), loop.token()]
     session_loop.EVERY, session_loop.MOMENT = usual
@@ -86,7 +86,7 @@ def counted(blender: Any, name: str) -> None:
     view, scene = blender.part("device.view"), blender.window().scene
     tips = [view.fingertip_of(bed) for bed in blender.beds()]
     hidden = sum(thing.hide_get() for thing in scene.objects)
-    sessions = len(blender.part("live.running").list_sessions())
+    sessions = len(blender.part("sessions.running").list_sessions())
     blender.SEEN[name] = [
         len(tips),
         sum(tip is not None for tip in tips),
@@ -98,7 +98,7 @@ def counted(blender: Any, name: str) -> None:
 
 def looked(blender: Any, name: str) -> Iterator[float | None]:
     """Wait until Blender has done what was asked for and it was looked at; count."""
-    watch, tick = blender.part("device.unit"), blender.part("live.running").list_sessions
+    watch, tick = blender.part("device.unit"), blender.part("sessions.running").list_sessions
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
     if tick():

@@ -114,7 +114,7 @@ def windows(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.digiclay.take_record)
     yield from blender.settle()
     yield from closed(
-        blender, "its own window closed", lambda: not blender.part("live.running").list_sessions()
+        blender, "its own window closed", lambda: not blender.part("sessions.running").list_sessions()
     )
     kept = blender.part("recorded.takes").list_takes
     blender.SEEN["kept when its window was closed"] = [entry.name for entry in kept(blender.beds()[0])]
@@ -152,7 +152,8 @@ def render(blender: Any) -> Iterator[float | None]:
 
     def rendered() -> bool:
         waits.extend(
-            {session.blocking_reason for session in blender.part("live.running").list_sessions()} - set(waits)
+            {session.blocking_reason for session in blender.part("sessions.running").list_sessions()}
+            - set(waits)
         )
         return not bpy.app.is_job_running("RENDER")
 

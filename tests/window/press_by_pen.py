@@ -34,7 +34,7 @@ def draw(blender: Any, row: float, pressure: float, right: float, near: float) -
 
 def pressed(blender: Any, since: int) -> dict[str, Any]:
     """Return how low the finger came in a recording since a period, mm, and its turns there, w first."""
-    (session,) = blender.part("live.running").list_sessions()
+    (session,) = blender.part("sessions.running").list_sessions()
     poses = session.path[since:, 0]
     low = poses[:, 2].min()
     return {"lowest": 1e3 * float(low), "inside": poses[poses[:, 2] < low + 1e-5, 3:].tolist()}
@@ -50,10 +50,10 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.settle()
     blender.call(bpy.ops.digiclay.take_record)
     for name, stroke in STROKES.items():
-        (session,) = blender.part("live.running").list_sessions()
+        (session,) = blender.part("sessions.running").list_sessions()
         since = len(session.path)
         yield from finish(blender, draw(blender, *stroke))
         note(blender, name)
-        (session,) = blender.part("live.running").list_sessions()
+        (session,) = blender.part("sessions.running").list_sessions()
         blender.SEEN[name] |= {"outside": session.pose[3:].tolist(), **pressed(blender, since)}
     blender.shot("pen")

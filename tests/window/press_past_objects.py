@@ -43,7 +43,7 @@ def try_both(blender: Any, name: str) -> Iterator[float | None]:
     seen = {}
     for what, place in (("covered", COVERED), ("bare", BARE)):
         yield from finish(blender, hand(to(on_the_screen(blender, *place), 0.3), "click 1 sleep 0.3"))
-        sessions = blender.part("live.running").list_sessions()
+        sessions = blender.part("sessions.running").list_sessions()
         seen[what] = sum(session.finished_strokes for session in sessions)
         seen[f"{what} selected"] = [thing.name for thing in blender.window().view_layer.objects.selected]
     blender.SEEN[name] = seen
@@ -118,7 +118,7 @@ def quarters(blender: Any) -> Iterator[float | None]:
             bed = blender.beds()[0]
             for what, place in (("covered", COVERED), ("bare", BARE)):
                 point = 1e-3 * np.array([[*place, 40.0]])
-                (xy,) = aim.project(context, bed, point)
+                (xy,) = blender.part("bridge").project(context, bed, point)
                 hit = aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
                 found.setdefault(f"{kind} {what}", []).append(hit)
     blender.SEEN["quarters"] = found | {"count": len(regions)}

@@ -57,7 +57,7 @@ def write_down(blender: Any, name: str) -> None:
     """Note the sizes, in mm, and the sessions."""
     note(blender, name)
     bed, tip = blender.beds()[0], blender.fingertip()
-    session = blender.part("live.running").find(bed)
+    session = blender.part("sessions.running").find(bed)
     blender.SEEN[name] |= {
         "size": bed.digiclay.size,
         "drawn size": 2e3 * blender.part("bridge").finger_of(tip).width,

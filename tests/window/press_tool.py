@@ -37,7 +37,9 @@ def come(blender: Any) -> Iterator[float | None]:
     for _ in range(480):
         yield 0.25
         now = tuple(blender.fingertip().location)
-        moment = max((session.tick for session in blender.part("live.running").list_sessions()), default=0)
+        moment = max(
+            (session.tick for session in blender.part("sessions.running").list_sessions()), default=0
+        )
         if now != last:
             last, still, since = now, 0, moment
             continue
@@ -202,12 +204,12 @@ def shown(blender: Any) -> Iterator[float | None]:
 def ended(blender: Any) -> Iterator[float | None]:
     """End the session; then a press starts it anew, and losing the bed under the mouse ends the gesture."""
     blender.key("ESC", blender.middle())
-    yield from blender.until(lambda: not blender.part("live.running").list_sessions())
+    yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
     note(blender, "ended")
     yield from drag(blender, [(20.0, 20.0)])
     note(blender, "started anew")
     bpy.data.objects.remove(blender.beds()[0])
-    yield from blender.until(lambda: not blender.part("live.running").list_sessions())
+    yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
     blender.look("bed deleted")
     blender.event("LEFTMOUSE", "RELEASE", blender.middle())
     yield 0.5

@@ -101,7 +101,7 @@ class Events:
 
     def revive(self) -> None:
         """Have a session run again: what happens to none tells nothing about it."""
-        if self.blender.part("live.running").list_sessions():
+        if self.blender.part("sessions.running").list_sessions():
             return
         if bpy.context.mode != "OBJECT":
             self.operator(bpy.ops.object.mode_set, mode="OBJECT")
@@ -165,14 +165,14 @@ class Events:
 
 def check(blender: Any) -> None:
     """Check that every session is a state that can be kept, and every bed shows finite pins."""
-    running, snapshot = blender.part("live.running"), blender.part("core.session.snapshot")
+    running, snapshot = blender.part("sessions.running"), blender.part("core.session.snapshot")
     for session in running.list_sessions():
         state = snapshot.load(session.system, session.snapshot)
         height = state.row(0)
         assert np.isfinite(height).all()
         assert height.min() >= 0.0
         assert height.max() <= session.system.cell.actuator.stroke
-        bed = blender.part("live.waiting").find_bed(session.uid, session.name)
+        bed = blender.part("live.beds").find_bed(session.uid, session.name)
         if bed is not None and not session.stale:
             assert blender.part("live.bed_state").read_snapshot(bed) == session.snapshot
     for bed in blender.beds():
@@ -201,7 +201,7 @@ def script(blender: Any) -> Iterator[float | None]:
         getattr(events, name)()
         yield 0.1
         check(blender)
-        live += bool(blender.part("live.running").list_sessions())
+        live += bool(blender.part("sessions.running").list_sessions())
     blender.SEEN["live"] = live
     blender.shot("session_random")
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, make_matrices
-from digiclay.press.pen import FULL_TILT
+from digiclay.press.pointer import FULL_TILT
 
 from tests.window.blender_window import ON_DISPLAY, played
 from tests.window.tablet.screen import pen_screen

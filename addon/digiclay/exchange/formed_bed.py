@@ -19,7 +19,8 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
 from ..core.session import snapshot
 from ..core.surface.formed import Body, Formed
-from ..live import bed_state, running
+from ..live import bed_state
+from ..sessions import running
 from ..settings import properties
 
 #: Attribute of the bed's mesh: height of each pin, m, that features are measured from.

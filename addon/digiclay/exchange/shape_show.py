@@ -24,7 +24,8 @@ from ..core.shapes.request import Relief, Shape
 from ..core.shapes.source_file import fit_shape
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
-from ..live import bed_state, sculpting
+from ..live import bed_state
+from ..sessions import sculpting
 from ..settings import properties
 
 #: Kinds of objects that have a surface.

@@ -1,1 +1,1 @@
-"""Live sessions: the loop, its ticks, and their data in the .blend."""
+"""Live sessions in Blender: the loop, its ticks, their data in the .blend, and servers to follow."""

@@ -7,20 +7,15 @@ from typing import Any
 import numpy as np
 
 from ..core.base.arrays import Floats
-from .running import Running
+from ..sessions.running import Running
 
-#: The state by `core.session.snapshot`, the finger's pose at it, and the tick it is of.
+#: The state by `core.session.snapshot`, the fingertip's pose at it, and the tick it is of.
 STATE, POSE, TICK = "digiclay_state", "digiclay_pose", "digiclay_moment"
 
 
 def write(bed: Any, running: Running, before: Running | None = None) -> None:
-    """Write a session into its bed's properties.
-
-    The tick is counted on even while nothing moves: it tells which one it was that
-    undo has come back to.
-
-    `bed` bpy.types.Object; `before`: what was written last; what has not changed since is left alone.
-    """
+    """Write a session into its bed's properties, except what has not changed since `before` was written."""
+    # The tick counts on even while nothing moves: it identifies the one that undo has returned to.
     bed[TICK] = running.tick
     if before is not None and running.snapshot is before.snapshot:
         return
@@ -33,29 +28,29 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
 
 
 def clear(bed: Any) -> None:
-    """Forget all that is kept: the bed is at rest."""
+    """Remove all session data: the bed is at rest."""
     for name in (STATE, POSE, TICK):
         if name in bed:
             del bed[name]
 
 
 def read_snapshot(bed: Any) -> bytes | None:
-    """Return the kept state, or None for a bed at rest; it may be anything a file can hold."""
+    """Return the stored state, or None for a bed at rest; it may be anything a file can hold."""
     value = bed.get(STATE)
     return value if value is None or isinstance(value, bytes) else b""
 
 
 def read_pose(bed: Any) -> Floats | None:
-    """Return the finger's pose (7,) at the kept state, or None where there is none that can be used."""
+    """Return the fingertip's pose (7,) at the stored state, or None where there is no usable one."""
     value = bed.get(POSE)
     if not isinstance(value, bytes) or len(value) != 7 * 8:
         return None
-    at = np.frombuffer(value, np.float64).copy()
-    turned = np.linalg.norm(at[3:])
-    return at if np.isfinite(at).all() and abs(turned - 1.0) < 1e-6 else None
+    pose = np.frombuffer(value, np.float64).copy()
+    length = np.linalg.norm(pose[3:])
+    return pose if np.isfinite(pose).all() and abs(length - 1.0) < 1e-6 else None
 
 
 def read_tick(bed: Any) -> int:
-    """Return the tick the kept state is of; 0 where none is kept."""
+    """Return the tick that the stored state is of; 0 where none is stored."""
     value = bed.get(TICK)
     return value if isinstance(value, int) and value > 0 else 0

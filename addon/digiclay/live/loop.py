@@ -3,104 +3,110 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import Any
 
 from .. import preferences
 from ..compat import bpy
-from . import running
+from ..sessions import running
 
-#: A loop that has not ticked for so long is gone, s: its window was closed in a way nobody told.
+#: A loop that has not ticked for so long is gone, s: its window was closed without a notice.
 GONE = 5.0
 #: Ticks may come this much early, as a share of the time between two: timers are not exact.
 EARLY = 0.2
 #: How often the numbers in the sidebar are drawn anew, s.
 NUMBERS = 0.25
 
-#: The loop that runs: its timer and window, a number of its own, times of the last tick and drawn numbers.
-_LOOP: dict[str, Any] = {}
-_COUNT = [0]
+
+@dataclass
+class Loop:
+    """Loop that runs: Blender's timer and the address of its window; without a timer there is none."""
+
+    timer: Any = None
+    window: int = 0
+    #: Number of the loop: how many were begun.
+    token: int = 0
+    #: Times of the last tick and of the last redraw of numbers, s.
+    ticked: float = 0.0
+    numbers: float = 0.0
+    #: Whether for the moment no operator drives it, nor takes the keys.
+    aside: bool = False
+
+
+LOOP = Loop()
 
 
 def token() -> int:
     """Return the number of the loop that runs; 0 when none does."""
-    return int(_LOOP["token"]) if _LOOP else 0
+    return 0 if LOOP.timer is None else LOOP.token
 
 
 def is_running() -> bool:
     """Return whether there is a loop, and it ticks."""
-    return bool(_LOOP) and time.perf_counter() - float(_LOOP["ticked"]) < GONE
+    return LOOP.timer is not None and time.perf_counter() - LOOP.ticked < GONE
 
 
 def begin(context: Any) -> int:
     """Begin a loop with a timer in the window of the context; return its token."""
     end()
-    _COUNT[0] += 1
-    timer = context.window_manager.event_timer_add(
-        1.0 / preferences.get(context).redraw_rate, window=context.window
-    )
-    window, now = context.window.as_pointer(), time.perf_counter()
-    _LOOP.update(timer=timer, window=window, token=_COUNT[0], ticked=now, numbers=0.0)
+    LOOP.timer = _add_timer(context)
+    LOOP.window, LOOP.token = context.window.as_pointer(), LOOP.token + 1
+    LOOP.ticked, LOOP.numbers = time.perf_counter(), 0.0
     bpy.types.STATUSBAR_HT_header.prepend(draw)
     redraw_status()
-    return _COUNT[0]
+    return LOOP.token
 
 
-def time_window(context: Any) -> Any | None:
-    """Return a timer for the window of the context, to be removed; None where the loop has one.
-
-    A timer's events come to the operators of its window alone.
-    """
-    if _LOOP and _LOOP["window"] == context.window.as_pointer():
-        return None
+def _add_timer(context: Any) -> Any:
+    """Add a timer at the preferred rate; its events come to the operators of the context's window alone."""
     rate = preferences.get(context).redraw_rate
     return context.window_manager.event_timer_add(1.0 / rate, window=context.window)
 
 
+def time_window(context: Any) -> Any | None:
+    """Return a timer for the window of the context, to be removed; None where the loop has one."""
+    has_loop = LOOP.timer is not None and LOOP.window == context.window.as_pointer()
+    return None if has_loop else _add_timer(context)
+
+
 def step_aside() -> None:
     """Note that for the moment no operator drives the loop, nor takes the keys."""
-    _LOOP["aside"] = True
+    LOOP.aside = True
 
 
 def take_over() -> None:
     """Note that an operator drives the loop."""
-    _LOOP.pop("aside", None)
+    LOOP.aside = False
 
 
 def is_aside() -> bool:
     """Return whether there is a loop that no operator drives for the moment."""
-    return "aside" in _LOOP
+    return LOOP.timer is not None and LOOP.aside
 
 
 def end() -> None:
     """End the loop that runs, if one does."""
-    if not _LOOP:
+    if LOOP.timer is None:
         return
-    bpy.context.window_manager.event_timer_remove(_LOOP["timer"])
-    _LOOP.clear()
+    bpy.context.window_manager.event_timer_remove(LOOP.timer)
+    LOOP.timer, LOOP.aside = None, False
     bpy.types.STATUSBAR_HT_header.remove(draw)
     redraw_status()
 
 
 def is_due(context: Any, now: float) -> bool:
-    """Return whether to tick now: no more often than preferred, though other timers may run as well.
-
-    `context` bpy.types.Context; `now`: monotonic time, s.
-    """
-    wanted = (1.0 - EARLY) / preferences.get(context).redraw_rate
-    if now - float(_LOOP["ticked"]) < wanted:
+    """Return whether to tick at a monotonic time, s: no more often than preferred, whatever timers run."""
+    if now - LOOP.ticked < (1.0 - EARLY) / preferences.get(context).redraw_rate:
         return False
-    _LOOP["ticked"] = now
+    LOOP.ticked = now
     return True
 
 
 def redraw_numbers(context: Any, now: float) -> None:
-    """Have the sidebars drawn anew, now and then: numbers that change too quickly cannot be read.
-
-    `context` bpy.types.Context; `now`: monotonic time, s.
-    """
-    if now - float(_LOOP["numbers"]) < NUMBERS:
+    """Redraw the sidebars now and then: numbers that change too quickly cannot be read. `now`, s."""
+    if now - LOOP.numbers < NUMBERS:
         return
-    _LOOP["numbers"] = now
+    LOOP.numbers = now
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -110,19 +116,15 @@ def redraw_numbers(context: Any, now: float) -> None:
 
 
 def redraw_status() -> None:
-    """Have the status bar drawn anew."""
+    """Redraw the status bar."""
     for window in bpy.context.window_manager.windows:
         window.workspace.status_text_set_internal(None)
 
 
 def draw(header: Any, context: Any) -> None:
-    """Draw the keys of a running session in the status bar.
-
-    `header` bpy.types.Header; `context` bpy.types.Context.
-    """
-    sessions = running.list_sessions()
+    """Draw the keys of a running session in the status bar."""
     row = header.layout.row()
-    paused = all(session.paused for session in sessions)
+    paused = all(session.paused for session in running.list_sessions())
     row.label(text="Digital Clay paused" if paused else "Digital Clay", icon="PAUSE" if paused else "PLAY")
     row.label(text=" Stop", icon="EVENT_ESC")
     row.label(text="Resume" if paused else "Pause", icon="EVENT_P")

@@ -12,9 +12,10 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
 from ..device import palettes, view
 from ..device.instant import Instant, find_ellipsoid
-from ..live import bed_state, running
-from ..press.free_place import find_free_place
+from ..live import bed_state
+from ..press.occlusion import find_free_place
 from ..roles import BALL, FINGER, HOUSING, ROLE, bed_of, fingertip_of
+from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import title
 from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene

@@ -12,12 +12,13 @@ from .. import bridge, preferences
 from ..compat import bpy
 from ..device import form
 from ..exchange import formed_bed
-from ..live import bed_state, follow, loop, running
-from ..live.waiting import active_session, blocking_reason
+from ..live import bed_state, follow, loop
+from ..live.beds import active_session, blocking_reason
 from ..press import brush
 from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..roles import bed_of, fingertip_of, is_bed, is_edited
+from ..sessions import running
 from ..settings import own_presets
 from ..ui_text import localize
 

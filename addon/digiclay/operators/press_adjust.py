@@ -11,10 +11,10 @@ from .. import bridge
 from ..compat import bpy
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
-from ..live.stroke import DEEPEST, SHALLOWEST, Brush
-from ..press import aim, brush, marks
+from ..press import aim, brush, tool
 from ..roles import fingertip_of
 from ..settings import finger_size
+from ..strokes.stroke import DEEPEST, SHALLOWEST, Brush
 from ..ui_text import localize
 from . import status
 from .action import Action, Drawing
@@ -142,13 +142,13 @@ class AdjustMixin(Drawing):
         depth = 1e-3 * settings.depth if settings else DEEPEST
         rims = self.outlines(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, self._shown())
         places = [np.column_stack([rim, np.zeros(len(rim))]) + self.center for rim in rims]
-        lines = [aim.project(context, bed, place) for place in places]
-        middle = aim.project(context, bed, self.center[None])[0]
+        lines = [bridge.project(context, bed, place) for place in places]
+        middle = bridge.project(context, bed, self.center[None])[0]
         system = context.preferences.system
         closed = [np.concatenate([line, line[:1]]) for line in lines if np.isfinite(line).all()]
         cursor(
-            marks.make_lines(closed, system.pixel_size),
-            marks.make_label(self.words, (middle[0], middle[1]), system.ui_scale),
+            tool.make_lines(closed, system.pixel_size),
+            tool.make_label(self.words, (middle[0], middle[1]), system.ui_scale),
         )
 
 
@@ -181,7 +181,7 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
     def rate(self, context: Any, bed: Any) -> float:
         """Return m a pixel at which the outline's side keeps up with the mouse."""
         points = self.center + 1e-3 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-        middle, along, across = aim.project(context, bed, points)[:, 0]
+        middle, along, across = bridge.project(context, bed, points)[:, 0]
         # Half the width on the screen of a circle of 1 mm about the place.
         pixels = float(np.hypot(along - middle, across - middle))
         return 2e-3 / pixels if np.isfinite(pixels) and pixels > 0.0 else 0.0

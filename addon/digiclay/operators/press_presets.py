@@ -6,8 +6,8 @@ from bl_operators.presets import AddPresetBase  # type: ignore[import-not-found]
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
-from ..press import brush, brush_presets
-from ..press.fingers import FINGERS
+from ..press import brush
+from ..press.brush import FINGERS
 from ..settings import finger_size
 from ..ui_text import localize
 from .action import Action, Polled
@@ -75,7 +75,7 @@ class BrushMenu(bpy.types.Menu):
 
     bl_idname = "DIGICLAY_MT_brushes"
     bl_label = "Presets"
-    preset_subdir = brush_presets.SUBFOLDER
+    preset_subdir = brush.SUBFOLDER
     preset_operator = ApplyBrush.bl_idname
     draw = bpy.types.Menu.draw_preset
 
@@ -87,10 +87,10 @@ class SaveBrush(AddPresetBase, Polled, bpy.types.Operator):
     bl_label = "Save Brush Preset"
     needs = no_tool_in_view, no_finger
     preset_menu = BrushMenu.bl_idname
-    preset_subdir = brush_presets.SUBFOLDER
-    preset_defines = brush_presets.DEFINES
+    preset_subdir = brush.SUBFOLDER
+    preset_defines = brush.DEFINES
 
     @property
     def preset_values(self) -> list[str]:
         """What the preset stores."""
-        return brush_presets.preset_values(brush.tool_settings(bpy.context))
+        return brush.preset_values(brush.tool_settings(bpy.context))

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from .. import bridge
 from ..compat import bpy
-from ..live import running
-from ..live.stroke import SYMMETRIES, Brush, lay_line, lay_path, lay_ring
-from ..live.stroke_queue import change_stroke, last_place, queue_stroke
-from ..press import aim, brush, marks
+from ..press import aim, brush, tool
+from ..sessions import running
+from ..sessions.stroke_queue import change_stroke, last_place, queue_stroke
+from ..strokes.stroke import SYMMETRIES, Brush, lay_line, lay_path, lay_ring
 from ..ui_text import localize
 from . import status
 from .action import Drawing, Polled
@@ -96,13 +97,13 @@ class PressShape(Drawing, bpy.types.Operator):
         for mirror in SYMMETRIES[settings.symmetry]:
             path = self._path() * mirror
             heights = self.height[self.grid.at(path[:, 0], path[:, 1])]
-            points = aim.project(context, bed, np.column_stack([path, heights]))
+            points = bridge.project(context, bed, np.column_stack([path, heights]))
             if len(points) > 1 and np.isfinite(points).all():
                 lines.append(points)
         system = context.preferences.system
-        at = aim.project(context, bed, np.array([[*self.to, float(self.height.max())]]))[0]
-        text = marks.make_label(self.words.partition("  |")[0], (at[0], at[1] - 14.0), system.ui_scale)
-        cursor(marks.make_lines(lines, system.pixel_size), text if np.isfinite(at).all() else ())
+        at = bridge.project(context, bed, np.array([[*self.to, float(self.height.max())]]))[0]
+        text = tool.make_label(self.words.partition("  |")[0], (at[0], at[1] - 14.0), system.ui_scale)
+        cursor(tool.make_lines(lines, system.pixel_size), text if np.isfinite(at).all() else ())
 
 
 class PressLine(Polled, bpy.types.Operator):

@@ -8,13 +8,14 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.control.methods import METHODS
-from ..live import loop, running, selection, tick
-from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw, pull
-from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
-from ..live.tracking import find_tracking
-from ..press import aim, brush, pen
-from ..press.release import begin_button, read_event
+from ..live import beds, loop, tick
+from ..press import aim, brush, pointer
+from ..press.pointer import begin_button, read_event
+from ..sessions import running
+from ..sessions.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..settings.declared import title
+from ..strokes.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw, pull
+from ..strokes.tracking import find_tracking
 from ..ui_text import localize
 from . import status
 from .action import Polled, millimeters
@@ -79,7 +80,7 @@ class PressSettings:
     pressure_curve: bpy.props.EnumProperty(
         name="Pressure Curve",
         description="Share of the values that a pen reaches with part of its pressure",
-        items=pen.CURVE_ITEMS,
+        items=pointer.CURVE_ITEMS,
         default="LINEAR",
     )
     use_tilt: bpy.props.BoolProperty(
@@ -203,9 +204,9 @@ class Press(PressSettings, Polled, bpy.types.Operator):
     def _feel(self, context: Any, bed: Any, event: Any) -> None:
         """Take a pen's pressure and tilt."""
         if self.use_pressure and event.is_tablet:
-            self.pressure = pen.find_share(float(event.pressure), self.pressure_curve)
+            self.pressure = pointer.find_share(float(event.pressure), self.pressure_curve)
         if self.use_tilt and event.is_tablet:
-            self.lean = pen.find_lean(tuple(event.tilt), aim.find_view(context, bed))
+            self.lean = pointer.find_lean(tuple(event.tilt), aim.find_view(context, bed))
 
     def _is_released(self, event: Any) -> bool:
         """Return whether the button is up though no release has come: a pie menu, say, has had it."""
@@ -265,5 +266,5 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
     if session.paused:
         words = localize("The session is paused: the fingertip follows after it resumes")
         operator.report({"WARNING"}, words)
-    selection.deselect(bed)
+    beds.deselect(bed)
     return session

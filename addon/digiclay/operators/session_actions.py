@@ -10,11 +10,12 @@ from ..core.engine.simulation import begin
 from ..core.scene.assembly import assemble
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
-from ..live import bed_state, follow, gestures, handlers, loop, running, sculpting, tick
-from ..live.running import Running
-from ..live.waiting import active_session
+from ..live import bed_state, follow, handlers, loop, tick
+from ..live.beds import active_session
 from ..recorded import takes
 from ..roles import bed_of, fingertip_of
+from ..sessions import running, sculpting
+from ..sessions.running import Running
 from ..settings import properties
 from ..ui_text import localize
 from .action import Action, Needs
@@ -83,7 +84,7 @@ class RewindSession(OfSession, bpy.types.Operator):
     needs = session_waits, no_gesture
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
-        back = gestures.rewind(session)
+        back = sculpting.rewind(session)
         if session.recording is not None and back.recording is None:
             words = takes.keep_recording(bed, session)
             self.report({"INFO"}, words or localize("The recording ended: the gesture began before it"))
@@ -117,7 +118,7 @@ class ResetSession(OfSession, bpy.types.Operator):
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Begin anew, the recording stored as a take."""
         words = takes.keep_recording(bed, session)
-        back = gestures.reset(session)
+        back = sculpting.reset(session)
         tick.show(bed, back)
         tick.place_finger(context, bed, back)
         if words:

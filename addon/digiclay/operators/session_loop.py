@@ -10,10 +10,11 @@ from typing import Any
 
 from .. import preferences
 from ..compat import bpy
-from ..live import handlers, loop, running, selection, tick
+from ..live import beds, handlers, loop, tick
 from ..overlay import views
 from ..press import tool
 from ..roles import bed_of
+from ..sessions import running
 from ..ui_text import localize
 from .action import Action, Polled
 from .poll_messages import (
@@ -233,7 +234,7 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         views.follow()
         if preferences.get(context).take_press_tool:
             tool.take_up(context)
-        selection.deselect(bed)
+        beds.deselect(bed)
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
         if loop.is_running():

@@ -11,8 +11,8 @@ from ..core.shapes.fitting import pack
 from ..core.shapes.request import LENGTHS, UPWARDS, Shape
 from ..core.shapes.source_file import KINDS, list_shapes
 from ..exchange import shape_show
-from ..live import running
 from ..roles import bed_of
+from ..sessions import running
 from ..settings import properties
 from ..settings.declared import title
 from ..settings.shown_units import to_si

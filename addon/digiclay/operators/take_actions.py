@@ -8,10 +8,11 @@ from ..core.base.errors import DigiclayError
 from ..core.files.run_folder import write_whole
 from ..core.scene.toml_table import format_scene
 from ..core.session.take import to_scene
-from ..live import handlers, running, sculpting, tick
-from ..live.recorded_strokes import play_strokes, read_strokes
+from ..live import handlers, tick
 from ..recorded import takes
+from ..recorded.pointer_strokes import play_strokes, read_strokes
 from ..roles import bed_of
+from ..sessions import running, sculpting
 from ..ui_text import localize
 from .action import Action, FileAction
 from .poll_messages import baked, cannot_record, linked, no_bed, no_recording, no_take, session_runs

@@ -18,10 +18,11 @@ from ..core.session.live_session import Clock, periods_due, simulate_path
 from ..core.session.take import MOST_PARTS, Take, refine
 from ..device import view
 from ..device.instant import find_ellipsoid, pick_pose
-from ..live import bed_state, sculpting, tick
-from ..live.running import Running
+from ..live import bed_state, tick
 from ..recorded import takes
 from ..roles import bed_of, fingertip_of
+from ..sessions import sculpting
+from ..sessions.running import Running
 from ..settings import properties
 from ..ui_text import localize
 from . import status

@@ -39,11 +39,7 @@ class Look:
 
 
 def choose_colors(back: Color, ink: Color) -> Look:
-    """Choose all colors to go with those of the theme.
-
-    `back`: the theme's color behind letters; `ink`: the theme's letters; replaced by black or white where
-    they could not be read.
-    """
+    """Choose all colors to go with the theme's background and letters; unreadable letters are replaced."""
     ink = make_legible(ink, back, INK)
     return Look(
         back=back,
@@ -57,19 +53,13 @@ def choose_colors(back: Color, ink: Color) -> Look:
 
 
 def contrast(one: Color, other: Color) -> float:
-    """Return the contrast of two colors as the guidelines define it, 1 to 21.
-
-    `one`, `other` (float, float, float), colors.
-    """
+    """Return the contrast of two colors, 1 to 21, by the Web Content Accessibility Guidelines."""
     low, high = sorted((_luminance(one), _luminance(other)))
     return (high + 0.05) / (low + 0.05)
 
 
 def make_legible(color: Color, back: Color, least: float) -> Color:
-    """Return a color, mixed with as much black or white as it needs for a contrast to what is behind it.
-
-    `color`, `back` (float, float, float), the color, and what is behind it; `least`: contrast, 1 to 21.
-    """
+    """Return a color mixed with as much black or white as a contrast of 1 to 21 with `back` requires."""
     end = WHITE if contrast(WHITE, back) >= contrast(BLACK, back) else BLACK
     for share in np.linspace(0.0, 1.0, 41):
         mixed = _mix(color, end, float(share))
@@ -145,11 +135,7 @@ class Picture:
 
 
 def round_axis(low: float, high: float) -> tuple[float, float]:
-    """Return round ends of an axis that holds two values, the first below the second.
-
-    Steps are 1, 2 or 5 times a power of ten, and at most ten of them make the axis, so that
-    the ends do not jump about with every value.
-    """
+    """Return round ends of an axis for low < high: at most ten steps of 1, 2 or 5 times a power of ten."""
     span = high - low
     step = 10.0 ** np.floor(np.log10(span))
     step *= next(factor for factor in (0.1, 0.2, 0.5, 1.0) if span <= 10.0 * factor * step)
@@ -159,11 +145,7 @@ def round_axis(low: float, high: float) -> tuple[float, float]:
 def scale_curve(
     time: Floats, value: Floats, window: tuple[float, float], ends: tuple[float, float], box: Box
 ) -> Floats:
-    """Return the points (k, 2) of a curve inside a box, what lies outside the window left away.
-
-    `time`, `value` (t,), the curve; times increase, s; `window`: first and last time shown, s; `ends`: ends
-    of the axis, in the unit of the values; values beyond are drawn at the end; `box`: where the curve goes.
-    """
+    """Return the points (k, 2), pixels, of a curve in a box; values beyond the axis are drawn at its end."""
     shown = (time >= window[0]) & (time <= window[1]) & np.isfinite(value)
     x = (time[shown] - window[0]) / (window[1] - window[0])
     y = np.clip((value[shown] - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)

@@ -1,12 +1,11 @@
-"""Sections of the overlay: head, force and set point, colors, heights of picked pins, modes.
-
-Each says how tall it is and draws itself. No Blender in here.
-"""
+"""Sections of the overlay, and their placement in a view; no Blender."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,51 +29,35 @@ LEAST_FORCE, LEAST_SPAN = 0.1, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Session data in the overlay.
+    """Session data in the overlay."""
 
-    Attributes
-    ----------
-    name, method : str
-        Of the bed and of its control method; an empty method means no control.
-    factor : float or None
-        Simulated over real time of the last second; None before there is one.
-    errors : tuple of float or None
-        Estimated errors of the heights, m, and of a cell's force, N; None before there is an estimate.
-    set_point : float or None
-        Total force asked for now, N.
-    time, force : ndarray (t,)
-        The last seconds: simulated time, s, and total force, N.
-    pins : tuple of int
-        The picked pins, k of them.
-    heights : ndarray (t, k)
-        Their heights, m; NaN where they were not followed yet.
-    modes : ndarray of int (8,)
-        Number of pins in each mode.
-    colors : tuple of Color
-        Of the modes, as the pins wear them.
-    seconds : float
-        How much of the past is shown, s.
-    top : float or None
-        Force from which on a pin has the last color, N; None while the colors tell the modes.
-    beyond : bool
-        Whether the contact law does not hold now, by `core.model.touch`.
-    """
-
+    #: Of the bed and of its control method; an empty method means no control.
     name: str
     method: str
     paused: bool
     waiting: bool
+    #: Simulated over real time of the last second; None before there is one.
     factor: float | None
+    #: Estimated errors of the heights, m, and of a cell's force, N; None before there is an estimate.
     errors: tuple[float, float] | None
+    #: Total force asked for now, N.
     set_point: float | None
+    #: (t,), the last seconds: simulated time, s, and total force, N.
     time: Floats
     force: Floats
+    #: The picked pins, k of them.
     pins: tuple[int, ...]
+    #: (t, k), their heights, m; NaN where they were not followed yet.
     heights: Floats
+    #: (8,), number of pins in each mode.
     modes: NDArray[np.int64]
+    #: Of the modes, as the pins wear them.
     colors: tuple[Color, ...]
+    #: How much of the past is shown, s.
     seconds: float
+    #: Force from which on a pin has the last color, N; None while the colors tell the modes.
     top: float | None = None
+    #: Whether the contact law does not hold now, by `core.model.touch`.
     beyond: bool = False
 
     @property
@@ -95,10 +78,7 @@ class Pen:
     scale: float
 
     def row(self, top: float, left: str, right: str = "", small: bool = False) -> float:
-        """Write a row, one text to the left and one to the right; return where the next one begins.
-
-        `top`: pixels; `small`: in small letters.
-        """
+        """Write a row of two texts, left and right; return the top of the next one, pixels."""
         size = (SMALL if small else LETTERS) * self.scale
         color = self.look.faint if small else self.look.ink
         y = top - 0.75 * ROW * self.scale
@@ -108,10 +88,7 @@ class Pen:
         return top - ROW * self.scale
 
     def frame(self, top: float, low: str, high: str) -> Box:
-        """Draw the frame of a plot with the ends of its axis; return the box the curves go into.
-
-        `top`: pixels; `low`, `high`: ends of the axis.
-        """
+        """Draw the frame of a plot with the ends of its axis; return the box of its curves."""
         box = Box(self.x, top - PLOT * self.scale, self.width, PLOT * self.scale, self.look.back)
         step, size = 3.0 * self.scale, SMALL * self.scale
         for y, label, lift in ((box.y, low, step), (top, high, -size)):
@@ -123,11 +100,7 @@ class Pen:
     def curve(
         self, told: Readings, value: Floats, ends: tuple[float, float], box: Box, pin: int = -1
     ) -> None:
-        """Draw a curve into the frame of a plot: that of a pin, or the force.
-
-        `value` (t,); `ends` (float, float), of the axis, in the unit of the values; `box`: from `frame`;
-        `pin`: which pin of the plot; below 0: the force.
-        """
+        """Draw a curve (t,) into the box of a plot, in the color of a picked pin, or of the force (-1)."""
         color = self.look.force if pin < 0 else self.look.pins[pin]
         points = scale_curve(told.time, value, told.window, ends, box)
         if len(points) > 1:
@@ -157,21 +130,11 @@ def describe_state(told: Readings) -> str:
     return "" if told.factor is None else localize("{:.2f} x real time", told.factor)
 
 
-def _head_height(told: Readings) -> float:
-    """Return the height of the head, pixels at a UI scale of 1."""
-    return 3 * ROW + GAP
-
-
 def _draw_head(told: Readings, pen: Pen, top: float) -> None:
     """Name the bed, the method and how well the simulation keeps up."""
     top = pen.row(top, told.name, describe_state(told))
     top = pen.row(top, localize("Method: {}", localize(told.method.replace("_", " ") or "none")))
     pen.row(top, error_message(told.errors), small=True)
-
-
-def _force_height(told: Readings) -> float:
-    """Return the height of the section of the force, pixels at a UI scale of 1."""
-    return 2 * ROW + PLOT + GAP
 
 
 def _draw_force(told: Readings, pen: Pen, top: float) -> None:
@@ -193,11 +156,6 @@ def _draw_force(told: Readings, pen: Pen, top: float) -> None:
         pen.picture.lines.append(Line(line, pen.look.set_point, 1.5 * pen.scale, dashed=True))
     pen.curve(told, told.force, ends, box)
     pen.row(box.y, "", localize("last {:g} s", told.seconds), small=True)
-
-
-def _heights_height(told: Readings) -> float:
-    """Return the height of the section of the heights, pixels at a UI scale of 1."""
-    return ROW * (2 + math.ceil(len(told.pins) / 3)) + PLOT + GAP if told.pins else ROW + GAP
 
 
 def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
@@ -222,25 +180,14 @@ def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
         _entry(pen, x, y, pen.look.pins[place], f"{pin}:{now}")
 
 
-def _scale_height(told: Readings) -> float:
-    """Return the height of the scale of colors, pixels at a UI scale of 1; 0 while none is needed."""
-    return 0.0 if told.top is None else 2.6 * ROW
-
-
 def _draw_scale(told: Readings, pen: Pen, top: float) -> None:
     """Draw the colors of the force on a pin."""
-    if told.top is None:
-        return
+    assert told.top is not None  # or the section has no height
     top = pen.row(top, localize("Force on a pin"))
     width, height = pen.width / len(heat.COLORS), 0.5 * ROW * pen.scale
     for place, color in enumerate(heat.COLORS):
         pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, color))
     pen.row(top - height, "0 N", f"{told.top:.3g} N", small=True)
-
-
-def _modes_height(told: Readings) -> float:
-    """Return the height of the section of the modes, pixels at a UI scale of 1."""
-    return ROW * (1 + math.ceil(np.count_nonzero(told.modes) / 2))
 
 
 def _draw_modes(told: Readings, pen: Pen, top: float) -> None:
@@ -267,11 +214,91 @@ def _entry(pen: Pen, x: float, y: float, color: tuple[float, float, float], text
     pen.picture.words.append(Words(x + 3.5 * radius, y, size, pen.look.ink, text))
 
 
-#: From the top down: how tall each section is, and how it is drawn.
-SECTIONS = (
-    (_head_height, _draw_head),
-    (_force_height, _draw_force),
-    (_scale_height, _draw_scale),
-    (_heights_height, _draw_heights),
-    (_modes_height, _draw_modes),
+def _draw_brief(told: Readings, pen: Pen, top: float) -> None:
+    """Write force, set point, simulated time and state in two rows."""
+    now = localize("no force yet")
+    if told.force.size:
+        now = force_message(float(told.force[-1]), beyond=told.beyond)
+    asked = "" if told.set_point is None else localize("of {:.2f} N", told.set_point)
+    top = pen.row(top, now, asked)
+    pen.row(top, f"{float(told.time[-1]) if told.time.size else 0.0:.1f} s", describe_state(told))
+
+
+class Section(NamedTuple):
+    """Section of the overlay: its height at a UI scale of 1, pixels, 0 without content, and its drawing."""
+
+    height: Callable[[Readings], float]
+    draw: Callable[[Readings, Pen, float], None]
+
+
+class Content(NamedTuple):
+    """Sections of the overlay from the top down, and their width at a UI scale of 1, pixels."""
+
+    sections: tuple[Section, ...]
+    width: float
+
+
+def _measure_heights(told: Readings) -> float:
+    return ROW * (2 + math.ceil(len(told.pins) / 3)) + PLOT + GAP if told.pins else ROW + GAP
+
+
+COMPACT = Content((Section(lambda told: 2 * ROW, _draw_brief),), 190.0)
+FULL = Content(
+    (
+        Section(lambda told: 3 * ROW + GAP, _draw_head),
+        Section(lambda told: 2 * ROW + PLOT + GAP, _draw_force),
+        Section(lambda told: 0.0 if told.top is None else 2.6 * ROW, _draw_scale),
+        Section(_measure_heights, _draw_heights),
+        Section(lambda told: ROW * (1 + math.ceil(np.count_nonzero(told.modes) / 2)), _draw_modes),
+    ),
+    290.0,
 )
+#: Height that Blender's own text and gizmos take in corners of the view at a UI scale of 1, pixels.
+TAKEN = {"top_left": 54.0, "top_right": 220.0}
+#: Sizes at a UI scale of 1, pixels.
+MARGIN, PADDING = 12.0, 10.0
+#: Opacity of the box behind it all: the bed shines through a little.
+BACK_ALPHA = 0.95
+#: Most of the room's height that is taken: the bed is what one looks at.
+SHARE = 0.75
+
+#: Left, bottom, right and top of a part of the view, pixels.
+Room = tuple[float, float, float, float]
+
+
+def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
+    """Return the part of a view, pixels, that no panel covers; `covered`: sides, and depths of the panels."""
+    deep = {"LEFT": 0.0, "RIGHT": 0.0, "TOP": 0.0, "BOTTOM": 0.0}
+    for side, depth in covered:
+        deep[side] += depth
+    return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
+
+
+def lay_out(
+    told: Readings, look: Look, room: Room, scale: float, content: Content = FULL,
+    corner: str = "bottom_right",
+) -> Picture:  # fmt: skip
+    """Lay the overlay out in a corner of a room; sections that do not fit are left out."""
+    left, bottom, right, top = room
+    at_top, at_left = corner.startswith("top"), corner.endswith("left")
+    top -= TAKEN.get(corner, 0.0) * scale
+    width, margin, padding = content.width * scale, MARGIN * scale, PADDING * scale
+    space, sections = SHARE * (top - bottom) - 2 * padding, []
+    for section in content.sections:
+        height = section.height(told) * scale
+        if 0.0 < height <= space:
+            sections.append((height, section.draw))
+            space -= height
+    picture = Picture()
+    if not sections or right - left < width + 2 * margin:
+        return picture
+    tall = sum(height for height, _ in sections) + 2 * padding
+    x = left + margin if at_left else right - margin - width
+    y = top - margin - tall if at_top else bottom + margin
+    picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
+    pen = Pen(picture, look, x + padding, width - 2 * padding, scale)
+    y += tall - padding
+    for height, draw in sections:
+        draw(told, pen, y)
+        y -= height
+    return picture

@@ -1,39 +1,47 @@
 """Overlay in the 3D views during live sessions.
 
-The draw handler is there only while a session runs whose bed wants it: an overlay that is off
-costs nothing. Whoever starts or ends a session calls `follow`.
+The draw handler is there only while a session runs whose bed has the overlay enabled: one that is off costs
+nothing. `follow` is called after each start and end of a session.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .. import preferences
+from ..bridge import project
 from ..compat import bpy
 from ..core.base.modes import Mode
 from ..core.model.control_interface import find_set_point
 from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
-from ..live import running
-from ..press.aim import project
+from ..sessions import running
 from .picture import Dot, Look, Picture, choose_colors
-from .placement import COMPACT, FULL, Room, find_room, lay_out
-from .sections import Readings
+from .sections import COMPACT, FULL, Readings, Room, find_room, lay_out
 
-#: How often the views are drawn anew while nothing moves in them, s: the curves go on all the same.
+#: How often the views are redrawn while nothing moves in them, s: the curves continue.
 QUIET = 0.25
-#: The draw handler, while there is one.
-_HANDLES: list[Any] = []
+
+
+@dataclass
+class DrawHandler:
+    """Blender's handle of the draw handler; None while there is none."""
+
+    handle: Any = None
+
+
+HANDLER = DrawHandler()
 
 
 def follow() -> None:
     """Draw the overlay if a live session has it enabled, and remove it otherwise."""
     if any(_is_wanted(bed) for bed in _beds()):
-        if not _HANDLES:
-            _HANDLES.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+        if not shown():
+            HANDLER.handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
             bpy.app.timers.register(_again, first_interval=QUIET)
     else:
         stop()
@@ -41,16 +49,17 @@ def follow() -> None:
 
 
 def stop() -> None:
-    """Draw the overlay no more."""
+    """Remove the overlay."""
     if bpy.app.timers.is_registered(_again):
         bpy.app.timers.unregister(_again)
-    while _HANDLES:
-        bpy.types.SpaceView3D.draw_handler_remove(_HANDLES.pop(), "WINDOW")
+    if shown():
+        bpy.types.SpaceView3D.draw_handler_remove(HANDLER.handle, "WINDOW")
+        HANDLER.handle = None
 
 
 def shown() -> bool:
     """Return whether the draw handler is there."""
-    return bool(_HANDLES)
+    return HANDLER.handle is not None
 
 
 def redraw() -> None:
@@ -62,7 +71,7 @@ def redraw() -> None:
 
 
 def _again() -> float:
-    """Have the views drawn anew now and then: a timer, so that an overlay that is off costs nothing."""
+    """Redraw the views now and then, as a timer."""
     redraw()
     return QUIET
 
@@ -70,10 +79,7 @@ def _again() -> float:
 def read_session(
     bed: Any, session: running.Running, colors: dict[Mode, tuple[float, float, float]]
 ) -> Readings:
-    """Return the content of the overlay for a bed and its session.
-
-    `bed` bpy.types.Object; `colors` (float, float, float).
-    """
+    """Return the content of the overlay for a bed and its session."""
     trace, scene = session.trace, session.scene
     wanted = float(trace.set_point[-1] if len(trace.rows) else find_set_point(scene.set_point, 0))
     errors = session.errors
@@ -126,20 +132,13 @@ def _room(area: Any, region: Any) -> Room:
         lies_over = other.x < region.x + region.width and other.x + other.width > region.x
         lies_over &= other.y < region.y + region.height and other.y + other.height > region.y
         if other.type in sides and lies_over and min(other.width, other.height) > 1:
-            side = (
-                other.alignment
-                if other.alignment in ("LEFT", "RIGHT", "TOP", "BOTTOM")
-                else sides[other.type]
-            )
+            side = other.alignment if other.alignment in sides.values() else sides[other.type]
             covered.append((side, other.width if side in ("LEFT", "RIGHT") else other.height))
     return find_room(region.width, region.height, covered)
 
 
 def _draw() -> None:
-    """Draw the overlay into the region Blender is drawing.
-
-    A quad view has four; what is written stands in the one that can be turned, picked pins are marked in all.
-    """
+    """Draw the overlay into the region Blender is drawing: marks in all of a quad view, text in one."""
     from .draw import draw
 
     context = bpy.context
@@ -154,14 +153,9 @@ def _draw() -> None:
     scale = settings.system.ui_scale
     picture = Picture()
     if context.region_data == context.space_data.region_3d:
-        picture = lay_out(
-            read_session(bed, session, colors),
-            chosen,
-            _room(context.area, context.region),
-            scale,
-            FULL if bed.digiclay_display.overlay_full else COMPACT,
-            preferences.get(context).overlay_corner,
-        )
+        content = FULL if bed.digiclay_display.overlay_full else COMPACT
+        room, corner = _room(context.area, context.region), preferences.get(context).overlay_corner
+        picture = lay_out(read_session(bed, session, colors), chosen, room, scale, content, corner)
     picture.dots += _marks(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)
 

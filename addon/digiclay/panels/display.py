@@ -15,8 +15,9 @@ from ..core.session import snapshot
 from ..core.session.recent_trace import PICKED, SPAN
 from ..device import form, heat, view
 from ..device.node_tree import LENGTH
-from ..live import bed_state, running
+from ..live import bed_state
 from ..overlay import views
+from ..sessions import running
 from ..settings import properties
 from ..ui_text import localize
 from .base import Panel, bed_of, draw_property, is_edited

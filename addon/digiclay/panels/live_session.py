@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from ..compat import bpy
-from ..live import bed_state, follow, running
-from ..live.running import Running
+from ..live import bed_state, follow
 from ..overlay.sections import error_message
 from ..recorded import bake, takes
+from ..sessions import running
+from ..sessions.running import Running
 from ..ui_text import localize
 from .base import Panel, bed_of, draw_lines
 

@@ -9,7 +9,7 @@ from ..core.base.quantity import list_quantities
 from ..core.control.methods import list_methods
 from ..core.scene.schema import NEEDS, OPTIONAL, import_parameters
 from ..core.scene.toml_table import PRESETS
-from ..live import running
+from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import WHOLE, title
 from ..settings.groups import method_of, method_property

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..press.brush import tool_settings
-from ..press.header import draw_presets
+from ..press.tool import draw_presets
 
 
 class Popover:

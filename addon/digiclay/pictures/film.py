@@ -93,18 +93,12 @@ LOOKS = 24
 
 @dataclass(frozen=True, eq=False)
 class Shots:
-    """Frames of a film, which can be drawn in any order.
-
-    Attributes
-    ----------
-    count : int
-        Number of frames.
-    show : callable
-        Changes the scene to what a frame shows, by its number from 0.
-    """
+    """Frames of a film, which can be drawn in any order."""
 
     scene: Any
+    #: Number of frames.
     count: int
+    #: Changes the scene to what a frame shows, by its number from 0.
     show: Callable[[int], None]
 
 
@@ -118,15 +112,7 @@ def render_film(
     stopped: Callable[[], bool] | None = None,
     **sizes: Any,
 ) -> Path | None:
-    """Draw a session, or a part of it, into an MP4 file.
-
-    `history`: as in ``history.npz``; `out`: the file; it appears whole or not at all; `set_point`: total
-    force that is asked for, N; drawn into the strip; `progress`: told after each frame how many are drawn,
-    and of how many; `stopped`: asked before each frame; when it says True, no film is made; `sizes`: `pitch`,
-    `actuator` and `finger`, as for `Instant.of`. Returns `out`; None when it was stopped. Raises
-    ParameterError when the part asked for is not in the session. Raises OutputError when the file cannot be
-    written.
-    """
+    """Draw rows of a history into an MP4 file, which appears whole or not at all; None: it was stopped."""
     return _render_whole(
         stage_film(history, looks, set_point=set_point, **sizes), out, looks, progress, stopped
     )
@@ -136,10 +122,7 @@ def render_film(
 def stage_film(
     history: Mapping[str, NDArray[Any]], looks: Film, *, set_point: float | None = None, **sizes: Any
 ) -> Iterator[Shots]:
-    """Set the stage for the frames of a film.
-
-    `history`, `looks`, `set_point`, `sizes`: as for `render_film`.
-    """
+    """Set the stage for the frames of a film; `sizes`: `pitch`, `actuator`, `finger` of `Instant.of`."""
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     height = history["height"][used]
@@ -176,11 +159,7 @@ def render_turntable(
     progress: Progress | None = None,
     stopped: Callable[[], bool] | None = None,
 ) -> Path | None:
-    """Draw a bed that turns once about itself into an MP4 file.
-
-    `instant`: what the bed shows; `out`, `looks`, `progress`, `stopped`: as for `render_film`. Returns `out`;
-    None when it was stopped.
-    """
+    """Draw a bed that turns once about itself into an MP4 file; None when it was stopped."""
     return _render_whole(stage_turntable(instant, looks), out, looks, progress, stopped)
 
 
@@ -210,10 +189,7 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
 def _visible_points(
     bed: Any, history: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], sizes: Mapping[str, Any]
 ) -> Floats:
-    """Return what a film must have in its frame, (k, 3) in Blender units.
-
-    The pins wherever they go, and the fingertip where it touches: in the air it may leave.
-    """
+    """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertip where it touches."""
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     touching = rows[history["total_force"][rows] > 0.0]
     poses = history["fingertip"][touching if touching.size else rows]
@@ -259,12 +235,7 @@ def draw_frames(
     progress: Progress | None = None,
     stopped: Callable[[], bool] | None = None,
 ) -> bool:
-    """Draw frames, each into a file of its own, which appears whole or not at all.
-
-    `frames`: their numbers, from 0; `folder`: of the files, see `render_settings.name_frame`; `out`: what the
-    user knows of it; messages name this; `progress`: told after each frame how many are drawn, and of how
-    many; `stopped`: asked before each frame. Returns whether all were drawn: nobody asked to stop.
-    """
+    """Draw frames by number, each into a whole file of `folder`; return whether all were drawn."""
     for count, frame in enumerate(frames):
         if stopped and stopped():
             return False

@@ -35,31 +35,20 @@ LAYER = 1e-3
 
 @dataclass(frozen=True)
 class Front:
-    """Plane in front of the camera, without shadow or shading.
+    """Plane in front of the camera, without shadow or shading."""
 
-    Attributes
-    ----------
-    scene, camera
-        Blender's.
-    depth : float
-        Distance from the camera, Blender units.
-    width, height : float
-        Half the picture's size there, Blender units.
-    """
-
+    #: Blender's.
     scene: Any
     camera: Any
+    #: Distance from the camera, Blender units.
     depth: float
+    #: Half the picture's size there, Blender units.
     width: float
     height: float
 
     @classmethod
     def before(cls, scene: Any, camera: Any, half: tuple[float, float]) -> Front:
-        """Return the plane of a camera; `half` of the frame's width and height at depth 1.
-
-        `scene` bpy.types.Scene; `camera` bpy.types.Object; `half` (float, float), half of the frame's width
-        and height at depth 1.
-        """
+        """Return the plane of a camera; `half` of the frame's width and height at depth 1."""
         depth = camera.data.clip_start * 20.0
         return cls(scene, camera, depth, half[0] * depth, half[1] * depth)
 
@@ -89,11 +78,7 @@ class Front:
         return self.note >= READ_NOTE * self.pixel
 
     def put(self, part: Any, x: float, y: float, color: Color, layer: int = 0) -> Any:
-        """Hang an object at a place of the plane; layers with a higher number lie behind.
-
-        `part` bpy.types.Object; `x`, `y`: place in the plane; `color` (float, float, float); `layer`: higher
-        numbers lie behind.
-        """
+        """Hang an object at a place of the plane; layers with a higher number lie behind."""
         behind = 1.0 + LAYER * layer
         part.parent = self.camera
         part.location = (x * behind, y * behind, -self.depth * behind)
@@ -105,11 +90,7 @@ class Front:
         return part
 
     def write(self, body: str, size: float, x: float, y: float, color: Color, align: str = "LEFT") -> Any:
-        """Write a text; return the object, whose `data.body` may be changed.
-
-        `size`, `x`, `y`: size of the letters and place, in the plane; `color` (float, float, float); `align`:
-        Blender's word for the side that stands at x.
-        """
+        """Write a text at a place; return the object, whose `data.body` may be changed."""
         text = bpy.data.curves.new(body, "FONT")
         text.body, text.size, text.align_x = body, size, align
         return self.put(bpy.data.objects.new(body, text), x, y, color)
@@ -117,11 +98,7 @@ class Front:
     def box(
         self, name: str, low: tuple[float, float], high: tuple[float, float], color: Color, layer: int
     ) -> Any:
-        """Fill a rectangle from its lower left to its upper right corner; it is placed by the lower left.
-
-        `low`, `high` (float, float), lower left and upper right corner; `color` (float, float, float);
-        `layer`: higher numbers lie behind.
-        """
+        """Fill a rectangle from its lower left to its upper right corner; its origin is the lower left."""
         width, height = high[0] - low[0], high[1] - low[1]
         corners = np.array([[0.0, 0.0, 0.0], [width, 0, 0], [width, height, 0], [0, height, 0]])
         part = bpy.data.objects.new(name, bridge.mesh(name, (corners, [(0, 1, 2, 3)])))
@@ -197,26 +174,18 @@ LEAST = 0.05
 
 @dataclass(frozen=True)
 class ForcePlot:
-    """Force plot of one film.
+    """Force plot of one film."""
 
-    Attributes
-    ----------
-    been, cursor, force, time
-        Objects that change from frame to frame.
-    place : ndarray (k,)
-        Where each column stands, plane units, and
-    height : ndarray (k,)
-        how high it is.
-    first, per_second : float
-        Time of the left edge, s, and plane units of a second.
-    """
-
+    #: Objects that change from frame to frame.
     been: Any
     cursor: Any
     force: Any
     time: Any
+    #: (k,), where each column stands, plane units, and.
     place: Floats
+    #: (k,), how high it is.
     height: Floats
+    #: Time of the left edge, s, and plane units of a second.
     first: float
     per_second: float
 
@@ -235,11 +204,7 @@ class ForcePlot:
 
 
 def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float | None) -> ForcePlot:
-    """Draw the strip of a session.
-
-    `time`, `force` (t,), times, s, and total forces, N, of the rows the film is made of; `set_point`: total
-    force that is asked for, N.
-    """
+    """Draw the strip of a session: times (t,), s, total forces (t,) and set point, N."""
     left, right = LEFT * front.width, -LEFT * front.width
     bottom = -0.95 * front.height
     full = 2.0 * SHARE * front.height
@@ -269,10 +234,7 @@ def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float 
 
 
 def reduce_columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:
-    """Return times and forces of at most so many columns: rows that share one give it their largest force.
-
-    `time` (t,), s; `force` (t,), N; `most`: columns.
-    """
+    """Return times and forces of at most so many columns, each with its largest force."""
     count = len(time)
     starts = np.unique(np.linspace(0, count, min(count, most), endpoint=False).astype(np.intp))
     return time[starts], np.maximum.reduceat(force, starts)

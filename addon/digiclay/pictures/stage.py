@@ -35,13 +35,7 @@ def set_up(
     modes: Sequence[Mode] | None = None,
     margins: Margins = MARGINS,
 ) -> Front:
-    """Put camera, lights, floor and legend about a bed that stands at the origin of `scene`.
-
-    `scene` bpy.types.Scene, engine and size of the picture are set; `bed` bpy.types.Object; `instant`: what
-    the bed shows; `points` (k, 3), what must be seen, Blender units; the bed's outline as it stands when left
-    out; `modes`: what the legend explains; the modes present when left out; `margins`: as `MARGINS`. Returns
-    the plane before the camera, for whatever else is to be written there.
-    """
+    """Put camera, lights, floor and legend about a bed at the origin; return the plane before the camera."""
     points = outline(bed) if points is None else points
     floor = float(points[:, 2].min())
     span = float(np.ptp(points, axis=0).max())
@@ -58,11 +52,7 @@ def set_up(
 
 
 def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Floats:
-    """Return the nearest place from which all points fall inside the frame.
-
-    `points` (k, 3), what must be seen; `axes` (3, 3), the camera's right, up and backward directions as rows;
-    `low`, `high` (2,), slopes (sideways and upwards, over depth) of the frame's edges, low < high.
-    """
+    """Return the nearest place that sees points (k, 3) between the slopes `low` and `high` (2,)."""
     seen = points @ axes.T
     across, back = seen[:, :2], seen[:, 2:]
     top = (across + high * back).max(axis=0)
@@ -73,10 +63,7 @@ def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Flo
 
 
 def outline(bed: Any) -> Floats:
-    """Return the points of housing and fingertip and the pin tops, (k, 3) in Blender units.
-
-    The bed stands at the origin; `matrix_basis` is right without an update of the scene.
-    """
+    """Return points of housing, fingertip and pin tops, (k, 3), Blender units; the bed is at the origin."""
     clouds = []
     # The housing's shape is that of an object which stands in no scene: what it is drawn by is the bed.
     meshes = [(part, part.data) for part in (bed, *bed.children_recursive) if part.type == "MESH"]

@@ -33,16 +33,7 @@ def render_still(
     color: str = "mode",
     arrows: bool = False,
 ) -> Path:
-    """Draw an instant into a PNG file.
-
-    `instant`: what to draw; `out`: the file; it is written under a temporary name and renamed; `width`,
-    `height`: size of the picture, pixels; `engine`: Cycles gives soft shadows and runs anywhere; Workbench is
-    quicker and plainer, and wants OpenGL; `samples`: samples per pixel of Cycles; more is smoother and slower
-    in proportion; `denoise`: smooth what few samples leave, where Blender was built with Cycles' denoiser;
-    `color`: what the color of a pin tells; `arrows`: draw the force on each pin as an arrow. Returns `out`.
-    Raises ParameterError: on an unknown engine, or a size that makes no picture. Raises OutputError when the
-    file cannot be written.
-    """
+    """Draw an instant into a PNG file, which appears whole or not at all."""
     looks = Still(width=width, height=height, engine=engine, samples=samples, color=color, arrows=arrows)
     partial = out.with_name(f".{out.name}.{os.getpid()}.partial.png")
     try:
@@ -68,11 +59,7 @@ def apply_style(bed: Any, looks: Picture) -> None:
 
 
 def render_picture(scene: Any, path: Path, out: Path) -> None:
-    """Draw a scene into a PNG file.
-
-    `scene` bpy.types.Scene; `path`: the file; `out`: what the user knows of it; messages name this. Raises
-    OutputError when the file cannot be written.
-    """
+    """Draw a scene into a PNG file; messages name `out`, which the user knows."""
     scene.render.filepath = str(path)
     try:
         path.touch()
@@ -110,10 +97,7 @@ def add_picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any
 
 
 def use_fast_settings(scene: Any) -> None:
-    """Leave out of a film's frames what costs Workbench most on a machine without a graphics card.
-
-    Shadows are two thirds of a frame, and the second half of the samples can hardly be seen.
-    """
+    """Leave out shadows, two thirds of a frame in Workbench, and the samples hardly seen."""
     scene.display.shading.show_shadows = False
     scene.display.render_aa = "8"
 

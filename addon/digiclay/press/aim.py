@@ -14,28 +14,21 @@ from ..core.base.errors import DigiclayError
 from ..core.model.layout import Grid, make_grid
 from ..core.surface.pointing import find_ray, intersect_surface
 from ..device import view
-from ..live import running
+from ..sessions import running
 from ..settings import properties
 from .occlusion import find_hider, shown_stretch
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Point on the pins of a bed.
+    """Point on the pins of a bed."""
 
-    Attributes
-    ----------
-    bed : bpy.types.Object
-        Not to be kept: undo invalidates it.
-    height : ndarray (n,)
-        Heights of the pin tops, m.
-    point : ndarray (3,)
-        Where the ray met them, in the bed's space, m.
-    """
-
+    #: Not to be kept: undo invalidates it.
     bed: Any
     grid: Grid
+    #: (n,), heights of the pin tops, m.
     height: Floats
+    #: (3,), where the ray met them, in the bed's space, m.
     point: Floats
 
     @property
@@ -51,11 +44,7 @@ def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
 
 
 def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any | None]:
-    """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any.
-
-    A bed that cannot be simulated as it stands, say because it is unevenly scaled, is looked
-    through; pressing on it says why. A click on what hides the pins is for that object.
-    """
+    """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any."""
     found, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
         if not view.is_bed(bed):
@@ -63,7 +52,7 @@ def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any |
         try:
             cells, height = read_surface(bed)
             point = hit_point(context, bed, cells, height, xy)
-        except DigiclayError:
+        except DigiclayError:  # the bed is looked through; pressing on it reports why
             continue
         if point is None:
             continue
@@ -77,10 +66,7 @@ def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any |
 
 
 def read_surface(bed: Any) -> tuple[Grid, Floats]:
-    """Return where a bed's pins stand and how high: from its session, or as they are drawn.
-
-    Raises DigiclayError when the bed's settings do not describe it.
-    """
+    """Return where a bed's pins stand, and their heights (n,), m: of its session, or as they are drawn."""
     session = running.find(bed)
     if session is not None:
         return session.system.grid, session.state.row(0)
@@ -88,25 +74,13 @@ def read_surface(bed: Any) -> tuple[Grid, Floats]:
 
 
 def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
-    """Return where the ray through a region's pixel meets pins of a height (n,), m, or None.
-
-    Raises DigiclayError when the bed is not uniformly scaled.
-    """
+    """Return where the ray through a pixel of the region meets pins of heights (n,), m; None if it misses."""
     origin, direction = _ray(context, bed, xy)
     first, last = shown_stretch(context, _place(bed, origin), _place(bed, origin + direction))
     if first > last:
         return None
     point = intersect_surface(cells, height, origin + first * direction, direction)
     return point if point is not None and (point - origin) @ direction <= last else None
-
-
-def project(context: Any, bed: Any, points: Floats) -> Floats:
-    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
-    to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
-    clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
-    depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
-    size = np.array([context.region.width, context.region.height])
-    return np.asarray((clip[:, :2] / depth + 1.0) / 2.0 * size)
 
 
 def find_view(context: Any, bed: Any) -> Floats:

@@ -1,14 +1,56 @@
-"""Settings of the Press tool: where they are, and the text that shows them beside the cursor."""
+"""Settings of the Press tool: brush, finger and presets, and the text beside the cursor."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from ..compat import bpy
 from ..core.model.fingertip import Fingertip
 from ..device import view
-from ..live import waiting
-from ..live.stroke import Brush
+from ..live import beds
+from ..settings import finger_size
+from ..strokes.stroke import Brush
 from ..ui_text import localize
+
+#: Semi-axes that differ by less are the same, m.
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class FingerKind:
+    """Preset finger: name, ellipsoid, and where its measures come from."""
+
+    label: str
+    finger: Fingertip
+    source: str
+
+
+FINGERS: Mapping[str, FingerKind] = {
+    "fingertip": FingerKind("Fingertip", Fingertip(), "an index finger's tip, the device's own"),
+    "thumb": FingerKind(
+        "Thumb",
+        Fingertip(14e-3, 11.5e-3, 11e-3),
+        "23 mm broad and 22 mm thick, about the median of men's thumbs; its length is assumed",
+    ),
+    "palm": FingerKind("Palm", Fingertip(30e-3, 25e-3, 20e-3), "the heel of a hand; assumed"),
+    "stylus": FingerKind("Stylus", Fingertip(3e-3, 3e-3, 8e-3), "the rounded end of a pen; assumed"),
+    "ball": FingerKind("Ball Tool", Fingertip(6e-3, 6e-3, 6e-3), "a ball of 12 mm; assumed"),
+}
+
+
+def find_kind(finger: Fingertip) -> FingerKind | None:
+    """Return the preset finger of the same semi-axes, or None."""
+    return next((kind for kind in FINGERS.values() if _same(kind.finger, finger)), None)
+
+
+def _same(one: Fingertip, other: Fingertip) -> bool:
+    """Return whether two fingers have the same semi-axes."""
+    pairs = ((one.length, other.length), (one.width, other.width), (one.height, other.height))
+    return all(abs(a - b) < SAME for a, b in pairs)
+
 
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
@@ -53,16 +95,13 @@ def tool_settings(context: Any) -> Any | None:
 
 
 def find_bed(context: Any, uid: int) -> Any | None:
-    """Return the bed of a `session_uid` in the scene, fetched anew since undo invalidates what is kept.
-
-    `context` bpy.types.Context.
-    """
+    """Return the bed of a `session_uid`, fetched anew, since undo invalidates what is kept."""
     return next((thing for thing in context.scene.objects if thing.session_uid == uid), None)
 
 
 def bed_in_use(context: Any) -> Any | None:
     """Return the bed that the tool's settings are about: active, in a session, or the only one seen."""
-    active = waiting.active_session(context)
+    active = beds.active_session(context)
     bed = view.bed_of(context) or (active and active[0])
     if bed is not None:
         return bed
@@ -71,19 +110,13 @@ def bed_in_use(context: Any) -> Any | None:
 
 
 def choose_brush(name: str, event: Any) -> Brush:
-    """Return the brush of a stroke that begins: Shift smooths, Ctrl inverts the tool's brush.
-
-    `name`: of the tool's brush; `event` bpy.types.Event, by which the stroke begins.
-    """
+    """Return the brush of a stroke that an event begins: Shift smooths, Ctrl inverts the tool's brush."""
     brush = Brush.SMOOTH if event.shift else Brush(name)
     return brush.inverse if event.ctrl else brush
 
 
 def find_press(context: Any, event: Any) -> tuple[int, int]:
-    """Return where the mouse went down, pixels of the region; a drag is told after a move on from there.
-
-    `context` bpy.types.Context; `event` bpy.types.Event, by which the stroke begins.
-    """
+    """Return where the mouse went down, pixels of the region; a CLICK_DRAG comes from a place further on."""
     if event.value != "CLICK_DRAG":
         return event.mouse_region_x, event.mouse_region_y
     return event.mouse_prev_press_x - context.region.x, event.mouse_prev_press_y - context.region.y
@@ -95,16 +128,64 @@ def amount_name(brush: Brush) -> str:
 
 
 def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: float = 1.0) -> str:
-    """Return size, brush, and depth or height in mm, as shown beside the cursor.
-
-    `depth`: depth or height, m; `strength`: share of it.
-    """
+    """Return size, brush, and depth or height (m) times strength, as shown beside the cursor."""
     return localize("Size {:.3g} mm   {}", 2e3 * finger.width, describe_stroke(brush, depth, strength))
 
 
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
-    """Return a brush, and its depth or height in mm. `depth`: depth or height, m; `strength`: share of it."""
+    """Return a brush, and its depth or height (m) times strength, in mm."""
     if not brush.has_amount:
         return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""
     return f"{localize(LABELS[brush])}, {localize(amount_name(brush))} {1e3 * depth:.3g} mm{share}"
+
+
+#: Folder of the presets below ``presets``, here and in the user's own folder.
+SUBFOLDER = "digiclay_press"
+#: Names that the lines of a preset begin with.
+DEFINES = (
+    "wm = bpy.context.window_manager",
+    'settings = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT").operator_properties('
+    f'"{OPERATOR}")',
+)
+#: Folder with a folder ``presets``.
+HOME = str(Path(__file__).parents[1])
+
+
+def preset_values(settings: Any) -> list[str]:
+    """Return what a preset keeps: the form of the fingertip, and every setting of the tool."""
+    names = [rna.identifier for rna in settings.bl_rna.properties if rna.identifier != "rna_type"]
+    return ["wm.digiclay_finger", *(f"settings.{name}" for name in names)]
+
+
+def register() -> None:
+    """Let Blender find the presets that come along, and presets the fingertip."""
+    bpy.types.WindowManager.digiclay_finger = bpy.props.FloatVectorProperty(
+        name="Fingertip (mm)",
+        description="Length, width and height of the fingertip that the Press tool is about, in mm",
+        size=3,
+        get=lambda _: _read_finger(),
+        set=lambda _, axes: _take_finger(axes),
+    )
+    bpy.utils.register_preset_path(HOME)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    bpy.utils.unregister_preset_path(HOME)
+    del bpy.types.WindowManager.digiclay_finger
+
+
+def _read_finger() -> tuple[float, float, float]:
+    """Return the fingertip's length, width and height, mm; that of a new bed without one."""
+    bed = bed_in_use(bpy.context)
+    finger = Fingertip() if bed is None else finger_size.read_finger(bed.digiclay)
+    return 2e3 * finger.length, 2e3 * finger.width, 2e3 * finger.height
+
+
+def _take_finger(axes: Any) -> None:
+    """Give the fingertip a length, width and height, mm."""
+    bed = bed_in_use(bpy.context)
+    if bed is not None and bed.library is None:
+        length, width, height = (round(5e-4 * float(axis), 9) for axis in axes)
+        finger_size.resize(bed.digiclay, Fingertip(length, width, height))

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.base.arrays import Floats
 from ..core.model.layout import Grid
-
-Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 #: Standard deviation of the weights, and how far they reach, in pitches.
 SPREAD, REACH = 1.0, 3
 
 
 def drape(cells: Grid, height: Floats, places: Floats) -> Floats:
-    """Return places in plan with the smoothed height of the pins there, (k, 3), m.
-
-    The height is the mean of the pins about a place, with normal weights. Beyond the edge it is that of the
-    outermost pins.
-
-    `height` (n,), heights of the pins, m; `places` (k, 2), m.
-    """
+    """Return places (k, 2) with the mean height of the pins about each, (k, 3), m, weighted normally."""
     plan = cells.layout
     row, column = np.divmod(cells.at(places[:, 0], places[:, 1]), plan.columns)
     step = np.arange(-REACH, REACH + 1)

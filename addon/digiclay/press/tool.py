@@ -1,7 +1,8 @@
-"""Press tool in the 3D view's toolbar, and its patch under the mouse."""
+"""Press tool in the 3D view's toolbar: its header, and its patch under the mouse."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,42 +10,101 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
+from ..core.base.arrays import Floats
+from ..core.base.modes import COLORS, Mode
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid, Layout
 from ..core.surface.pointing import find_contact_outline
 from ..device import view
 from ..device.instant import find_ellipsoid
-from ..live import running
-from ..live.stroke import SYMMETRIES, Brush
-from ..live.sweep import find_radius
+from ..overlay.picture import Color, Line, Words
+from ..sessions import running
+from ..settings import finger_size
+from ..strokes.stroke import SYMMETRIES, Brush
+from ..strokes.sweep import find_radius
 from ..ui_text import localize
-from . import aim, header, marks
-from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, describe_brush
+from . import aim
+from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, bed_in_use, describe_brush, find_kind
 from .drape import drape
 
-Floats = np.ndarray[Any, np.dtype[np.float64]]
+#: A light line on a dark one is seen on everything.
+DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
+#: That of a stroke that smooths has the color of the pins that the device drives.
+SMOOTHING = COLORS[Mode.BLISTER]
+
+
+def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> list[Line]:
+    """Return light lines on dark ones along paths (k, 2), pixels; `width` is that of a thin line, pixels."""
+    return [Line(path, *look) for look in ((DARK, 4.0 * width), (color, 2.0 * width)) for path in paths]
+
+
+def make_label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
+    """Return text beside a place, pixels, light on a dark edge."""
+    x, y, size = xy[0] + 22.0 * scale, xy[1] - 26.0 * scale, 12.0 * scale
+    edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
+    return [*edge, Words(x, y, size, LIGHT, text)]
+
+
+#: Width from which on a header names brushes and popovers in full, in pixels at a resolution scale of 1.
+WIDE = 1000
+#: Widths of what it holds, in Blender's units of 20 pixels.
+BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 5.8, 6.6, 6.0
+
+
+def draw_header(context: Any, layout: Any, settings: Any) -> None:
+    """Draw the tool's settings into the header."""
+    wide = context.region.width >= WIDE * context.preferences.system.ui_scale
+    row = layout.row(align=True)
+    if wide:
+        row.prop(settings, "brush", expand=True)
+    else:
+        row.ui_units_x = BRUSH
+        row.prop(settings, "brush", text="")
+    bed = bed_in_use(context)
+    if bed is not None:
+        row = layout.row(align=True)
+        _number(row, bed.digiclay, "size", SIZE)
+        row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
+    if Brush(settings.brush).has_amount:
+        _number(layout, settings, amount_name(Brush(settings.brush)), AMOUNT)
+    _number(layout, settings, "strength", STRENGTH)
+    if bed is not None:
+        kind = find_kind(finger_size.read_finger(bed.digiclay))
+        words = (kind.label if kind else "Finger") if wide else ""
+        layout.menu("DIGICLAY_MT_fingers", text=words, icon="NONE" if wide else "VIEW_PAN")
+    layout.popover("DIGICLAY_PT_press_stroke", text="Stroke" if wide else "", icon="CURVE_BEZCURVE")
+    layout.popover("DIGICLAY_PT_press_pen", text="Pen" if wide else "", icon="STYLUS_PRESSURE")
+    if wide:
+        draw_presets(layout)
+    layout.operator("digiclay.skin_toggle", text="", icon="SURFACE_DATA")
+
+
+def draw_presets(layout: Any) -> None:
+    """Draw the menu of brush presets, and what keeps and removes one. `layout` bpy.types.UILayout."""
+    row = layout.row(align=True)
+    row.menu("DIGICLAY_MT_brushes", text=bpy.types.DIGICLAY_MT_brushes.bl_label)
+    row.operator("digiclay.press_brush_save", text="", icon="ADD")
+    row.operator("digiclay.press_brush_save", text="", icon="REMOVE").remove_active = True
+
+
+def _number(layout: Any, owner: Any, name: str, units: float) -> None:
+    """Draw a number no wider than it needs."""
+    row = layout.row(align=True)
+    row.ui_units_x = units
+    row.prop(owner, name)
 
 
 def touch_outline(
     bed: Any, cells: Grid, height: Floats, place: Floats, depth: float, kind: Brush = Brush.LOWER
 ) -> Floats:
-    """Return the rim of what a brush would form at a place, lying on the pins, (k, 3), m.
-
-    `bed` bpy.types.Object, with a fingertip; `height` (n,), heights of the pins, m; `place` (3,), where the
-    mouse points, m; `depth`: how deep the finger would be pressed, m; `kind`: the rim of Smooth is a circle,
-    that of the others where the finger would touch.
-    """
+    """Return the rim of what a brush would form at a place, lying on the pins, (k, 3), m."""
     tip = view.fingertip_of(bed)
     outline = find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, kind, cells.layout)
     return drape(cells, height, place[:2] + outline)
 
 
 def find_outline(finger: Fingertip, turn: Floats, depth: float, kind: Brush, layout: Layout) -> Floats:
-    """Return the rim of what a brush would form about the origin, (k, 2), m.
-
-    `turn` (4,), its orientation, quaternion w, x, y, z; `depth`: how deep it would be pressed, m; `layout`:
-    of the bed.
-    """
+    """Return the rim of what a brush would form about the origin at a depth, m, (k, 2), m."""
     if kind is Brush.SMOOTH:
         radius = find_radius(finger, layout)
         return find_contact_outline(Fingertip(radius, radius, radius), turn, radius)
@@ -63,7 +123,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     found, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y))
     if hider is not None:
         words = localize("{} hides the bed", hider.name)
-        cursor([], marks.make_label(words, xy, context.preferences.system.ui_scale))
+        cursor([], make_label(words, xy, context.preferences.system.ui_scale))
         return
     if found is None or view.fingertip_of(found.bed) is None:
         return
@@ -75,14 +135,14 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     ]
     drawn = [*(np.concatenate([rim, rim[:1]]) for rim in rims), *_trail(found)]
     corner = np.array([region.x, region.y])
-    lines = [corner + aim.project(context, found.bed, points) for points in drawn]
+    lines = [corner + bridge.project(context, found.bed, points) for points in drawn]
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
     amount = 1e-3 * getattr(settings, amount_name(kind))
     text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), kind, amount, settings.strength)
-    color = marks.SMOOTHING if kind is Brush.SMOOTH else marks.LIGHT
-    label = marks.make_label(text, xy, context.preferences.system.ui_scale)
-    cursor(marks.make_lines(shown, width, color), label)
+    color = SMOOTHING if kind is Brush.SMOOTH else LIGHT
+    label = make_label(text, xy, context.preferences.system.ui_scale)
+    cursor(make_lines(shown, width, color), label)
 
 
 def _shown_brush(bed: Any, settings: Any) -> Brush:
@@ -144,11 +204,8 @@ class PressTool(bpy.types.WorkSpaceTool):
 
     @staticmethod
     def draw_settings(context: Any, layout: Any, tool: Any) -> None:
-        """Draw the tool's settings into the header.
-
-        `context` bpy.types.Context; `layout` bpy.types.UILayout; `tool` bpy.types.WorkSpaceTool.
-        """
-        header.draw_header(context, layout, tool.operator_properties(OPERATOR))
+        """Draw the tool's settings into the header."""
+        draw_header(context, layout, tool.operator_properties(OPERATOR))
 
 
 def register() -> None:

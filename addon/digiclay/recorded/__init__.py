@@ -1,1 +1,1 @@
-"""Takes and bakes."""
+"""Takes, bakes, and recorded strokes."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import bridge
+from ..bridge import ATTRIBUTES
 from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_setting
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
@@ -21,8 +22,72 @@ from ..core.session.live_session import simulate_path
 from ..core.session.take import Take
 from ..device import view
 from ..device.instant import pick_pose
+from ..device.nodes import attribute, node, number, socket
 from ..roles import BAKE
-from .bake_tree import MOMENT, playback_nodes
+
+#: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
+MOMENT = "Moment"
+
+
+def playback_nodes(bake: Any, moments: int) -> Any:
+    """Make the node group that moves the pins of a bed to where object `bake` has them at a moment."""
+    tree = bpy.data.node_groups.new("Digital Clay Bake", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    socket(tree, MOMENT, "NodeSocketFloat", 0.0, "Which baked moment to show, counted from 0")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    settings, result = node(tree, "NodeGroupInput", 0, 0), node(tree, "NodeGroupOutput", 10, 0)
+    source = node(tree, "GeometryNodeObjectInfo", 2, -2)
+    source.inputs["Object"].default_value = bake
+    table = source.outputs["Geometry"]
+
+    least = number(tree, "MAXIMUM", 1, 1, settings.outputs[MOMENT], 0.0)
+    moment = number(tree, "MINIMUM", 2, 1, least, float(moments - 1))
+    before, after = number(tree, "FLOOR", 3, 1, moment), number(tree, "CEIL", 3, 2, moment)
+    part = number(tree, "SUBTRACT", 4, 4, moment, before)
+    size = node(tree, "GeometryNodeAttributeDomainSize", 1, 3)
+    tree.links.new(settings.outputs["Geometry"], size.inputs["Geometry"])
+    count, pin = size.outputs["Point Count"], node(tree, "GeometryNodeInputIndex", 4, 3).outputs["Index"]
+    first = number(tree, "MULTIPLY_ADD", 5, 1, before, count, pin)
+    second = number(tree, "MULTIPLY_ADD", 5, 2, after, count, pin)
+
+    place = node(tree, "GeometryNodeInputPosition", 5, -1).outputs["Position"]
+    blend = node(tree, "ShaderNodeMix", 8, 1)
+    blend.data_type = "VECTOR"
+    tree.links.new(part, blend.inputs["Factor"])
+    for end, index, row in (("A", first, 0), ("B", second, 1)):
+        sampled = _sample(tree, table, place, "FLOAT_VECTOR", index, row)
+        tree.links.new(sampled, _enabled_socket(blend.inputs, end))
+    moved = node(tree, "GeometryNodeSetPosition", 9, 0)
+    tree.links.new(settings.outputs["Geometry"], moved.inputs["Geometry"])
+    tree.links.new(_enabled_socket(blend.outputs, "Result"), moved.inputs["Position"])
+
+    shown = moved.outputs["Geometry"]
+    for row, (name, (kind, _, _)) in enumerate(ATTRIBUTES.items(), 3):
+        stored = node(tree, "GeometryNodeStoreNamedAttribute", 9, row)
+        stored.data_type, stored.domain = kind, "POINT"
+        stored.inputs["Name"].default_value = name
+        value = attribute(tree, name, kind, 6, row)
+        tree.links.new(_sample(tree, table, value, kind, first, row), _enabled_socket(stored.inputs, "Value"))
+        tree.links.new(shown, stored.inputs["Geometry"])
+        shown = stored.outputs["Geometry"]
+    tree.links.new(shown, result.inputs["Geometry"])
+    return tree
+
+
+def _sample(tree: Any, table: Any, value: Any, kind: str, index: Any, row: float) -> Any:
+    """Add the node that reads a value of the bake's vertices at a place among them."""
+    sample = node(tree, "GeometryNodeSampleIndex", 7, row)
+    sample.data_type, sample.domain = kind, "POINT"
+    tree.links.new(table, sample.inputs["Geometry"])
+    tree.links.new(value, _enabled_socket(sample.inputs, "Value"))
+    tree.links.new(index, sample.inputs["Index"])
+    return _enabled_socket(sample.outputs, "Value")
+
+
+def _enabled_socket(sockets: Any, name: str) -> Any:
+    """Return the socket of a name that is in use: nodes have one for each type, all of the same name."""
+    return next(one for one in sockets if one.name == name and one.enabled)
+
 
 #: Name of the modifier.
 MODIFIER = "Baked session"
@@ -32,44 +97,29 @@ MOST_FRAMES = 216_000
 
 @dataclass(frozen=True, eq=False)
 class BakedFrames:
-    """Content of a bake, a row a frame.
+    """Content of a bake, a row a frame."""
 
-    Attributes
-    ----------
-    position : ndarray (n, 2)
-        Axes of the pins, m.
-    height : ndarray (t, n)
-        m.
-    mode : ndarray (t, n) of int8
-    force : ndarray (t, n)
-        N.
-    pose : ndarray (t, f, 7)
-        Of the fingertip.
-    """
-
+    #: (n, 2), axes of the pins, m.
     position: Floats
+    #: (t, n), m.
     height: NDArray[np.float32]
+    #: (t, n).
     mode: NDArray[np.int8]
+    #: (t, n), N.
     force: NDArray[np.float32]
+    #: (t, f, 7), of the fingertip.
     pose: Floats
 
 
 def frame_periods(take: Take, rate: float) -> NDArray[np.intp]:
-    """Return the control period, 0 to t, that each frame of a take shows: the nearest one.
-
-    `rate`: frames a second.
-    """
+    """Return the control period, 0 to t, that each frame of a take shows at a rate, 1/s: the nearest one."""
     period = take.scene.simulation.control_period
     count = int(np.floor(take.duration * rate + 1e-6)) + 1
     return np.asarray(np.minimum(np.rint(np.arange(count) / (rate * period)), take.periods), np.intp)
 
 
 def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
-    """Simulate a take and keep what each frame shows.
-
-    `rate`: frames a second. Yields the share that is done, after each control period; last of all the
-    `BakedFrames`.
-    """
+    """Simulate a take; yield the share done after each control period, and at last the `BakedFrames`."""
     wanted = frame_periods(take, rate)
     system = assemble(take.scene)
     count = system.grid.count
@@ -87,11 +137,7 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
 
 
 def apply(bed: Any, moments: BakedFrames, first: int, finger: Fingertip, *, keyframe_finger: bool) -> None:
-    """Give a bed a bake, in place of an older one.
-
-    `bed` bpy.types.Object; `first`: frame of the first moment; `keyframe_finger`: whether the fingertip gets
-    keyframes as well, in place of those it has.
-    """
+    """Give a bed a bake from a frame on, in place of an older one, and the fingertip keyframes if asked."""
     free(bed)
     count = len(moments.height)
     modifier = bed.modifiers.new(MODIFIER, "NODES")
@@ -144,13 +190,7 @@ def free(bed: Any) -> bool:
 
 
 def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
-    """Read the path of an animated fingertip, frame by frame and in between.
-
-    `scene` bpy.types.Scene, its current frame is put back in the end; `bed` bpy.types.Object; `first`,
-    `last`: frames; `period`: control period, s: a pose is read at the end of each. Yields the share that is
-    done, after each pose; last of all the poses (t + 1, 1, 7). Raises DigiclayError when the range has no
-    frame, or more than an hour of them, or the bed has no fingertip.
-    """
+    """Read the path of an animated fingertip; yield the share done after each pose, at last the poses."""
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
@@ -182,11 +222,9 @@ def _modifier(bed: Any) -> Any | None:
 
 def _source(tree: Any) -> Any | None:
     """Return the object that holds the baked pins a tree plays, or None when it plays none."""
-    for node in tree.nodes:
-        held = node.inputs["Object"].default_value if node.bl_idname == "GeometryNodeObjectInfo" else None
-        if held is not None and held.get(view.ROLE) == BAKE:
-            return held
-    return None
+    infos = [item for item in tree.nodes if item.bl_idname == "GeometryNodeObjectInfo"]
+    sources = (info.inputs["Object"].default_value for info in infos)
+    return next((source for source in sources if source is not None and source.get(view.ROLE) == BAKE), None)
 
 
 def _curves(bed: Any) -> Iterator[tuple[Any, Any]]:

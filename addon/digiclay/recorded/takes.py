@@ -15,7 +15,7 @@ from ..core.scene.schema import Scene
 from ..core.session import snapshot
 from ..core.session.live_session import simulate_path
 from ..core.session.take import Take, from_bytes, make_take, to_bytes
-from ..live.running import Running
+from ..sessions.running import Running
 from ..ui_text import localize
 
 #: The bed's property that holds them, by number.
@@ -27,17 +27,11 @@ START = np.zeros(1)
 
 
 class Entry(NamedTuple):
-    """Row in the list of takes.
+    """Row in the list of takes."""
 
-    Attributes
-    ----------
-    number : str
-        Its name in the property; never used twice in one bed.
-    name : str
-        The user's.
-    """
-
+    #: Its name in the property; never used twice in one bed.
     number: str
+    #: The user's.
     name: str
     seconds: float
 
@@ -50,11 +44,7 @@ def list_takes(bed: Any) -> list[Entry]:
 
 
 def find(bed: Any, number: str = "") -> Entry:
-    """Return what a list shows of one take of a bed.
-
-    `bed` bpy.types.Object; `number`: the last one when left out. Raises DigiclayError when the bed has none,
-    or none of that number.
-    """
+    """Return the row of one take of a bed, by default the last; raise DigiclayError where there is none."""
     known = list_takes(bed)
     if not known and not number:
         raise DigiclayError(f"{bed.name} has no take: record one in a session first.")
@@ -82,10 +72,7 @@ def add(bed: Any, take: Take, name: str = "") -> Entry:
 
 
 def keep_recording(bed: Any, session: Running) -> str:
-    """Keep what a session has recorded before its recording ends; return words about it, empty without.
-
-    `bed` bpy.types.Object.
-    """
+    """Keep what a session has recorded before its recording ends; return words about it, empty without."""
     take = read_recording(session)
     if take is None:
         return ""
@@ -94,29 +81,19 @@ def keep_recording(bed: Any, session: Running) -> str:
 
 
 def read(bed: Any, number: str = "") -> Take:
-    """Return a take of a bed; see `find`.
-
-    `bed` bpy.types.Object; `number`: as `find` takes it. Raises DigiclayError when there is no such take, or
-    it is damaged.
-    """
+    """Return a take of a bed, by default the last; raise DigiclayError if it is missing or damaged."""
     number = find(bed, number).number  # first: a bed without takes has no such property
     return from_bytes(bytes(bed[PROPERTY][number]["data"]))
 
 
 def remove(bed: Any, number: str) -> None:
-    """Take a take away for good.
-
-    `bed` bpy.types.Object. Raises DigiclayError when there is none of that number.
-    """
+    """Remove a take of a bed; raise DigiclayError where there is none of that number."""
     number = find(bed, number).number
     del bed[PROPERTY][number]
 
 
 def simulate(scene: Scene) -> Take | None:
-    """Return the session of a scene, from rest to its end; None when that would take too long.
-
-    The finger goes straight from control period to control period, as every take's does.
-    """
+    """Return the session of a scene, from rest to its end; None when that would take too long."""
     if scene.cells * scene.periods > MOST:
         return None
     system = assemble(scene)

@@ -12,7 +12,8 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
 from digiclay.device import view
-from digiclay.live import bed_state, handlers, running, tick
+from digiclay.live import bed_state, handlers, tick
+from digiclay.sessions import running
 from digiclay.settings import properties
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.

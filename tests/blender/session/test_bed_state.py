@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.core.session import snapshot
-from digiclay.live import bed_state, handlers, running, sculpting, tick
+from digiclay.live import bed_state, handlers, tick
+from digiclay.sessions import running, sculpting
 
 from tests.blender.session.live import (
     FLOAT32,

@@ -15,8 +15,9 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.device import view
-from digiclay.live import follow, running
+from digiclay.live import follow
 from digiclay.live.follow import pack_subscription, parse_address, read_pose
+from digiclay.sessions import running
 
 from tests.blender.session.live import FLOAT32, TICK, Clock, exact, started
 from tests.timeouts import TIMEOUT

@@ -10,7 +10,8 @@ import pytest
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.session import snapshot
 from digiclay.device import view
-from digiclay.live import bed_state, running, sculpting
+from digiclay.live import bed_state
+from digiclay.sessions import running, sculpting
 
 from tests.blender.session.live import (
     FLOAT32,

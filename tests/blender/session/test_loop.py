@@ -6,22 +6,23 @@ from types import SimpleNamespace
 from typing import Any
 
 import bpy
-from digiclay.live import running
+from digiclay.live import tick
 from digiclay.operators.session_loop import LoopMixin
+from digiclay.sessions import running
 
 from tests.blender.session.live import started
 
 
-def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed: Any) -> None:
+def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed: Any, monkeypatch: Any) -> None:
     class Drive(LoopMixin):
         token, newer, report = 0, frozenset(), staticmethod(lambda level, words: said.append(words))
 
     said: list[str] = []
     started(bed)
-    # There is no loop that could be due.
+    monkeypatch.setattr(tick, "tick", lambda context, now: {}["now"])
     assert Drive().modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
     assert running.list_sessions() == ()
-    assert said == ["Fault of the extension: KeyError: 'ticked'"]
+    assert said == ["Fault of the extension: KeyError: 'now'"]
     assert running.last_message() == f"The session of Digital Clay ended: {said[0]}"
 
 

@@ -10,7 +10,8 @@ import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.device import view
-from digiclay.live import running, tick
+from digiclay.live import tick
+from digiclay.sessions import running
 
 from tests.blender.session.live import (
     FLOAT32,

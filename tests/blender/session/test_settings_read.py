@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, import_parameters
-from digiclay.live import handlers, running
+from digiclay.live import handlers
+from digiclay.sessions import running
 from digiclay.settings import properties
 
 from tests.blender.session.live import TICK, Clock, move, started, undone, waits

@@ -9,8 +9,9 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay.device import view
-from digiclay.live import bed_state, handlers, running, tick
-from digiclay.live.stroke_queue import queue_stroke
+from digiclay.live import bed_state, handlers, tick
+from digiclay.sessions import running
+from digiclay.sessions.stroke_queue import queue_stroke
 
 from tests.blender.session.live import FLOAT32, Clock, goes_on, press, shown, started, waits
 

@@ -18,8 +18,8 @@ from ..core.control.blister import Blister
 from ..core.control.smoothing import ORDER
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid, Layout
+from .motion import CLEARANCE, DRAG, LIFT, SEARCH, cross, drag, finish_image, run_clock
 from .stroke import ABOVE, DONE, DRAGGING, LEAVING, SETTLING, Brush, Stroke
-from .stroke_motion import CLEARANCE, DRAG, LIFT, SEARCH, cross, drag, finish_image, run_clock
 
 #: Least radius of the disc that is smoothed, in pitches: below one a pin has no neighbor in it.
 LEAST = 2.0
@@ -36,15 +36,7 @@ def sweep(
     stroke: Stroke, height: Floats, radius: float, pose: Floats, count: int, period: float, now: float,
     *, arrived: bool,
 ) -> tuple[Stroke, Floats, Floats]:  # fmt: skip
-    """Advance the fingertip over a press stroke that smooths.
-
-    `stroke`: not done yet; `height` (n,), how high the pins are now, or are commanded to, m: the finger stays
-    above; `radius`: of the disc that is smoothed, m; `pose` (7,), where the finger is; `count`: most control
-    periods to go on for; `period`: control period, s; `now`: time by the wall, s, by a clock that never goes
-    back; `arrived`: whether all smoothed pins are at their heights now. Returns `stroke`; `path` (k + 1, 7),
-    poses between the periods, row 0 where the finger was; k is at most `count`; `orders` (k, 4), what is
-    smoothed in each of the periods, see `core.control.smoothing`.
-    """
+    """Advance the fingertip over a press stroke that smooths; return path (k + 1, 7) and orders (k, 4)."""
     if stroke.height is None:
         stroke = replace(stroke, height=height.copy(), phase=ABOVE)
     safe = float(height.max()) + CLEARANCE
@@ -101,14 +93,7 @@ def settle(
     stroke: Stroke, grid: Grid, target: Floats, finger: Fingertip, blister: Blister, pose: Floats, count: int,
     period: float, *, arrived: bool,
 ) -> tuple[Stroke, Floats, Floats]:  # fmt: skip
-    """Settle the worst spike for a stretch of time; without one, wait until the pins have arrived.
-
-    `stroke`: in the phase SETTLING; `target` (n,), heights that the pins are commanded to, m; `pose` (7,),
-    where the finger is, and stays; `count`: most control periods to go on for; `period`: control period, s;
-    `arrived`: whether no pin is on its way to a height. Returns `stroke`; `path` (k + 1, 7), poses between
-    the periods; k is at most `count`; `orders` (k, 4), what is smoothed in each of the periods, see
-    `core.control.smoothing`.
-    """
+    """Settle the worst spike for a while, or wait until the pins have arrived; returns as `sweep`."""
     gone = stroke.clock - stroke.left
     if gone < 0.0:
         # The device still looks for the finger, and takes back what rises meanwhile.
@@ -128,10 +113,7 @@ def settle(
 
 
 def find_spike(stroke: Stroke, grid: Grid, target: Floats, finger: Fingertip, blister: Blister) -> int | None:
-    """Return the worst spike that a stroke has left; None when there is none.
-
-    `target` (n,), heights that the pins are commanded to, m.
-    """
+    """Return the worst spike that a stroke has left in heights `target` (n,), m; None when there is none."""
     assert stroke.height is not None
     excess, limit = measure_excess_heights(grid, target), LIMIT * grid.layout.pitch
     cells = np.flatnonzero(np.abs(excess) > limit)
@@ -150,10 +132,7 @@ def find_spike(stroke: Stroke, grid: Grid, target: Floats, finger: Fingertip, bl
 
 
 def measure_excess_heights(grid: Grid, height: Floats) -> Floats:
-    """Return how far each pin is above all its neighbors, (n,), m; negative below all of them, else 0.
-
-    `grid`: a pin of an aligned bed has eight neighbors, one of a bed with shifted rows six; `height` (n,), m.
-    """
+    """Return how far each pin is above all neighbors, (n,), m; negative below all of them, else 0."""
     one = np.asarray(height)
     beside = np.append(one, np.nan)[grid.layout.find_neighbors(corners=True)]
     highest, lowest = np.fmax.reduce(beside, axis=1), np.fmin.reduce(beside, axis=1)
@@ -164,10 +143,7 @@ def measure_excess_heights(grid: Grid, height: Floats) -> Floats:
 
 
 def _find_form(stroke: Stroke, grid: Grid, finger: Fingertip, blister: Blister) -> float:
-    """Return how far the lowest or highest pin of a stroke's own section is off those beside it, m.
-
-    A valley has the finger's underside, and a ridge the blister's profile.
-    """
+    """Return how far the extreme pin of a stroke's own section is off those beside it, m."""
     part = grid.layout.pitch / finger.width
     if stroke.brush is Brush.LOWER:
         return finger.height * (1.0 - math.sqrt(1.0 - part * part)) if part < 1.0 else math.inf

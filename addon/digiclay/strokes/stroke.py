@@ -59,89 +59,59 @@ class Brush(Enum):
 
 @dataclass(frozen=True)
 class Sample:
-    """Point of a press stroke.
+    """Point of a press stroke."""
 
-    Attributes
-    ----------
-    time : float
-        Since the mouse went down, s.
-    x, y : float
-        Place on the bed, m.
-    depth : float
-        How far below the surface, or above it where it is raised, m.
-    share : float
-        Share of the way from the surface to the level, or strength of the smoothing, from 0 to 1.
-    lean : (float, float)
-        How far the finger leans towards x and y of the bed, rad; see `stroke_motion.lean_finger`.
-    """
-
+    #: Since the mouse went down, s.
     time: float
+    #: Place on the bed, m.
     x: float
     y: float
+    #: How far below the surface, or above it where it is raised, m.
     depth: float
+    #: Share of the way from the surface to the level, or strength of the smoothing, from 0 to 1.
     share: float = 1.0
+    #: How far the finger leans towards x and y of the bed, rad; see `stroke_motion.lean_finger`.
     lean: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """Press stroke, and the progress of the fingertip along it.
+    """Press stroke, and the progress of the fingertip along it."""
 
-    Attributes
-    ----------
-    number : int
-        Tells the strokes of a session apart.
-    samples : tuple of Sample
-        The path, at least one place, in the order of time.
-    held : bool
-        Whether the hand still draws.
-    phase : int
-        What the finger does.
-    reached : int
-        Index of the sample the finger is at, or past.
-    clock : float
-        Time since the finger came above the path's first place, s: simulated, or by the wall less `LATE`.
-    began : float
-        When it came there, by the wall, s.
-    height : ndarray (n,) or None
-        Heights of the pins when the finger began, m; None before.
-    mirrors : tuple of (float, float)
-        Factors of x and y: the path itself, then its mirror images.
-    image : int
-        Index of the one that the finger is at.
-    known : float
-        Up to when every move has come, s; what was drawn since may still wait in Blender's queue.
-    heard : float
-        When the last sample came, s.
-    burst : int
-        Index of the first sample that came together with the last one.
-    tracking : Tracking or None
-        How the blister follows, of a brush that needs one; found when the finger begins.
-    climb : float
-        How fast the finger rises with the blister, m/s.
-    left : float
-        When a finger that smooths, or waits, came to the end of the path, s of `clock`.
-    turn : ndarray (4,) or None
-        Orientation of the finger when it began, which it has again when it is done; None before.
-    """
-
+    #: Tells the strokes of a session apart.
     number: int
+    #: The path, at least one place, in the order of time.
     samples: tuple[Sample, ...]
+    #: Whether the hand still draws.
     held: bool = True
+    #: What the finger does.
     phase: int = WAITING
+    #: Index of the sample the finger is at, or past.
     reached: int = 0
+    #: Time since the finger came above the path's first place, s: simulated, or by the wall less `LATE`.
     clock: float = 0.0
+    #: When it came there, by the wall, s.
     began: float = 0.0
+    #: (n,), heights of the pins when the finger began, m; None before.
     height: Floats | None = None
+    #: Factors of x and y: the path itself, then its mirror images.
     mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
+    #: Index of the one that the finger is at.
     image: int = 0
+    #: Up to when every move has come, s; what was drawn since may still wait in Blender's queue.
     known: float = 0.0
+    #: When the last sample came, s.
     heard: float = 0.0
+    #: Index of the first sample that came together with the last one.
     burst: int = 0
     brush: Brush = Brush.LOWER
+    #: How the blister follows, of a brush that needs one; found when the finger begins.
     tracking: Tracking | None = None
+    #: How fast the finger rises with the blister, m/s.
     climb: float = 0.0
+    #: When a finger that smooths, or waits, came to the end of the path, s of `clock`.
     left: float = 0.0
+    #: (4,), orientation of the finger when it began, which it has again when it is done; None before.
     turn: Floats | None = None
 
     @property
@@ -166,10 +136,7 @@ def start(
     number: int, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
     brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
 ) -> Stroke:  # fmt: skip
-    """Return the stroke of a mouse that goes down at a place, m.
-
-    `x`, `y`, `depth`, `share`, `lean`: see `Sample`; `mirrors` (float, float), see `SYMMETRIES`.
-    """
+    """Return the stroke of a mouse that goes down at a place, m; see `Sample`."""
     first = Sample(0.0, x, y, _limit_depth(depth), share, lean)
     return Stroke(number, (first,), mirrors=mirrors, brush=brush)
 
@@ -178,11 +145,7 @@ def draw(
     stroke: Stroke, time: float, x: float, y: float, depth: float, share: float = 1.0,
     lean: tuple[float, float] = (0.0, 0.0),
 ) -> Stroke:  # fmt: skip
-    """Return the stroke drawn on to a place; nothing is added to one that is let go.
-
-    `time`: when Blender tells of the move, since the mouse went down, s; see `BURST`; `x`, `y`, `depth`,
-    `share`, `lean`: see `Sample`.
-    """
+    """Return the stroke drawn on to a place at a time of the hand, s; a released one stays as it is."""
     if not stroke.held:
         return stroke
     samples = (*stroke.samples, Sample(time, x, y, _limit_depth(depth), share, lean))
@@ -198,7 +161,7 @@ def draw(
 
 
 def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
-    """Return the stroke with another depth where it is, m, within what is possible. `time`, s; `by`, m."""
+    """Return the stroke with its depth changed where it is, m, within the limits."""
     last = stroke.samples[-1]
     return draw(stroke, time, last.x, last.y, last.depth + by, last.share, last.lean)
 
@@ -216,11 +179,7 @@ SIDE, SMALLEST_RING = 1e-3, 0.5e-3
 
 
 def pull(place: Place, mouse: Place, radius: float) -> Place:
-    """Return where a place comes that the mouse pulls behind it on a string.
-
-    `place`, `mouse` (float, float), m; `radius`: length of the string, m: while the mouse is nearer the place
-    stays.
-    """
+    """Return where a place gets that the mouse pulls on a string of a length, m."""
     away = math.hypot(mouse[0] - place[0], mouse[1] - place[1])
     if away <= radius:
         return place
@@ -229,16 +188,12 @@ def pull(place: Place, mouse: Place, radius: float) -> Place:
 
 
 def lay_line(start: Place, end: Place) -> Floats:
-    """Return the ends of a line, (2, 2), m. `start`, `end` (float, float), m."""
+    """Return the ends of a line, (2, 2), m."""
     return np.array([start, end])
 
 
 def lay_ring(center: Place, rim: Place) -> Floats:
-    """Return a closed polygon for the circle about a place through another, (k, 2), m.
-
-    `center`, `rim` (float, float), m. It begins and ends at the rim; one without a radius is its center
-    alone.
-    """
+    """Return a closed polygon (k, 2), m, for the circle about a place through another."""
     radius = math.hypot(rim[0] - center[0], rim[1] - center[1])
     if radius < SMALLEST_RING:
         return np.array([center])
@@ -249,10 +204,7 @@ def lay_ring(center: Place, rim: Place) -> Floats:
 
 
 def lay_path(stroke: Stroke, points: Sequence[Place] | Floats) -> Stroke:
-    """Return a stroke whose path is drawn already, evenly, and let go.
-
-    `stroke`: all its places are pressed like its first; `points` (float, float), m; at least one.
-    """
+    """Return a stroke with the whole path (k, 2), m, drawn evenly, and released."""
     places = np.asarray(points, np.float64).reshape(-1, 2)
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     times = np.concatenate([[0.0], np.cumsum(steps)]) / EVEN_SPEED

@@ -9,23 +9,20 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
+from ..core.session.live_session import Moment
 from ..device.instant import find_ellipsoid
-from .running import Moment, Running
-from .stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
-from .stroke_motion import follow
-from .sweep import begin_settling, find_radius, settle, sweep
-from .tracking import find_tracking
+from ..strokes.motion import follow
+from ..strokes.stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
+from ..strokes.sweep import begin_settling, find_radius, settle, sweep
+from ..strokes.tracking import find_tracking
+from .running import Running
 
 
 def queue_stroke(
     running: Running, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
     brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Running, int]:  # fmt: skip
-    """Queue the stroke of a mouse that goes down at a place, m; return its number as well.
-
-    `x`, `y`, `depth`, `share`, `lean`: see `stroke.Sample`; `mirrors` (float, float), see
-    `stroke.SYMMETRIES`.
-    """
+    """Queue the stroke of a mouse that goes down at a place; return its number as well; see `Sample`."""
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
     return replace(
         running, strokes=(*running.strokes, start(number, x, y, depth, mirrors, brush, share, lean))
@@ -46,29 +43,20 @@ def last_place(running: Running) -> tuple[float, float] | None:
 
 
 def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:
-    """Return the session with one of its strokes changed, if it still has it.
-
-    `number`: of the stroke; `change`: returns a stroke in place of another.
-    """
+    """Return the session with one of its strokes changed, if it still has it."""
     strokes = tuple(change(one) if one.number == number else one for one in running.strokes)
     return replace(running, strokes=strokes)
 
 
 def drop_strokes(running: Running) -> Running:
-    """Return the session without what the finger has not finished; it stays there, upright."""
+    """Return the session without unfinished strokes; the fingertip stays there, upright."""
     pose, turn = running.pose, running.strokes[0].turn if running.strokes else None
     pose = pose if turn is None else np.concatenate([pose[:3], turn])
     return replace(running, strokes=(), stroke_start=None, pose=pose)
 
 
 def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | None]:
-    """Take from the first stroke where the finger goes in the next control periods.
-
-    `running`: with a stroke at least; `count`: most control periods. Returns `running`: without the stroke
-    when that ends here. Where it began is where a gesture began; `path` (k + 1, 7), poses between the
-    periods, k at most `count`; `smoothing` (k, 4), what is smoothed in each of the periods, see
-    `core.control.smoothing`; None: nothing.
-    """
+    """Return the session, and path (k + 1, 7) and smoothing orders (k, 4) of its first stroke, k <= count."""
     first = running.strokes[0]
     if first.height is None:
         begun = Moment(running.state.period, running.snapshot, running.pose)
@@ -86,7 +74,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | N
 
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Floats | None]:
-    """Advance the finger along a stroke; return it, the finger's path, and what is smoothed."""
+    """Advance the fingertip along a stroke; return it, the path, and the smoothing orders."""
     system, pose = running.system, running.pose
     finger, height = find_ellipsoid(running.scene), running.state.row(0)
     now, period = running.clock.seen or stroke.began, system.period

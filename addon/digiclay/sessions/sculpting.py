@@ -1,4 +1,4 @@
-"""Start and advance of a live session; no Blender."""
+"""Start, advance and return of a live session; no Blender."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ from ..core.session.live_session import (
     start_recording,
     update_cost,
 )
+from ..device.instant import CLEARANCE
 from ..ui_text import localize
 from .running import Running
-from .stroke_queue import take_path
+from .stroke_queue import drop_strokes, take_path
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
@@ -45,13 +46,7 @@ STILL = 2e-6
 def begin_session(
     uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, tick: int = 0
 ) -> tuple[Running, str]:
-    """Begin a session, from a kept state if there is one.
-
-    `uid`: `session_uid` of the bed; `name`: of the bed, for messages; `pose` (7,), of the fingertip: lowest
-    point, m, and quaternion; `kept`: a snapshot of `core.session.snapshot`; at rest when left out; `tick`: of
-    that snapshot. Returns `running`; `said`: what of the kept state could not be taken up, and why; empty
-    when all could. Raises DigiclayError when the scene's parts do not go together.
-    """
+    """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost."""
     system = assemble(scene)
     state, said = _load_state(system, kept)
     pose = clamp_pose(pose, system.cell.actuator.stroke)
@@ -65,7 +60,7 @@ def begin_session(
 
 
 def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
-    """Return the state to go on from, and what could not be taken up."""
+    """Return the state to continue from, and what could not be taken up."""
     if kept is None:
         return begin(system), ""
     # The state of other parts has heights at least; what has none is of no use.
@@ -81,12 +76,7 @@ def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
 def advance(
     running: Running, pose: Floats, now: float, most: int, pins: Sequence[int] | None = None
 ) -> Running:
-    """Let a session follow the finger up to now; nothing is simulated while it is paused.
-
-    `running`: used up; `pose` (7,), where the finger is, finite; `now`: the wall's time by a clock that never
-    goes back, s; `most`: most control periods to simulate; `pins`: the picked ones; those picked before when
-    left out. Raises DivergenceError: the session is used up then: `restore` takes it up again.
-    """
+    """Let a session follow the fingertip to a pose (7,) until `now`, s, monotonic; uses `running` up."""
     if pins is not None:
         running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))
     if running.paused:
@@ -103,10 +93,7 @@ def request_step(running: Running) -> Running:
 
 
 def follow_finger(running: Running, pose: Floats, count: int) -> Running:
-    """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advance`.
-
-    `pose` (7,), where the finger is; `count`: most control periods.
-    """
+    """Simulate control periods while the fingertip moves along its strokes, or else to a pose (7,)."""
     system, monitor, smoothing = running.system, running.monitor, None
     if running.strokes:
         running, path, smoothing = take_path(running, count)
@@ -137,7 +124,7 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
 
 
 def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
-    """Keep where a gesture begins: at a finger that moves after a rest, or that does not touch."""
+    """Mark where a gesture begins: when the fingertip moves after a rest, or does not touch."""
     moved = float(np.abs(pose - running.pose).max()) > STILL
     rest_time = 0.0 if moved else running.rest_time + count * running.system.period
     next_gesture = running.next_gesture
@@ -157,11 +144,7 @@ def _count_gesture(running: Running, *, smoothed: bool) -> Running:
 
 
 def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None = None) -> Running:
-    """Return the session with another state of its bed: after undo or redo, or when it diverged.
-
-    `kept`: none: the bed was at rest; `pose` (7,), the finger's at that state; `tick`: when it was that
-    state; a recording goes back to it, or ends if it did not lead there.
-    """
+    """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends."""
     state, _ = _load_state(running.system, kept)
     now = snapshot.dump(running.system, state)
     keep = running.recording
@@ -178,31 +161,62 @@ def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None
 
 
 def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
-    """Let the session go on with other parameters; see `begin_session` for what is returned and raised."""
+    """Continue the session with other parameters; returns and raises as `begin_session`."""
     if scene == running.scene:
         return running, ""
-    other, said = begin_session(
+    other, lost = begin_session(
         running.uid, running.name, scene, running.pose, running.snapshot, running.tick
     )
+    names = ["clock", "paused", "blocking_reason", "finished_strokes", "last_place"]
+    names += [] if lost else ["gestures", "strokes", "stroke_start"]
     trace = recent_trace.pick(other.trace, running.trace.pins, other.system.grid.count)
-    other = replace(
-        other,
-        clock=running.clock,
-        paused=running.paused,
-        blocking_reason=running.blocking_reason,
-        trace=trace,
-        finished_strokes=running.finished_strokes,
-        last_place=running.last_place,
-    )
-    if not said:
-        other = replace(
-            other, gestures=running.gestures, strokes=running.strokes, stroke_start=running.stroke_start
-        )
-    return other, said
+    return replace(other, trace=trace, **{name: getattr(running, name) for name in names}), lost
 
 
 def set_recording(running: Running, on: bool) -> Running:
-    """Begin to record the finger's path, or stop recording it."""
+    """Begin to record the fingertip's path, or stop recording it."""
     if not on:
         return replace(running, recording=None)
     return start_recording(running, running.snapshot, running.tick)
+
+
+def rewind(running: Running) -> Running:
+    """Take back the last gesture, or the last stroke: state and fingertip are where it began."""
+    if running.strokes:
+        return withdraw_stroke(running)
+    if not running.gestures:
+        return running
+    *earlier, last = running.gestures
+    return restore_gesture(replace(running, gestures=tuple(earlier)), last)
+
+
+def withdraw_stroke(running: Running) -> Running:
+    """Take back the last stroke: state and finger are where it began, or it never begins."""
+    *earlier, last = running.strokes
+    if last.height is None:
+        return replace(running, strokes=tuple(earlier))
+    assert running.stroke_start is not None
+    return drop_strokes(restore_gesture(running, running.stroke_start))
+
+
+def restore_gesture(running: Running, gesture: Moment) -> Running:
+    """Bring state, fingertip and recording back to where a gesture of the session began."""
+    back = restore(replace(running, recording=None), gesture.snapshot, gesture.pose)
+    keep = running.recording
+    # The gesture a reset leaves behind has periods of another count.
+    if keep is not None:
+        keep = keep.cut_at_period(gesture.period) if gesture.period == back.state.period else None
+    # A fingertip that touched there already has to move on before it makes another gesture: it would be
+    # counted at once, and hide those before it for ever.
+    next_gesture = gesture if back.next_gesture is not None else None
+    return replace(back, next_gesture=next_gesture, rest_time=REST, recording=keep)
+
+
+def reset(running: Running) -> Running:
+    """Bring the bed back to rest and lift the fingertip off it; this can be rewound like a gesture."""
+    # Before period 0, at which the first gesture after the reset may begin.
+    before = Moment(-1, running.snapshot, running.pose)
+    pose = running.pose.copy()
+    pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
+    back = restore(replace(drop_strokes(running), gestures=()), None, pose, tick=-1)
+    return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)

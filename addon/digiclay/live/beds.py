@@ -1,4 +1,4 @@
-"""Bed of a session, and the reason for which a session waits."""
+"""Beds of sessions: look-up, reason to wait, selection."""
 
 from __future__ import annotations
 
@@ -9,16 +9,32 @@ import numpy as np
 from .. import bridge
 from ..compat import bpy
 from ..device import view
+from ..sessions import running
+from ..sessions.running import TABLE, Running
 from ..ui_text import localize
-from . import running
-from .running import Running
+
+
+def deselect(bed: Any) -> None:
+    """Take a bed out of the selection of the view layer in use; it stays active."""
+    if bed.name in bpy.context.view_layer.objects and bed.select_get():
+        TABLE.selected.add(bed.session_uid)
+        bed.select_set(False)
+
+
+def select_active(uids: frozenset[int]) -> None:
+    """Select the active object again if it was until one of these sessions, and nothing else is."""
+    layer = bpy.context.view_layer
+    active = layer.objects.active if layer is not None else None
+    selected = uids & TABLE.selected
+    TABLE.selected -= uids
+    if active is None or active.session_uid not in selected:
+        return
+    if not any(thing.select_get() for thing in layer.objects):
+        active.select_set(True)
 
 
 def find_bed(uid: int, name: str) -> Any | None:
-    """Return the object of a `session_uid`, or None when it was deleted: it stands in no scene any more.
-
-    `name`: its name when last seen: looked up first.
-    """
+    """Return the object of a `session_uid`, its last name looked up first; None when it was deleted."""
     bed = bpy.data.objects.get(name)
     if bed is None or bed.session_uid != uid:
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
@@ -35,11 +51,7 @@ def _is_shown(context: Any, thing: Any) -> bool:
 
 
 def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
-    """Return the reason why the session of a bed cannot continue now, or an empty text.
-
-    `context` bpy.types.Context; `bed` bpy.types.Object; `pins`: how many the session simulates; as many as
-    there are when left out.
-    """
+    """Return why the session of a bed, of so many pins, cannot continue now, or an empty text."""
     if bpy.app.is_job_running("RENDER"):
         return localize("a render is under way")
     if not _is_shown(context, bed):
@@ -58,19 +70,16 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
     if not _is_shown(context, tip):
         return localize("its fingertip stands in no scene shown: link it to a collection to go on")
     fault = bridge.find_scale_fault(bed)
-    if fault:
-        return fault
     matrix = np.array(tip.matrix_world)
-    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+    if not fault and (not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12):
         return localize("its fingertip is scaled to nothing: clear its scale to go on")
-    return ""
+    return fault
 
 
 def active_session(context: Any) -> tuple[Any, Running] | None:
-    """Return the bed that is active, or the only one that runs, and its session; None without."""
-    bed = view.bed_of(context)
+    """Return the bed that is active, or the only one with a session, and its session; None without."""
+    bed, sessions = view.bed_of(context), running.list_sessions()
+    if bed is None and len(sessions) == 1:
+        bed = find_bed(sessions[0].uid, sessions[0].name)
     session = running.find(bed)
-    if session is None and bed is None and len(running.list_sessions()) == 1:
-        (session,) = running.list_sessions()
-        bed = find_bed(session.uid, session.name)
-    return (bed, session) if bed is not None and session is not None else None
+    return None if session is None else (bed, session)

@@ -36,40 +36,26 @@ SAMPLES, HALVINGS = 41, 40
 
 @dataclass(frozen=True)
 class Tracking:
-    """Limits within which the blister of a device follows a fingertip.
+    """Limits within which the blister of a device follows a fingertip."""
 
-    Attributes
-    ----------
-    sink : float
-        How far the finger's lowest point lies below the pins' tops while they hold its force, m.
-    press : float
-        Depth of a press that starts a blister, m.
-    speed : float
-        Speed at which pins rise without load, m/s.
-    lift : float
-        Speed at which a finger can rise with the blister under it, m/s.
-    slope : float
-        Steepest slope of the blister's profile per height, 1/m.
-    radius : float
-        Of the blister, m.
-    highest : float
-        Highest place of a pin's top, m.
-    """
-
+    #: How far the finger's lowest point lies below the pins' tops while they hold its force, m.
     sink: float
+    #: Depth of a press that starts a blister, m.
     press: float
+    #: Speed at which pins rise without load, m/s.
     speed: float
+    #: Speed at which a finger can rise with the blister under it, m/s.
     lift: float
+    #: Steepest slope of the blister's profile per height, 1/m.
     slope: float
+    #: Of the blister, m.
     radius: float
+    #: Highest place of a pin's top, m.
     highest: float
 
 
 def find_tracking(scene: Scene, system: System) -> Tracking | None:
-    """Return how the blister of a scene follows a fingertip; None where its method has no blister.
-
-    `system`: of the scene.
-    """
+    """Return how the blister of a scene follows a fingertip; None where its method has no blister."""
     control, touch, blister = scene.control, system.cell.touch, scene.blister
     if not isinstance(control, VirtualMaster | CellStates | Hybrid) or touch is None or blister is None:
         return None
@@ -106,11 +92,7 @@ def _sample_underside(finger: Fingertip, layout: Layout) -> tuple[Floats, float]
 
 
 def _find_sink(touch: Touch, gap: Floats, share: float, force: float) -> float:
-    """Return how deep a finger lies in flat pins under a force.
-
-    `gap` (k,), height of its underside over its lowest point at some places, m; `share`: how many pins each
-    of the places stands for; `force`, N.
-    """
+    """Return how deep a fingertip, its underside given by `gap` (k,), m, lies in flat pins under a force."""
     pulp = touch.pulp
     kept = float(pulp.reduced(np.array(CONTACT_TIME))) if isinstance(pulp, Relaxation) else 1.0
     low, high = 0.0, touch.fingertip.height

@@ -55,10 +55,7 @@ def run_clock(stroke: Stroke, period: float, now: float) -> Stroke:
 
 
 def cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[Stroke, Place]:
-    """Go up to a safe height, then over to the path's first place.
-
-    `place` (float, float, float), of the finger, m; `safe`, m; `period`, s.
-    """
+    """Rise to a safe height, m, then cross to the path's first place."""
     x, y, z = place
     if z < safe - NEAR:
         return stroke, (x, y, min(safe, z + LIFT * period))
@@ -70,10 +67,7 @@ def cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[Str
 
 
 def drag(stroke: Stroke, x: float, y: float, length: float) -> tuple[Stroke, float, float]:
-    """Return the stroke and the place after a length of its path, never ahead of the hand.
-
-    `x`, `y`: where the finger is, m; `length`, m.
-    """
+    """Return the stroke and its place, m, a length further along its path, never ahead of the hand."""
     reached, samples = stroke.reached, stroke.samples
     while reached + 1 < len(samples):
         last, aim = samples[reached], samples[reached + 1]
@@ -106,11 +100,7 @@ TURN = 3.0
 
 
 def lean_finger(turn: Floats, lean: tuple[float, float]) -> Floats:
-    """Return the orientation of a finger that leans over from another orientation.
-
-    `turn` (4,), unit quaternion w, x, y, z of the finger that does not lean; `lean` (float, float), how far
-    its top leans towards x and towards y of the bed, rad: the angle is the length.
-    """
+    """Return an orientation (4,) that leans from `turn` (4,) towards x and y of the bed, rad."""
     angle = math.hypot(*lean)
     if angle == 0.0:
         return turn
@@ -120,20 +110,14 @@ def lean_finger(turn: Floats, lean: tuple[float, float]) -> Floats:
 
 
 def mirror_turn(turn: Floats, mirror: Mirror) -> Floats:
-    """Return the orientation of an ellipsoid's mirror image.
-
-    `turn` (4,), unit quaternion w, x, y, z; `mirror` (float, float), factors of x and y, 1 or -1.
-    """
+    """Return the orientation (4,) of an ellipsoid's mirror image."""
     along, across = mirror
     # M R M for M = diag(along, across, 1): the axis of a rotation is mirrored the other way round.
     return np.asarray(turn * [1.0, across, along, along * across])
 
 
 def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:
-    """Return an orientation turned towards another, by an angle at most.
-
-    `turn`, `aim` (4,), unit quaternions w, x, y, z; `angle`, rad.
-    """
+    """Return an orientation (4,) turned towards another, by an angle, rad, at most."""
     dot = float(turn @ aim)
     # The two quaternions of an orientation are opposite: the nearer one is meant.
     aim = aim if dot >= 0.0 else -aim
@@ -146,11 +130,7 @@ def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:
 
 
 def advance_turn(stroke: Stroke, turn: Floats, clear: bool, period: float) -> Floats:
-    """Return the finger's orientation after a control period on a stroke, (4,).
-
-    `stroke`: begun; a finished one leaves the finger as it was before; `turn` (4,), the finger's before;
-    `clear`: whether it is above all pins, where it turns at once; `period`, s.
-    """
+    """Return the fingertip's orientation (4,) after a control period; above all pins it turns at once."""
     assert stroke.turn is not None
     if stroke.done:
         return stroke.turn
@@ -193,14 +173,7 @@ def follow(
     now: float,
     tracking: Tracking | None = None,
 ) -> tuple[Stroke, Floats]:
-    """Advance the fingertip along a press stroke.
-
-    `stroke`: not done yet; `height` (n,), heights of the pins now, m; taken for the surface by a stroke that
-    begins; `pose` (7,), where the finger is; `count`: most control periods to go on for; `period`: control
-    period, s; `now`: time by the wall, s, by a clock that never goes back; `tracking`: how the device's
-    blister follows; None without one. Taken by a stroke that begins. Returns `stroke`; `path` (k + 1, 7),
-    poses between the periods, row 0 where the finger was; k is at most `count`.
-    """
+    """Advance the fingertip along a press stroke; return the stroke and its path (k + 1, 7), k <= count."""
     if stroke.height is None:
         stroke = replace(_begin(stroke, height, tracking), turn=pose[3:])
     assert stroke.height is not None
@@ -288,10 +261,7 @@ def _track(
 
 
 def _find_lowest(stroke: Stroke, grid: Grid, x: float, y: float, radius: float) -> float:
-    """Return how low the finger is to be at a place of its path, m.
-
-    `x`, `y`, `radius`: the place, and how far about it the surface counts, m.
-    """
+    """Return how low the fingertip is to be at a place of its path, m."""
     height, sample = stroke.height, stroke.samples[stroke.reached]
     assert height is not None
     surface = find_ground_height(grid, height, x, y, radius)
@@ -318,11 +288,7 @@ def _limit_drag(stroke: Stroke, grid: Grid, place: Place) -> float:
 
 
 def _climb(z: float, climb: float, aim: float, fastest: float, period: float) -> tuple[float, float]:
-    """Return height and speed after a control period on the way to a height, m and m/s.
-
-    `z`, `climb`: height, m, and speed upwards, m/s; `aim`, m; `fastest`: m/s; it is reached in the time
-    `SPEED_UP`; `period`, s.
-    """
+    """Return height, m, and speed, m/s, after a control period on the way to height `aim`."""
     gain = fastest / SPEED_UP
     far = aim - z
     wanted = math.copysign(min(fastest, math.sqrt(2.0 * gain * abs(far))), far)
@@ -333,12 +299,8 @@ def _climb(z: float, climb: float, aim: float, fastest: float, period: float) ->
 
 
 def _find_touch(grid: Grid, height: Floats, finger: Fingertip, x: float, y: float) -> float:
-    """Return how high a finger is that comes down at a place and first touches a pin, m.
-
-    On a slope it touches the pins beside it first, several millimeters above the surface below it.
-
-    `height` (n,), m; `x`, `y`, m.
-    """
+    """Return how high a fingertip is that descends at a place and first touches a pin, m."""
+    # On a slope it touches the pins beside it first, several millimeters above the surface below it.
     cells = grid.disc(x, y, finger.width)
     square = ((grid.x[cells] - x) ** 2 + (grid.y[cells] - y) ** 2) / finger.width**2
     gap = finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))

@@ -22,12 +22,23 @@ from ..core.model.fingertip import Fingertip
 from ..core.scene.scene_source import read_table
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
+from ..sessions.running import Running
+from ..sessions.sculpting import change_scene, follow_finger
+from ..sessions.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..settings.devices import BEDS, change_finger
-from .running import Running
-from .sculpting import change_scene, follow_finger
-from .stroke import DEEPEST, SHALLOWEST, SYMMETRIES, Brush, Stroke, draw, lay_line, lay_path, lay_ring, pull
-from .stroke_queue import change_stroke, find_stroke, queue_stroke
-from .tracking import find_tracking
+from ..strokes.stroke import (
+    DEEPEST,
+    SHALLOWEST,
+    SYMMETRIES,
+    Brush,
+    Stroke,
+    draw,
+    lay_line,
+    lay_path,
+    lay_ring,
+    pull,
+)
+from ..strokes.tracking import find_tracking
 
 #: Ticks a second of the replay.
 RATE = 60.0
@@ -100,7 +111,7 @@ class Recorded:
 
 
 def read_strokes(path: Path) -> Recorded:
-    """Read a file of recorded strokes. Raises SceneError: one line: file, stroke, key, rule, value."""
+    """Read a file of recorded strokes; raise SceneError of one line: file, stroke, key, rule, value."""
     table = read_table(path)
     try:
         refuse_unknown("", table, (*TEXTS, "stroke"))
@@ -127,11 +138,7 @@ def _read_text(table: Mapping[str, Any], key: str, usual: str) -> str:
 
 
 def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterator[Running]:
-    """Play strokes in a session, as fast as the machine can; yield the session after each of them.
-
-    `running`: used up. At the end its fingertip has the size that it has now. Raises DigiclayError when a
-    brush needs a blister that the method has not, or the session diverges.
-    """
+    """Play strokes in a session, as fast as the machine can; yield the session after each of them."""
     usual = running.scene
     for number, stroke in enumerate(strokes, 1):
         running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
@@ -150,7 +157,7 @@ def _take_finger(running: Running, usual: Scene, finger: Fingertip) -> Running:
 
 
 def _play(running: Running, stroke: PointerStroke, number: int) -> Running:
-    """Draw a stroke, and let the session go on until the fingertip has finished it and the pins rest."""
+    """Draw a stroke, and continue the session until the fingertip has finished it and the pins rest."""
     (_, x, y), last = stroke.moves[0], stroke.moves[-1][0]
     running = replace(running, clock=running.clock.stopped())
     running, known = queue_stroke(

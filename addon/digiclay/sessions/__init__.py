@@ -1,0 +1,1 @@
+"""Live sessions as values, with their queues of press strokes; no Blender."""

@@ -1,0 +1,113 @@
+"""Live sessions as values, and the table of those of this Blender; no Blender in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..core.base.arrays import Floats
+from ..core.session.accuracy import ErrorMonitor, Errors
+from ..core.session.live_session import Clock, LiveSession, Moment
+from ..core.session.recent_trace import RecentTrace
+from ..strokes.stroke import Stroke
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Running(LiveSession):
+    """Live session at one instant; replaced by another value at each tick."""
+
+    #: `session_uid` of the bed, and its name for messages.
+    uid: int
+    name: str
+    #: The state by `core.session.snapshot`; also in the bed's property.
+    snapshot: bytes
+    #: Counts ticks and never decreases, not even by undo.
+    tick: int
+    clock: Clock
+    trace: RecentTrace
+    monitor: ErrorMonitor | None
+    #: Latest estimate.
+    errors: Errors | None = None
+    #: By the user.
+    paused: bool = False
+    #: Why the session waits although it is not paused; empty: it does not.
+    blocking_reason: str = ""
+    #: Ticks until the session takes up the state that undo or redo has put into the bed; 0: there is none.
+    stale: int = 0
+    #: Single control periods requested while paused.
+    steps: int = 0
+    #: The last gestures, oldest first, and the one that begins if the fingertip touches.
+    gestures: tuple[Moment, ...] = ()
+    next_gesture: Moment | None = None
+    #: How long the fingertip has not moved, s of simulated time.
+    rest_time: float = 0.0
+    #: Number of the take that holds the recording while the file is saved; empty otherwise.
+    saved_take: str = ""
+    #: Unfinished strokes of the Press tool, oldest first: the fingertip moves along these, wherever Blender
+    #: has it.
+    strokes: tuple[Stroke, ...] = ()
+    #: Where the first of them began.
+    stroke_start: Moment | None = None
+    finished_strokes: int = 0
+    #: Where the last finished stroke ended, x and y, m.
+    last_place: tuple[float, float] | None = None
+    #: Stored settings of the bed that `scene` was made of; None: unknown.
+    settings: tuple[Any, ...] | None = None
+
+    @property
+    def factor(self) -> float:
+        """Real-time factor of the last second: 1 keeps up; 0 while the session waits."""
+        return self.clock.factor
+
+    @property
+    def path(self) -> Floats | None:
+        """Recorded poses (t + 1, f, 7), row 0 the start; None when nothing is recorded."""
+        return self.recording.path if self.recording else None
+
+
+@dataclass
+class Table:
+    """Sessions of this Blender, which no file holds, and the last message about them."""
+
+    #: By the uid of the bed, in order of their start.
+    sessions: dict[int, Running] = field(default_factory=dict)
+    #: Some messages cannot be reported where they occur, such as while a file is loaded.
+    message: str = ""
+    #: Uids of the beds that the message is about; empty: those of a closed file.
+    subjects: tuple[int, ...] = ()
+    #: Uids of the beds that were selected until their sessions.
+    selected: set[int] = field(default_factory=set)
+
+
+TABLE = Table()
+
+
+def find(bed: Any) -> Running | None:
+    """Return the session of a bed's object, or None."""
+    return TABLE.sessions.get(bed.session_uid) if bed is not None else None
+
+
+def list_sessions() -> tuple[Running, ...]:
+    """Return all sessions, in the order they were started."""
+    return tuple(TABLE.sessions.values())
+
+
+def put(running: Running) -> None:
+    """Make a value the present one of its bed's session."""
+    TABLE.sessions[running.uid] = running
+
+
+def drop(uid: int) -> Running | None:
+    """Remove a session from the table; return its last value."""
+    return TABLE.sessions.pop(uid, None)
+
+
+def set_message(words: str, *uids: int) -> None:
+    """Store the last message, for the Session panels of the beds that it is about, or of all."""
+    TABLE.message, TABLE.subjects = words, uids
+
+
+def last_message(bed: Any = None) -> str:
+    """Return the last message; for a bed's panel, unless it is about others."""
+    of_bed = bed is None or not TABLE.subjects or bed.session_uid in TABLE.subjects
+    return TABLE.message if of_bed else ""
