@@ -11,10 +11,10 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
+from digiclay.core.session.live_session import Recording
 from digiclay.live import handlers
 from digiclay.recorded import takes
 from digiclay.sessions import running
-from digiclay.sessions.running import Recording
 
 from tests.blender.session.live import Clock, move, only_bed, started, undone
 
