@@ -23,8 +23,9 @@ from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
-from digiclay.core.studies.method_trials import PHASES, Trial, place_trial
 from digiclay.core.studies.speed_limits import place_way
+
+from digiclay_study.method_trials import PHASES, Trial, place_trial
 
 from .report import Report, Steps
 

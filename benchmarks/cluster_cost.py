@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from digiclay.commands.cluster import Cluster, open_cluster
-from digiclay.commands.cluster_task import evaluate_on_worker
-from digiclay.commands.executors import finish
+from digiclay.commands.cluster import Cluster, evaluate_on_worker, open_cluster
+from digiclay.commands.evaluator import finish
 from digiclay.commands.progress import table
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis

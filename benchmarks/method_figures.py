@@ -17,11 +17,21 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.evaluation import Record
-from digiclay.core.studies.method_trials import GROUPS, LIMITS, Trial, list_trials, measure_trial, place_trial
+from digiclay.core.studies.axes import Record
 from digiclay.core.studies.speed_limits import Drag, place_way
-from digiclay.core.studies.trial_paths import drag_row, lift_off, with_path
 from digiclay.plots.figure import empty
+
+from digiclay_study.method_trials import (
+    GROUPS,
+    LIMITS,
+    Trial,
+    drag_row,
+    lift_off,
+    list_trials,
+    measure_trial,
+    place_trial,
+    with_path,
+)
 
 from .ablation import run_controller
 from .report import BLUE, RED, STYLE, Report, Steps

@@ -9,10 +9,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
-from digiclay.commands.machine import describe_machine
 from digiclay.commands.progress import Line, draw_share
 from digiclay.core.base.errors import OutputError
 from digiclay.plots.figure import save
+
+from digiclay_study.suite_page import describe_machine
 
 Item = TypeVar("Item")
 

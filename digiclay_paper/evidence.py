@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from digiclay.core.studies.method_trials import find_free_speed
-from digiclay.core.studies.speed_limits import Criterion, Follows
+from digiclay.core.studies.speed_limits import Criterion, Follows, find_free_speed
 
 from . import scenes
 from .relief_sections import LIMITS, Section, blister_section, sections

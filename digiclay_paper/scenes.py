@@ -11,7 +11,7 @@ import numpy as np
 from digiclay.core.model.trajectory import Path
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.studies.method_trials import find_free_speed
+from digiclay.core.studies.speed_limits import find_free_speed
 
 METHODS = ("virtual_master", "cell_states")
 #: The method that the paper asks for in its conclusion, and all that figures compare.

@@ -25,8 +25,15 @@ from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result, run, select_rows
-from digiclay.core.studies.method_trials import find_free_speed, find_unintended_losses
-from digiclay.core.studies.speed_limits import Drag, Follows, Lift, find_largest_speed, track
+from digiclay.core.studies.speed_limits import (
+    Drag,
+    Follows,
+    Lift,
+    find_free_speed,
+    find_largest_speed,
+    find_unintended_losses,
+    track,
+)
 
 from . import scenes
 from .results import (

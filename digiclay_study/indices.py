@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
+from digiclay.core.base.errors import OutputError
+from digiclay.core.studies.axes import Record
+from digiclay.core.studies.evaluation import FIGURES
 
 
 def describe_problem(parameters: int) -> dict[str, Any]:
@@ -17,10 +21,7 @@ def describe_problem(parameters: int) -> dict[str, Any]:
 
 
 def count_points(samples: int, parameters: int, *, second: bool) -> int:
-    """Return how many points a design has.
-
-    `samples`: of the Sobol sequence; `second`: whether second-order indices are computed.
-    """
+    """Return how many points a design has."""
     return samples * (2 * parameters + 2 if second else parameters + 2)
 
 
@@ -29,9 +30,6 @@ def sample_shares(samples: int, parameters: int, seed: int, *, second: bool) -> 
 
     Each sample gives a block of points: A, A with one parameter of B each, for the second order B with one
     parameter of A each, and B. A and B are halves of a scrambled Sobol point.
-
-    `samples`: a power of two, for the balance of the Sobol sequence; `seed`: of the scrambling, at least 1;
-    `second`: whether second-order indices are computed. Returns (points, parameters), in [0, 1).
     """
     from SALib.sample import sobol
 
@@ -68,12 +66,7 @@ class Indices:
 
 
 def compute_indices(values: Floats, parameters: int, seed: int, *, second: bool) -> Indices | None:
-    """Return the Sobol indices of an output at the points of `indices.sample_shares`.
-
-    `values` (points,), in the order of the points; finite; `seed`: of the bootstrap, at least 1: SALib takes
-    0 for none; `second`: as at the sampling. Returns none for an output that does not vary, or varies by
-    rounding alone: its variance has no shares.
-    """
+    """Return the Sobol indices of an output at the points of `indices.sample_shares`."""
     from SALib.analyze import sobol
 
     if not np.ptp(values) > 1e-9 * np.max(np.abs(values)):
@@ -87,3 +80,68 @@ def compute_indices(values: Floats, parameters: int, seed: int, *, second: bool)
         found["S1"], found["S1_conf"], found["ST"], found["ST_conf"],
         found["S2"] if second else none, found["S2_conf"] if second else none,
     )  # fmt: skip
+
+
+#: The metric by which a run loses the fingertip, and how far it may exceed that of the unchanged scene, which
+#: may lift the fingertip on purpose.
+LOSS, ALLOWED = "contact_loss_share", 0.05
+#: Metrics of the contact itself: a loss is a value of theirs.
+CONTACT = (LOSS, "contact_share")
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """An output at the points of a study.
+
+    Attributes
+    ----------
+    name : str
+        A key of `evaluation.FIGURES`.
+    values : ndarray (points,)
+        SI; finite.
+    absent : int
+        How many runs failed, or have no such value.
+    lost : int
+        How many others lost the fingertip.
+    """
+
+    name: str
+    values: Floats
+    absent: int
+    lost: int
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+        return FIGURES[self.name].unit
+
+
+def find_excess_losses(records: Sequence[Record], reference: Record) -> Floats:
+    """Return by how much the loss of contact of each run exceeds what is allowed, shape (points,)."""
+    usual = reference["figures"].get(LOSS) or 0.0
+    shares = np.array([get_figure(record, LOSS) for record in records])
+    return shares - usual - ALLOWED
+
+
+def make_response(name: str, records: Sequence[Record], excess: Floats) -> Response:
+    """Return an output of all runs; those without it, or that lost the fingertip, have the others' largest.
+
+    Left out they would leave holes in the design of a study; at their own values runs that touch for a moment
+    only would count as good.
+    """
+    values = np.array([get_figure(record, name) for record in records])
+    absent = np.isnan(values)
+    lost = (excess > 0.0) & ~absent & (name not in CONTACT)
+    replaced = absent | lost
+    if replaced.all():
+        first = next((record["error"] for record in records if "error" in record), "")
+        why = f"; the first error: {first}" if first else "."
+        raise OutputError(f"No run that keeps the fingertip has the metric {name}{why}")
+    values[replaced] = values[~replaced].max()
+    return Response(name, values, int(absent.sum()), int(lost.sum()))
+
+
+def get_figure(record: Record, name: str) -> float:
+    """Return a figure of a record; NaN where there is none."""
+    value = record.get("figures", {}).get(name)
+    return np.nan if value is None else float(value)

@@ -1,39 +1,53 @@
-"""``digiclay study``: Sobol indices of a scene's metrics over ranges of its parameters."""
+"""``digiclay study``: Sobol indices of a scene's metrics over ranges of its parameters, and their page."""
 
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from digiclay import __version__
 from digiclay.commands.arguments import add_command
+from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.extras import format_command
-from digiclay.commands.progress import Counted, format_duration
-from digiclay.commands.stop import STOPPED, Stop, refuse_without
+from digiclay.commands.progress import Counted
+from digiclay.commands.stop import refuse_without
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
-from digiclay.core.studies.axes import Point
-from digiclay.core.studies.evaluation import Bundles, Record, make_bundles
-from digiclay.core.studies.sweep_plan import Folder
+from digiclay.core.studies.axes import Point, Record
+from digiclay.core.studies.evaluation import FIGURES, make_bundles
+from digiclay.plots.sweep import read_unit
 
-from .index_page import Findings, format_index_table, format_page
-from .indices import compute_indices, count_points, sample_shares
+from .indices import (
+    ALLOWED,
+    CONFIDENCE,
+    LOSS,
+    Indices,
+    Response,
+    compute_indices,
+    count_points,
+    find_excess_losses,
+    make_response,
+    sample_shares,
+)
 from .point_series import (
     UNCHANGED,
+    Range,
     Subject,
     add_subject,
-    describe_stop,
+    evaluate_unchanged,
     make_points,
-    open_evaluation,
     open_folder,
     read_subject,
     refuse_too_many,
     write_points,
 )
-from .responses import LOSS, Response, find_excess_losses, make_response
 
 EXAMPLES = """\
 examples:
@@ -93,44 +107,20 @@ def carry_out(arguments: argparse.Namespace) -> int:
         shares = sample_shares(arguments.samples, count, arguments.seed, second=second)
         points = make_points(subject, shares, 1, None if arguments.quiet else bar)
         bundles = make_bundles(points, errors=subject.errors)
-    with open_folder(arguments.out, "study", subject, plan) as folder:
-        with Stop() as stop:
-            records = _evaluate(arguments, subject, folder, points, bundles, stop)
-            if stop() and len(records) <= total:
-                if not arguments.quiet:
-                    print(describe_stop(folder.path, len(records), total + 1))
-                return STOPPED
+
+    def evaluate(evaluation: Evaluation) -> None:
+        if evaluate_unchanged(evaluation, subject, quiet=arguments.quiet):
+            evaluation.finish(bundles.every, subject.keys)
+
+    def write(records: dict[int, Record]) -> list[str]:
         lines = _write(arguments, subject, points, records)
-        if not arguments.quiet:
-            print(*lines, *bundles.describe(), f"written to {arguments.out}: start with study.md", sep="\n")
-    return 0
+        return [*lines, *bundles.describe(), f"written to {arguments.out}: start with study.md"]
 
-
-def _evaluate(
-    arguments: argparse.Namespace,
-    subject: Subject,
-    folder: Folder,
-    points: Sequence[Point],
-    bundles: Bundles,
-    stop: Stop,
-) -> dict[int, Record]:
-    """Run the unchanged scene and the points that are not in the folder yet; return the records of all."""
-    every = (*bundles.batches, *bundles.alone)
-    with open_evaluation(
-        arguments, "study", subject, folder, len(every), len(points) + 1, stop
-    ) as evaluation:
-        unchanged = evaluation.evaluate_unchanged()
-        if unchanged is None:
-            return evaluation.records
-        left = len(points) + 1 - len(evaluation.records)
-        if left and not arguments.quiet:
-            each = unchanged["figures"]["run_time"]
-            time = format_duration(left * each)
-            print(
-                f"{left} runs: about {time} of one core if each is run by itself, less in batches", flush=True
-            )
-        failed = evaluation.evaluate(every, subject.keys)
-        return {**evaluation.records, **failed}
+    opened = open_folder(arguments.out, "study", subject, plan)
+    return run_series(
+        arguments, "study", total + 1, opened, evaluate, write, errors=subject.errors,
+        pieces=len(bundles.every),
+    )  # fmt: skip
 
 
 def _write(
@@ -214,3 +204,139 @@ def _summarize(findings: Findings) -> list[str]:
         )
         lines.append(f"{name}: total indices {', '.join(parts)}{gaps}")
     return lines
+
+
+#: Of the table of the outputs.
+HEAD = (
+    "output", "unit", "unchanged scene", "mean", "standard deviation", "least", "largest", "without a value",
+    "fingertip lost",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """Results of a study.
+
+    Attributes
+    ----------
+    title : str
+        Scene and version.
+    command : str
+        By which the study is repeated.
+    second : bool
+        Whether there are second-order indices.
+    unchanged : mapping
+        Outputs of the unchanged scene, None where it has none.
+    indices : mapping of str to Indices or None
+        None for an output that does not vary.
+    """
+
+    title: str
+    command: str
+    ranges: tuple[Range, ...]
+    samples: int
+    points: int
+    seed: int
+    second: bool
+    unchanged: Mapping[str, float | None]
+    responses: Mapping[str, Response]
+    indices: Mapping[str, Indices | None]
+
+
+def format_index_table(findings: Findings) -> str:
+    """Return all indices as CSV, with half the widths of their intervals; empty where there are none."""
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(["output", "order", "parameter", "with", "index", f"interval ({CONFIDENCE:.0%}, +-)"])
+    keys = [one.key for one in findings.ranges]
+    for name, found in findings.indices.items():
+        for order, kind in (("first", "first"), ("total", "total")):
+            for number, key in enumerate(keys):
+                pair = ("", "")
+                if found is not None:
+                    pair = (
+                        repr(float(getattr(found, kind)[number])),
+                        repr(float(getattr(found, f"{kind}_interval")[number])),
+                    )
+                writer.writerow([name, order, key, "", *pair])
+        if findings.second and found is not None:
+            for i, j in zip(*np.triu_indices(len(keys), 1), strict=True):
+                pair = (repr(float(found.second[i, j])), repr(float(found.second_interval[i, j])))
+                writer.writerow([name, "second", keys[i], keys[j], *pair])
+    return lines.getvalue()
+
+
+def format_page(findings: Findings, pictures: Sequence[str]) -> str:
+    """Return the page of a study in Markdown. `pictures`: files beside it."""
+    return "\n".join(_write_page(findings, pictures)) + "\n"
+
+
+def _write_page(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
+    yield f"# Sensitivity of {findings.title}\n"
+    yield f"    {findings.command}\n"
+    yield (
+        f"{findings.points} runs: {findings.samples} samples of Saltelli's design, seed {findings.seed}. "
+        "All values of a range are equally likely; on a logarithmic scale, equal ratios are.\n"
+    )
+    yield "| parameter | range |"
+    yield "| --- | --- |"
+    yield from (f"| `{one.key}` | {one} |" for one in findings.ranges)
+    yield "\n## Outputs\n"
+    yield f"| {' | '.join(HEAD)} |"
+    yield f"| --- | --- |{' ---: |' * (len(HEAD) - 2)}"
+    yield from (_describe(findings.unchanged[name], one) for name, one in findings.responses.items())
+    yield (
+        "\n*Without a value* are runs that failed or to which the output does not apply. *Fingertip lost* "
+        f"are other runs whose `{LOSS}` exceeds that of the unchanged scene by more than {ALLOWED:g}. Both "
+        "enter the indices with the largest value of the remaining runs.\n"
+    )
+    yield "## Indices\n"
+    yield (
+        "The first-order index is the share of the variance of the output that the parameter causes alone, "
+        "the total index the share it causes alone and by interactions. A total index near 0 means that the "
+        "parameter has no effect on the output within its range. ± is half the width of the "
+        f"{CONFIDENCE:.0%} interval, from resampling.\n"
+    )
+    yield from (f"![Indices]({name})\n" for name in pictures)
+    keys = [one.key for one in findings.ranges]
+    for name, found in findings.indices.items():
+        yield f"### `{name}`\n"
+        if found is None:
+            yield "It does not vary.\n"
+            continue
+        yield "| parameter | first order | total |"
+        yield "| --- | ---: | ---: |"
+        for i in np.argsort(-found.total, kind="stable"):
+            first, total = (
+                _pair(found.first[i], found.first_interval[i]),
+                _pair(found.total[i], found.total_interval[i]),
+            )
+            yield f"| `{keys[i]}` | {first} | {total} |"
+        yield ""
+        if findings.second:
+            yield from _write_pairs(keys, found)
+
+
+def _describe(unchanged: float | None, one: Response) -> str:
+    """Return an output as a row of the table."""
+    factor, unit = read_unit(FIGURES[one.name].unit, one.values)
+    values = one.values * factor
+    usual = "–" if unchanged is None else f"{unchanged * factor:.4g}"
+    numbers = (values.mean(), values.std(), values.min(), values.max())
+    middle = " | ".join(f"{number:.4g}" for number in numbers)
+    return f"| `{one.name}` | {unit or '1'} | {usual} | {middle} | {one.absent} | {one.lost} |"
+
+
+def _write_pairs(keys: Sequence[str], found: Indices) -> Iterator[str]:
+    """Give the second-order indices, the largest first."""
+    yield "| interaction of | second order |"
+    yield "| --- | ---: |"
+    rows, columns = np.triu_indices(len(keys), 1)
+    for number in np.argsort(-found.second[rows, columns], kind="stable"):
+        i, j = rows[number], columns[number]
+        yield f"| `{keys[i]}`, `{keys[j]}` | {_pair(found.second[i, j], found.second_interval[i, j])} |"
+    yield ""
+
+
+def _pair(index: float, interval: float) -> str:
+    return f"{round(index, 2) + 0.0:.2f} ± {interval:.2f}"  # no minus before a zero

@@ -1,40 +1,40 @@
-"""``digiclay tune``: Pareto front of two metrics of a scene over ranges of its parameters."""
+"""``digiclay tune``: Pareto front of two metrics over ranges of parameters, searched by optuna's NSGA-II."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.commands.arguments import add_command
-from digiclay.commands.progress import format_duration
-from digiclay.commands.stop import STOPPED, Stop, refuse_without
+from digiclay.commands.arguments import add_command, whole_number
+from digiclay.commands.evaluation_pool import Evaluation, run_series
+from digiclay.commands.stop import refuse_without
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.scene.toml_table import format_scene
-from digiclay.core.studies.axes import Point
-from digiclay.core.studies.evaluation import FIGURES, Record, find_figure, make_bundles
-from digiclay.core.studies.sweep_plan import Folder
+from digiclay.core.studies.axes import Point, Record
+from digiclay.core.studies.evaluation import FIGURES, find_figure, make_bundles
 from digiclay.plots.sweep import read_unit
+from numpy.typing import NDArray
 
+from .indices import find_excess_losses, get_figure
 from .point_series import (
     UNCHANGED,
     Subject,
     add_subject,
-    describe_stop,
+    evaluate_unchanged,
     make_points,
-    open_evaluation,
     open_folder,
-    read_count,
     read_subject,
     refuse_too_many,
     write_points,
 )
-from .trials import find_knee, judge_trials, propose_generations
 
 EXAMPLES = """\
 examples:
@@ -58,12 +58,12 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--population",
         metavar="N",
-        type=read_count(4, 4096),
+        type=whole_number(4, 4096),
         default=64,
         help="runs a generation; default: 64",
     )
     parser.add_argument(
-        "--generations", metavar="N", type=read_count(1, 4096), default=10, help="default: 10"
+        "--generations", metavar="N", type=whole_number(1, 4096), default=10, help="default: 10"
     )
     parser.add_argument(
         "--choose", metavar="M", default=KNEE,
@@ -83,17 +83,16 @@ def carry_out(arguments: argparse.Namespace) -> int:
     total = arguments.population * arguments.generations + 1
     refuse_too_many("--population times --generations", total)
     plan = {"metrics": list(subject.names), "population": arguments.population, "seed": arguments.seed}
-    with open_folder(arguments.out, "tuning", subject, plan) as folder:
-        with Stop() as stop:
-            points, records = _evolve(arguments, subject, folder, total, stop)
-            if len(points) + 1 < total:
-                if not arguments.quiet:
-                    print(describe_stop(folder.path, len(records), total))
-                return STOPPED
-        lines = _write(arguments, subject, points, records, choice)
-        if not arguments.quiet:
-            print(*lines, f"written to {arguments.out}", sep="\n")
-    return 0
+    points: list[Point] = []
+
+    def write(records: dict[int, Record]) -> list[str]:
+        return [*_write(arguments, subject, points, records, choice), f"written to {arguments.out}"]
+
+    return run_series(
+        arguments, "tune", total, open_folder(arguments.out, "tuning", subject, plan),
+        lambda evaluation: _evolve(arguments, subject, evaluation, points), write, errors=subject.errors,
+        pieces=-(-arguments.population // 4),
+    )  # fmt: skip
 
 
 def _read_choice(word: str, names: Sequence[str]) -> str:
@@ -105,53 +104,40 @@ def _read_choice(word: str, names: Sequence[str]) -> str:
 
 
 def _evolve(
-    arguments: argparse.Namespace, subject: Subject, folder: Folder, total: int, stop: Stop
-) -> tuple[list[Point], dict[int, Record]]:
-    """Evaluate all generations, of which what is kept is not run again; return their points, and all records.
-
-    After a stop the generation that is not complete is missing.
-
-    Raises OutputError when no worker survives a point: without it the next generation would be another one.
-    """
-    size, done = arguments.population, list[Point]()
-    generations = propose_generations(len(subject.ranges), size, arguments.seed)
-    with open_evaluation(arguments, "tune", subject, folder, -(-size // 4), total, stop) as evaluation:
-        unchanged = evaluation.evaluate_unchanged()
-        if unchanged is None:
-            return done, evaluation.records
-        left = total - len(evaluation.records)
-        if left > 0 and not arguments.quiet:
-            time = format_duration(left * unchanged["figures"]["run_time"])
-            print(
-                f"{left} runs: about {time} of one core if each is run by itself, less in batches", flush=True
-            )
-        shares = next(generations)
-        while True:
-            points = make_points(subject, shares, len(done) + 1)
-            _refuse_others(folder, subject, points, evaluation.records)
-            bundles = make_bundles(points, errors=subject.errors)
-            failed = evaluation.evaluate((*bundles.batches, *bundles.alone), subject.keys)
-            if failed:
-                why = next(iter(failed.values()))["error"]
-                raise OutputError(f"{why} What is done is kept, and the same command goes on from there.")
-            if any(point.index not in evaluation.records for point in points):
-                return done, evaluation.records
-            done += points
-            if len(done) + 1 == total:
-                return done, evaluation.records
-            found = [evaluation.records[point.index] for point in points]
-            shares = generations.send(judge_trials(subject.names, found, unchanged).outcomes)
+    arguments: argparse.Namespace, subject: Subject, evaluation: Evaluation, done: list[Point]
+) -> None:
+    """Evaluate all generations, or those before a stop, and add their points to those that are done."""
+    generations = propose_generations(len(subject.ranges), arguments.population, arguments.seed)
+    unchanged = evaluate_unchanged(evaluation, subject, quiet=arguments.quiet)
+    if unchanged is None:
+        return
+    shares = next(generations)
+    while True:
+        points = make_points(subject, shares, len(done) + 1)
+        _refuse_others(evaluation.folder.path, subject, points, evaluation.records)
+        evaluation.finish(make_bundles(points, errors=subject.errors).every, subject.keys)
+        records = evaluation.collect()
+        if lost := evaluation.failed.keys() - evaluation.records.keys():
+            why = evaluation.failed[min(lost)]["error"]
+            raise OutputError(f"{why} What is done is kept, and the same command goes on from there.")
+        if any(point.index not in records for point in points):
+            return
+        done += points
+        if len(done) + 1 == evaluation.total:
+            return
+        found = [records[point.index] for point in points]
+        shares = generations.send(judge_trials(subject.names, found, unchanged).outcomes)
 
 
 def _refuse_others(
-    folder: Folder, subject: Subject, points: Sequence[Point], records: Mapping[int, Record]
+    folder: Path, subject: Subject, points: Sequence[Point], records: Mapping[int, Record]
 ) -> None:
     """Refuse records of other points, as another version of optuna would have proposed them."""
     for point in points:
         own = dict(zip(subject.keys, point.words, strict=True))
         if records.get(point.index, {}).get("values", own) != own:
             rule = "holds points of another version of optuna"
-            raise OutputError(f"{folder.path} {rule}: choose another folder with --out.")
+            raise OutputError(f"{folder} {rule}: choose another folder with --out.")
 
 
 def _write(
@@ -206,3 +192,128 @@ def _describe(names: Sequence[str], values: Any) -> str:
         factor, unit = read_unit(FIGURES[name].unit, [value])
         parts.append(f"{name} {value * factor:.4g} {unit}".strip())
     return ", ".join(parts)
+
+
+def find_front(values: Floats) -> NDArray[np.intp]:
+    """Return the points that no other dominates, ordered by the first output.
+
+    A point dominates another if it is at most as large in both outputs, and less in one. Of equal points the
+    first one is returned.
+    """
+    known = np.flatnonzero(~np.isnan(values).any(axis=1))
+    order = known[np.lexsort((values[known, 1], values[known, 0]))]
+    front, least = [], np.inf
+    for point in order:
+        if values[point, 1] < least:
+            least = values[point, 1]
+            front.append(point)
+    return np.array(front, dtype=np.intp)
+
+
+def find_knee(front: Floats) -> int:
+    """Return the index of the point of a front that is farthest below the line between its ends.
+
+    With both outputs scaled to 0 to 1 over the front, the ends are (0, 1) and (1, 0), and that point has the
+    least sum. It is the place where less of one output begins to cost much of the other.
+    """
+    extent = np.ptp(front, axis=0)
+    scaled = (front - front.min(axis=0)) / np.where(extent > 0.0, extent, 1.0)
+    return int(np.argmin(scaled.sum(axis=1)))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Outcome of a point, which a search takes.
+
+    Attributes
+    ----------
+    values : tuple of float
+        The outputs to be minimized; infinite where there are none.
+    violation : float
+        Above 0 for a point that is no solution: of two such points the lesser violation is preferred, and any
+        solution to both.
+    """
+
+    values: tuple[float, float]
+    violation: float
+
+
+def propose_generations(
+    parameters: int, population: int, seed: int
+) -> Generator[Floats, Sequence[Outcome], None]:
+    """Yield generations without end; each is asked for with the outcomes of the one before.
+
+    The same outcomes lead to the same generations: a search that is told kept outcomes from its beginning
+    goes on as if it had never stopped.
+    """
+    import optuna
+    from optuna.samplers.nsgaii import PolynomialMutation, SBXCrossover
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    space: dict[str, optuna.distributions.BaseDistribution] = {
+        f"x{number}": optuna.distributions.FloatDistribution(0.0, 1.0) for number in range(parameters)
+    }
+    with warnings.catch_warnings():
+        # Crossover and mutation of the original NSGA-II; optuna's own are coarser, and no experiment.
+        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+        sampler = optuna.samplers.NSGAIISampler(
+            population_size=population, crossover=SBXCrossover(), mutation=PolynomialMutation(), seed=seed
+        )
+    study = optuna.create_study(directions=["minimize", "minimize"], sampler=sampler)
+    while True:
+        trials = [study.ask(space) for _ in range(population)]
+        outcomes = yield np.array([[trial.params[name] for name in space] for trial in trials])
+        for trial, outcome in zip(trials, outcomes, strict=True):
+            trial.set_constraint("loss", outcome.violation)
+            study.tell(trial, outcome.values)
+
+
+#: Violation of a run without outputs: more than any loss of contact, which is a share.
+WITHOUT = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Outputs of runs.
+
+    Attributes
+    ----------
+    values : ndarray (points, 2)
+        SI; infinite in both where a run has no such outputs.
+    violation : ndarray (points,)
+        By how much the loss of contact exceeds what is allowed, 0 for a run that keeps the fingertip, and
+        `WITHOUT` for one without outputs.
+    """
+
+    values: Floats
+    violation: Floats
+
+    @property
+    def sound(self) -> NDArray[np.bool_]:
+        """Which runs keep the fingertip, shape (points,)."""
+        kept: NDArray[np.bool_] = self.violation <= 0.0
+        return kept
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """What a search is told of them."""
+        return [
+            Outcome((float(one), float(other)), float(violation))
+            for (one, other), violation in zip(self.values, self.violation, strict=True)
+        ]
+
+    def find_front(self) -> NDArray[np.intp]:
+        """Return the runs on the front, ordered by the first output."""
+        front = find_front(np.where(self.sound[:, None], self.values, np.nan))
+        if not front.size:
+            raise OutputError("No run has both metrics without losing the fingertip: there is no front.")
+        return front
+
+
+def judge_trials(names: Sequence[str], records: Sequence[Record], reference: Record) -> Trials:
+    """Return the trials that records are of."""
+    values = np.array([[get_figure(record, name) for name in names] for record in records])
+    excess = find_excess_losses(records, reference)
+    without = np.isnan(values).any(axis=1) | np.isnan(excess)
+    values[without] = np.inf
+    return Trials(values, np.where(without, WITHOUT, np.maximum(excess, 0.0)))

@@ -18,10 +18,7 @@ CORES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_M
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; return its exit code: 0, 2 for what a user can mend, 130 when stopped.
-
-    `argv`: the arguments; by default those of the process.
-    """
+    """Run a command; return its exit code: 0, 2 for what a user can mend, 130 when stopped."""
     return carry_out(lambda: _parsed(argv))
 
 

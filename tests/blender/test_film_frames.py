@@ -9,9 +9,8 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.commands.job_steps import find_frames, make_frames
+from digiclay.commands.job_steps import Work, find_frames, is_done, make_frames
 from digiclay.commands.render import ARRAYS, stage_moving
-from digiclay.commands.run_state import is_done
 from digiclay.compat import scratch, strips
 from digiclay.core.files.run_folder import lock_name
 from digiclay.core.session.finished_run import read_run
@@ -75,7 +74,7 @@ def test_frames_drawn_in_ranges_are_those_of_the_whole_film_and_make_it(
     name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
     asked = iter([False, True])
     with pytest.raises(KeyboardInterrupt):
-        make_frames(JOB, RUN, outputs, "film", "2-4", lambda: next(asked), lambda step, share: None)
+        make_frames(Work(JOB, RUN, outputs, lambda: next(asked), lambda step, share: None), "film", "2-4")
     assert list_missing(folder, range(COUNT)) == [0, 1, 4]
     assert name_frame(folder, 3).stat().st_mtime_ns == kept
     np.testing.assert_array_equal(pixels(folder, 2), pixels(whole, 2))

@@ -43,6 +43,8 @@ def test_the_extension_never_imports_what_stands_beside_it() -> None:
 @pytest.mark.parametrize("package", BESIDE.values(), ids=BESIDE)
 def test_what_stands_beside_the_extension_imports_no_part_of_its_neighbor(package: Path) -> None:
     others = {name for name, path in BESIDE.items() if path != package}
+    if package.name == "benchmarks":  # only in a checkout, where the suite's trials are beside it
+        others.remove("digiclay_study")
     wrong = [
         f"{path.relative_to(ROOT)}:{line}: {target}"
         for path in package.rglob("*.py")

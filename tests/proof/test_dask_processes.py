@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands.cluster import open_cluster
-from digiclay.commands.executors import finish
+from digiclay.commands.evaluator import finish
 from digiclay.core.files.run_folder import read_json
 from distributed import Client
 

@@ -19,7 +19,7 @@ pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
 from digiclay_study.point_series import Subject, fit_ranges, make_points, read_range
-from digiclay_study.trials import find_front
+from digiclay_study.tune_command import find_front
 
 Floats = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result, run
 from digiclay.core.studies.speed_limits import Drag, Lift, track
-from digiclay.core.studies.trial_paths import drag_row, with_path
 
 from benchmarks.method_figures import list_models, run_mismatched
+from digiclay_study.method_trials import drag_row, with_path
 from tests.assemble import path, record, sample
 
 REST = 40.0

@@ -14,9 +14,8 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands import cluster as cluster_module
-from digiclay.commands.cluster import open_cluster
-from digiclay.commands.cluster_task import Versions, describe_versions, evaluate_on_worker
-from digiclay.commands.executors import finish
+from digiclay.commands.cluster import Versions, describe_versions, evaluate_on_worker, open_cluster
+from digiclay.commands.evaluator import finish
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
@@ -177,15 +176,12 @@ def test_a_scheduler_that_is_gone_ends_a_series_in_one_line() -> None:
 
 
 def test_versions_that_differ_are_named_with_who_has_them() -> None:
-    from digiclay.commands.cluster import _refuse_others
-
     here = describe_versions()
-    _refuse_others({"a": here, "b": here}, here)
+    cluster_module._refuse_others({"a": here, "b": here}, here)
     older = Versions("0.0.9", here.numpy, here.python)
-    with pytest.raises(
-        DigiclayError, match=r"^b has digiclay 0\.0\.9, numpy .* \(and 1 more like it\); here it"
-    ):
-        _refuse_others({"a": here, "b": older, "c": older}, here)
+    named = r"^b has digiclay 0\.0\.9, numpy .* \(and 1 more like it\); here it"
+    with pytest.raises(DigiclayError, match=named):
+        cluster_module._refuse_others({"a": here, "b": older, "c": older}, here)
 
 
 @pytest.mark.parametrize(
@@ -202,9 +198,8 @@ def test_a_bad_address_is_refused_in_one_line(
 ) -> None:
     assert main([*SWEEP, "--scheduler", address, "--out", "out"]) == 2
     said = capsys.readouterr().err
-    assert said.startswith(
-        f"--scheduler must be an address such as tcp://127.0.0.1:8786 (got {address!r}: {why}"
-    )
+    rule = "--scheduler must be an address such as tcp://127.0.0.1:8786"
+    assert said.startswith(f"{rule} (got {address!r}: {why}")
     assert said.count("\n") == 1
 
 
@@ -223,13 +218,6 @@ def test_a_bad_address_is_refused_in_one_line(
 def test_an_address_without_encryption_beyond_this_machine_is_warned_of(address: str, host: str) -> None:
     said = cluster_module._describe_exposure(address)
     assert said.partition(",")[0] == (f"Other machines can reach {host}" if host else "")
-
-
-def test_processes_of_this_machine_and_a_cluster_exclude_each_other(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main([*SWEEP, "--scheduler", "tcp://127.0.0.1:1", "--workers", "2", "--out", "out"]) == 2
-    assert "--workers: not allowed with argument --scheduler" in capsys.readouterr().err
 
 
 def test_the_example_for_slurm_makes_the_script_of_a_job() -> None:

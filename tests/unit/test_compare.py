@@ -36,34 +36,21 @@ def test_both_methods_are_printed_side_by_side(capsys: pytest.CaptureFixture[str
     assert [line.split(":")[0] for line in said] == ["virtual_master"]
 
 
-def test_the_columns_of_the_table_are_aligned() -> None:
+def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_not_found() -> None:
     found = {name: dict.fromkeys(RUN_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
     assert len({len(line) for line in table(found)}) == 1
+    rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
+    assert ["lag_max", "mm", "2.5"] in rows
+    assert ["rfd", "N", "–"] in rows
 
 
-def test_lengths_are_printed_in_millimeters() -> None:
-    found = {"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}}
-    row = next(line for line in table(found) if "lag_max" in line)
-    assert row.split() == ["lag_max", "mm", "2.5"]
-
-
-def test_what_was_not_found_is_a_dash() -> None:
-    row = next(line for line in table({"one": dict.fromkeys(RUN_METRICS)}) if " rfd " in line)
-    assert row.split() == ["rfd", "N", "–"]
-
-
-def test_the_folder_holds_the_picture_and_every_number(here: Path) -> None:
-    main(["compare", "my.toml", "--quiet"])
+def test_the_folder_holds_the_picture_and_every_number_of_all_methods_on_the_same_input(here: Path) -> None:
+    main(["compare", "my.toml", "--quiet", "--methods", "cell_states,virtual_master"])
     folder = here / "my_compare"
     assert sorted(path.name for path in folder.iterdir()) == ["compare.png", "metrics.json"]
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    assert list(known["methods"]) == BOTH
-    assert list(known["methods"]["cell_states"]) == list(RUN_METRICS)
-
-
-def test_the_methods_see_the_same_input(here: Path) -> None:
-    main(["compare", "my.toml", "--quiet", "--methods", "cell_states,virtual_master"])
-    known = json.loads((here / "my_compare" / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    assert list(known) == BOTH[::-1]
+    assert list(known["cell_states"]) == list(RUN_METRICS)
     assert known["cell_states"]["duration"] == known["virtual_master"]["duration"] == 0.5
     # Other controllers, other forces: neither was run twice.
     assert known["cell_states"]["max_total_force"] != known["virtual_master"]["max_total_force"]

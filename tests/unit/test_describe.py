@@ -47,15 +47,12 @@ def test_the_free_speeds_are_those_of_a_pin_with_its_valve_wide_open(
     assert said[1] == pytest.approx(1.5 * said[0], rel=1e-2)
 
 
-def test_the_hold_force_is_pressure_times_area(capsys: pytest.CaptureFixture[str]) -> None:
-    area = Actuator().area
-    assert numbers(described(capsys, *UNLIKE)["hold force"]) == pytest.approx(
-        [0.4e5 * area, 0.6e5 * area], rel=5e-3
-    )
-
-
-def test_the_bed_is_refilled_at_the_free_speed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_hold_force_is_pressure_times_area_and_the_bed_is_refilled_at_the_free_speed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     said = described(capsys, *UNLIKE)
+    forces = [pressure * Actuator().area for pressure in (0.4e5, 0.6e5)]
+    assert numbers(said["hold force"]) == pytest.approx(forces, rel=5e-3)
     up, down = numbers(said["free speed"])
     filled, emptied, volume = numbers(said["refill"])
     # 100 mm of stroke; three digits each.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,10 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import (
     RUNS,
+    TIMES,
     BatchWarning,
     evaluate,
     evaluate_bundle,
-    explain_failed_batches,
     make_bundles,
 )
 
@@ -63,8 +64,8 @@ def test_the_formulas_of_a_part_hold_for_many_runs() -> None:
 
 def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
     assert classify(Contact(stiffness=100.0)) == classify(Contact())
-    scene = load(find("tap"))
-    assert classify(scene.layout) != classify(load(find("tap"), [Setting("layout.rows", "15")]).layout)
+    layout = load(find("tap")).layout
+    assert classify(layout) != classify(replace(layout, rows=15))
 
 
 def test_the_reach_of_many_fingers_is_that_of_each() -> None:
@@ -113,17 +114,23 @@ def test_points_of_one_structure_run_together() -> None:
     assert parts.describe() == ["8 points run in 2 stacks"]
 
 
-def test_a_stack_has_no_more_runs_than_pay() -> None:
-    for count, sizes in ((2 * RUNS - 1, [2 * RUNS - 1]), (2 * RUNS + 1, [RUNS, RUNS + 1])):
-        parts = make_bundles(some(f"control.force_gain=1:6:{count}"))
-        assert [len(batch) for batch in parts.batches] == sizes
-
-
-def test_long_sessions_make_smaller_stacks() -> None:
-    long = [Setting("simulation.duration", "1e4")]
-    parts = make_bundles(some("control.force_gain=1:6:20", settings=long))
-    # 2 million rows of 41 bytes are 82 MB, and a stack may hold 1 GiB.
-    assert [len(batch) for batch in parts.batches] == [10, 10]
+@pytest.mark.parametrize(
+    ("count", "duration", "sizes"),
+    [
+        (2 * RUNS - 1, "0.1", [2 * RUNS - 1]),
+        (2 * RUNS + 1, "0.1", [RUNS, RUNS + 1]),
+        (20, "1e4", [10, 10]),  # 2 million rows of 41 bytes are 82 MB, and a stack may hold 1 GiB
+        (5, "1e5", []),
+    ],
+)
+def test_a_stack_has_no_more_runs_than_pay_or_fit_into_memory(
+    count: int, duration: str, sizes: list[int]
+) -> None:
+    settings = [Setting("simulation.duration", duration)]
+    parts = make_bundles(some(f"control.force_gain=1:6:{count}", settings=settings))
+    assert [len(batch) for batch in parts.batches] == sizes
+    reason = f"{count} points one at a time: they have too many rows to keep for many at once"
+    assert (parts.describe() == [reason]) == (not sizes)
 
 
 def test_points_whose_half_steps_are_cut_elsewhere_are_judged_in_stacks_of_their_own() -> None:
@@ -145,13 +152,6 @@ def test_points_without_their_like_run_alone_and_it_is_said() -> None:
     assert parts.describe() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
 
 
-def test_sessions_of_days_run_alone_and_it_is_said() -> None:
-    days = [Setting("simulation.duration", "1e5")]
-    parts = make_bundles(some("control.force_gain=1:6:5", settings=days))
-    assert parts.batches == ()
-    assert parts.describe() == ["5 points one at a time: they have too many rows to keep for many at once"]
-
-
 def test_every_method_stands_in_stacks_with_noise_and_without() -> None:
     noise = ("sensors.force_noise=1e-3,2e-3,3e-3", "sensors.seed=1,2")
     parts = make_bundles(some("control.method=viscous,push_pull,cell_states,virtual_master", *noise))
@@ -171,15 +171,14 @@ def test_values_that_do_not_go_together_are_in_no_stack() -> None:
 @pytest.mark.parametrize("errors", [False, True])
 def test_a_bundle_comes_to_the_figures_of_its_points(errors: bool) -> None:
     bundle = some("control.force_gain=1,5")
-    found = evaluate_bundle(bundle, errors=errors)
-    for record, point in zip(found, bundle, strict=True):
+    assert evaluate_bundle(bundle, lambda: True) == [None, None]
+    for record, point in zip(evaluate_bundle(bundle, errors=errors), bundle, strict=True):
         assert point.scene
         alone = evaluate(point.scene, errors=errors)
         assert record is not None
         assert alone is not None
-        times = ("run_time", "real_time_factor")
         own, other = (
-            {name: value for name, value in one["figures"].items() if name not in times and value is not None}
+            {name: value for name, value in one["figures"].items() if name not in TIMES and value is not None}
             for one in (record, alone)
         )
         assert own == pytest.approx(other, rel=1e-9, abs=1e-15)
@@ -194,24 +193,11 @@ def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     monkeypatch.setattr("digiclay.core.studies.evaluation.measure_together", faulty)
 
 
-def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:
-    break_stacks(monkeypatch, MemoryError())
-    bundle = some("control.force_gain=1,5")
-    records = dict(enumerate(record or {} for record in evaluate_bundle(bundle)))
-    assert all("figures" in record for record in records.values())
-    assert explain_failed_batches(records) == (
-        "2 points one at a time: there is not enough memory for a stack",
-    )
-
-
 def test_a_fault_in_a_stack_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     # Warnings are errors in tests: a stack that fails by our own fault fails the test it runs in.
     break_stacks(monkeypatch, ZeroDivisionError("by\nzero"))
-    bundle = some("control.force_gain=1,5")
-    with pytest.raises(BatchWarning, match="A batch of 2 runs failed: ZeroDivisionError: by zero"):
-        evaluate_bundle(bundle)
-    with pytest.warns(BatchWarning):
-        records = evaluate_bundle(bundle)
+    with pytest.warns(BatchWarning, match="A batch of 2 runs failed: ZeroDivisionError: by zero"):
+        records = evaluate_bundle(some("control.force_gain=1,5"))
     assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
 
 
@@ -226,26 +212,16 @@ def test_a_sweep_says_which_points_ran_alone_because_their_stack_failed(
     assert [line.endswith(",") for line in table[1:]] == [True] * 4  # no point has an error
 
 
-def test_a_stack_that_is_stopped_has_no_records() -> None:
-    bundle = some("control.force_gain=1,5")
-    assert evaluate_bundle(bundle, lambda: True) == [None, None]
-
-
-def test_a_sweep_says_how_its_points_were_run(capsys: pytest.CaptureFixture[str]) -> None:
-    varied = ["--vary", "control.force_gain=1:5:4", "--set", "simulation.duration=0.1"]
-    assert main(["sweep", "tap", *varied, "--out", "out"]) == 0
-    assert "4 points\n4 points run in 1 stack\n" in capsys.readouterr().out
-
-
-def test_a_point_done_again_comes_to_the_same_bits(here: Path) -> None:
+def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     sweep = ["sweep", "tap", "--vary", "control.force_gain=1:6:5", "--set", "simulation.duration=0.2"]
-    main([*sweep, "--out", "out", "--quiet"])
-    file = here / "out" / "points" / "000003.json"
-    before = json.loads(file.read_text(encoding="utf-8"))["figures"]
-    file.unlink()
-    main([*sweep, "--out", "out", "--quiet"])
-    after = json.loads(file.read_text(encoding="utf-8"))["figures"]
-    times = ("run_time", "real_time_factor")
-    assert {n: v for n, v in after.items() if n not in times} == {
-        n: v for n, v in before.items() if n not in times
-    }
+    main([*sweep, "--out", "out"])
+    assert "5 points\n5 points run in 1 stack\n" in capsys.readouterr().out
+    file, figures = here / "out" / "points" / "000003.json", []
+    for _ in range(2):
+        kept = json.loads(file.read_text(encoding="utf-8"))["figures"]
+        figures.append({name: value for name, value in kept.items() if name not in TIMES})
+        file.unlink()
+        main([*sweep, "--out", "out", "--quiet"])
+    assert figures[0] == figures[1]

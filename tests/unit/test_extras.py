@@ -14,8 +14,9 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
-from digiclay.commands.extras import format_command
-from digiclay.core.mesh_io import mesh_reader
+from digiclay.commands.extras import format_command, plan_meshes
+from digiclay.core.scene.scene_source import load
+from digiclay.core.session.finished_run import find_row
 
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
 
@@ -90,14 +91,8 @@ def test_a_run_stopped_before_its_errors_are_estimated_says_so(
 def test_a_run_stopped_within_its_session_can_be_exported_as_it_says(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    begin = run_command.run
-
-    def interrupted(*given: Any, **known: Any) -> Any:
-        signal.raise_signal(signal.SIGINT)
-        return begin(*given, **known)
-
     with monkeypatch.context() as patched:
-        patched.setattr(run_command, "run", interrupted)
+        stop_before(patched, run_command, "run")
         assert main(["run", "my.toml", "--out", OUT, "--quiet", "--export", "ply"]) == 130
     commands = told(capsys.readouterr().err)
     assert list(commands) == ["surface.ply"]
@@ -168,20 +163,8 @@ def test_a_command_is_written_as_a_shell_takes_it() -> None:
 
 
 def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) -> None:
-    from digiclay.commands.extras import plan_meshes
-    from digiclay.core.scene.scene_source import load
-    from digiclay.core.session.finished_run import find_row
-
     times = np.arange(2000) * 0.005
     for row in (1, 777, 1999):
-        later = plan_meshes(load(Path("my.toml")), {"time": times}, ["stl"], row, "displayed").later(
-            Path("o")
-        )
+        extra = plan_meshes(load(Path("my.toml")), {"time": times}, ["stl"], row, "displayed")
+        later = extra.later(Path("o"))
         assert find_row({"time": times}, float(later[later.index("--time") + 1]), "--time") == row
-
-
-def test_libraries_that_read_are_imported_where_a_stop_does_no_harm() -> None:
-    # trimesh reads three formats, which are imported within `defer_interrupt`; all others need no library.
-    assert {
-        kind: mesh_reader.find_library(kind) for kind in mesh_reader.MESHES if mesh_reader.find_library(kind)
-    } == dict.fromkeys((".stl", ".ply", ".off"), "trimesh")

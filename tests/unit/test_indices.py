@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from argparse import Namespace
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from digiclay.commands.evaluation_pool import Evaluation
+from digiclay.commands.stop import Stop
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import find, load
-from digiclay.core.studies.axes import Point
-from digiclay.core.studies.evaluation import Record
-from digiclay.core.studies.series import finish_here
+from digiclay.core.studies.axes import Point, Record
+from digiclay.core.studies.sweep_plan import Folder
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
-from digiclay_study.indices import Indices, compute_indices, count_points, sample_shares
-from digiclay_study.point_series import Evaluation, Range, Subject, open_folder
-from digiclay_study.responses import find_excess_losses, make_response
+from digiclay_study.indices import (
+    Indices,
+    compute_indices,
+    count_points,
+    find_excess_losses,
+    make_response,
+    sample_shares,
+)
+from digiclay_study.point_series import Range, Subject, open_folder
 
 #: Ishigami's function sin x1 + A sin² x2 + B x3⁴ sin x1 on [-π, π]³, and its indices by integration.
 A, B = 7.0, 0.1
@@ -38,6 +45,20 @@ def evaluate_ishigami(bundle: Sequence[Point]) -> list[Record | None]:
     return [{"figures": {"rfd": float(value)}} for value in values]
 
 
+def evaluate_with(
+    task: Callable[[Sequence[Point]], list[Record | None]], folder: Folder, bundles: Sequence[Sequence[Point]]
+) -> Evaluation:
+    """Evaluate bundles in this process with a task in place of sessions."""
+    here = Namespace(quiet=True, scheduler=None, workers=1)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(
+            "digiclay.commands.evaluation_pool.evaluate_bundle", lambda bundle, **_: task(bundle)
+        )
+        with Evaluation(here, "study", folder, 10_000, Stop()) as evaluation:
+            evaluation.finish(bundles, [one.key for one in ANGLES])
+    return evaluation
+
+
 def run_study(out: Path, samples: int, seed: int, *, second: bool) -> Indices:
     """Have Ishigami's function sampled, evaluated as a series in a folder, and analyzed."""
     shares = sample_shares(samples, len(ANGLES), seed, second=second)
@@ -46,8 +67,7 @@ def run_study(out: Path, samples: int, seed: int, *, second: bool) -> Indices:
     bundles = [points[first : first + 64] for first in range(0, len(points), 64)]
     subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
     with open_folder(out, "study", subject, {"samples": samples}) as folder:
-        pool = partial(finish_here, evaluate_ishigami, stopped=lambda: False)
-        assert Evaluation(subject, folder, pool, {}).evaluate(bundles, subject.keys) == {}
+        assert evaluate_with(evaluate_ishigami, folder, bundles).failed == {}
         records = folder.read_records()
     reference: Record = {"figures": {}}
     found = [records[point.index] for point in points]
@@ -88,23 +108,16 @@ def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path)
     bundles = [points[:2], points[2:]]
     subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
     with open_folder(tmp_path / "out", "study", subject, {}) as folder:
-        dying, sound = (
-            partial(finish_here, task, stopped=lambda: False) for task in (die, evaluate_ishigami)
-        )
-        failed = Evaluation(subject, folder, dying, {}).evaluate(bundles, subject.keys)
+        failed = evaluate_with(die, folder, bundles).failed
         assert failed == {index: {"error": "A worker died twice of this."} for index in (1, 2)}
-        again = Evaluation(subject, folder, sound, folder.read_records())
-        assert set(again.records) == {3, 4}
-        assert again.evaluate(bundles, subject.keys) == {}
+        assert set(folder.read_records()) == {3, 4}
+        assert evaluate_with(evaluate_ishigami, folder, bundles).failed == {}
         assert set(folder.read_records()) == {1, 2, 3, 4}
 
 
-def test_a_design_has_a_block_of_points_a_sample() -> None:
+def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone() -> None:
     assert sample_shares(8, 3, 1, second=False).shape == (count_points(8, 3, second=False), 3) == (40, 3)
     assert sample_shares(8, 3, 1, second=True).shape == (count_points(8, 3, second=True), 3) == (64, 3)
-
-
-def test_the_same_seed_gives_the_same_design_and_intervals() -> None:
     one, same, other = (sample_shares(16, 2, seed, second=False) for seed in (3, 3, 4))
     assert np.array_equal(one, same)
     assert not np.array_equal(one, other)
@@ -129,22 +142,20 @@ def record(rfd: float | None, loss: float | None = 0.0) -> Record:
 RUNS = [record(0.2), record(0.5, 0.04), {"error": "no memory"}, record(None, None), record(0.01, 0.3)]
 
 
-def test_runs_without_a_value_and_those_that_lose_the_fingertip_have_the_largest_of_the_others() -> None:
-    found = make_response("rfd", RUNS, find_excess_losses(RUNS, record(0.1)))
-    assert found.values.tolist() == [0.2, 0.5, 0.5, 0.5, 0.5]
-    assert (found.absent, found.lost) == (2, 1)
-
-
-def test_what_the_unchanged_scene_loses_is_no_loss() -> None:
-    found = make_response("rfd", RUNS, find_excess_losses(RUNS, record(0.1, 0.26)))
-    assert found.values.tolist() == [0.2, 0.5, 0.5, 0.5, 0.01]
-    assert (found.absent, found.lost) == (2, 0)
-
-
-def test_the_loss_itself_keeps_its_value() -> None:
-    found = make_response("contact_loss_share", RUNS, find_excess_losses(RUNS, record(0.1)))
-    assert found.values.tolist() == [0.0, 0.04, 0.3, 0.3, 0.3]
-    assert (found.absent, found.lost) == (2, 0)
+@pytest.mark.parametrize(
+    ("name", "usual", "values", "counts"),
+    [
+        ("rfd", 0.0, [0.2, 0.5, 0.5, 0.5, 0.5], (2, 1)),
+        ("rfd", 0.26, [0.2, 0.5, 0.5, 0.5, 0.01], (2, 0)),  # what the unchanged scene loses is no loss
+        ("contact_loss_share", 0.0, [0.0, 0.04, 0.3, 0.3, 0.3], (2, 0)),  # the loss keeps its value
+    ],
+)
+def test_runs_without_a_value_or_the_fingertip_have_the_largest_of_the_others(
+    name: str, usual: float, values: list[float], counts: tuple[int, int]
+) -> None:
+    found = make_response(name, RUNS, find_excess_losses(RUNS, record(0.1, usual)))
+    assert found.values.tolist() == values
+    assert (found.absent, found.lost) == counts
 
 
 def test_an_output_that_no_run_has_is_told_with_the_first_error() -> None:

@@ -1,20 +1,27 @@
-"""A job of a series may be started again and again: what is done stays, and what is not is done."""
+"""A job of a series, started again and again, and the page of the series, from its folder alone."""
 
 from __future__ import annotations
 
+import os
+import shutil
 from pathlib import Path
 
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
+from digiclay.core.files.run_folder import lock_name
 from digiclay.core.session.render_settings import format_range, list_missing, name_frame, read_range
 
 JOBS = """
 scenes = ["tap"]
 errors = false
-[settings.quick]
-simulation.duration = 0.05
+[settings]
+quick = { simulation.duration = 0.05 }
+endless = { simulation.duration = 1e6 }
+narrow = { layout.pitch = "1 mm" }
 """
+#: How a page says that a browser is to load it again.
+AGAIN = 'http-equiv="refresh"'
 JOB, RUN = Path("two/jobs/tap-quick"), Path("two/runs/tap-quick")
 
 
@@ -108,20 +115,23 @@ def test_a_part_that_cannot_be_done_is_refused_in_one_line(
     assert list(Path("two/runs").iterdir()) == []
 
 
-RANGES = {"0-24": (0, 25), "7": (7, 8), "50+25": (50, 60), "59+1": (59, 60), "0-59": (0, 60), " 3-3 ": (3, 4)}
+RANGES: dict[str, tuple[int, int] | None] = {
+    "0-24": (0, 25), "7": (7, 8), "50+25": (50, 60), "59+1": (59, 60), "0-59": (0, 60), " 3-3 ": (3, 4),
+    **dict.fromkeys(["", "a", "1-", "-3", "5-2", "0-60", "60", "60+1", "3+0", "1e2", "٣"]),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "ends"), RANGES.items())
-def test_a_range_of_frames_reads_back(text: str, ends: tuple[int, int]) -> None:
+def test_a_range_of_frames_reads_back_and_one_that_is_none_is_refused(
+    text: str, ends: tuple[int, int] | None
+) -> None:
+    if ends is None:
+        with pytest.raises(OutputError, match="--frames must be "):
+            read_range(text, 60)
+        return
     frames = read_range(text, 60)
     assert (frames.start, frames.stop) == ends
     assert read_range(format_range(frames), 60) == frames
-
-
-@pytest.mark.parametrize("text", ["", "a", "1-", "-3", "5-2", "0-60", "60", "60+1", "3+0", "1e2", "٣"])
-def test_a_range_that_is_none_of_the_film_is_refused(text: str) -> None:
-    with pytest.raises(OutputError, match="--frames must be "):
-        read_range(text, 60)
 
 
 def test_a_frame_that_is_cut_off_is_missing(tmp_path: Path) -> None:
@@ -130,3 +140,62 @@ def test_a_frame_that_is_cut_off_is_missing(tmp_path: Path) -> None:
         name_frame(tmp_path, frame).write_bytes(content)
     assert list_missing(tmp_path, range(6)) == [1, 2, 4, 5]
     assert list_missing(tmp_path / "none", range(2)) == [0, 1]
+
+
+def page() -> str:
+    """Return the page."""
+    return Path("two/index.html").read_text(encoding="utf-8")
+
+
+def test_jobs_that_are_started_alone_write_the_page_of_their_series(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["job", "two/jobs/tap-endless", "--quiet"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert "0 of 3 jobs done, 2 failed." in page()
+    assert AGAIN in page()
+    # Another job has just written the page; the last task of a farm writes it in any case.
+    assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 0
+    assert "0 of 3 jobs done" in page()
+    os.utime("two/index.html", (0, 0))
+    assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 0
+    assert "1 of 3 jobs done, 2 failed." in page()
+    Path("two.toml").unlink()
+    Path("two/index.html").unlink()
+    assert main(["page", "two"]) == 0
+    assert capsys.readouterr().out == "1 of 3 jobs done, 2 failed; written to two/index.html\n"
+    assert page().count('class="failed"') == 2
+    assert said in page()
+    assert "layout.pitch must be at least" in page()
+    assert page().count("data:image/png;base64,") == 1
+    assert AGAIN not in page()
+
+
+def test_a_job_that_another_process_does_has_not_failed() -> None:
+    with lock_name(Path("two/runs/tap-quick")):
+        assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 2
+    assert main(["page", "two", "--quiet"]) == 0
+    assert "0 of 3 jobs done, 1 failed." in page()
+
+
+def test_a_failure_is_forgotten_when_the_job_is_described_anew() -> None:
+    assert main(["job", "two/jobs/tap-endless", "--quiet"]) == 2
+    prepare(JOBS.replace("1e6", "0.1"))
+    assert main(["page", "two", "--quiet"]) == 0
+    assert "0 of 3 jobs done, 1 failed." in page()
+    assert page().count("not done yet") == 2
+
+
+def test_a_folder_of_an_older_version_has_the_jobs_that_lie_in_it(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("two/batch.json").write_text('{"batch": "two", "digiclay": "0.1.0"}', encoding="utf-8")
+    assert main(["page", "two"]) == 0
+    assert capsys.readouterr().out.startswith("0 of 2 jobs done; ")
+
+
+def test_what_is_no_series_has_no_page(capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree("two/jobs/tap-quick", "alone/jobs/tap-quick")
+    assert main(["job", "alone/jobs/tap-quick", "--quiet"]) == 0
+    assert sorted(path.name for path in Path("alone").iterdir()) == ["jobs", "runs"]
+    assert main(["page", "alone"]) == 2
+    rule = "alone is no folder of a job series: it has no batch.json of 'digiclay batch'.\n"
+    assert capsys.readouterr().err == rule

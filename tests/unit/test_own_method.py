@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.commands.run_state import RunState, judge_run
+from digiclay.commands.job_steps import RunState, judge_run
 from digiclay.core.base.errors import MethodError, SceneError
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.control.methods import METHODS, list_added, remove_method

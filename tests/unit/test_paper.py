@@ -12,8 +12,7 @@ from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result
-from digiclay.core.studies.method_trials import find_free_speed, find_unintended_losses
-from digiclay.core.studies.speed_limits import Follows
+from digiclay.core.studies.speed_limits import Follows, find_free_speed, find_unintended_losses
 from digiclay.plots.figure import canvas, save
 
 from digiclay_paper import scenes

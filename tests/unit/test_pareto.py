@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
-from digiclay_study.trials import Outcome, find_front, find_knee, propose_generations
+from digiclay_study.tune_command import Outcome, find_front, find_knee, propose_generations
 
 POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]])
 
@@ -27,14 +27,16 @@ def test_every_other_point_is_dominated_by_one_of_the_front() -> None:
     assert not better[:, front].any()
 
 
-def test_the_knee_is_where_both_are_small() -> None:
-    front = np.array([[0.0, 100.0], [1.0, 20.0], [6.0, 10.0], [10.0, 0.0]])
-    assert find_knee(front) == 1
-
-
-@pytest.mark.parametrize("front", [[[1.0, 2.0]], [[1.0, 2.0], [2.0, 1.0]]])
-def test_a_front_of_one_or_two_points_has_a_knee(front: list[list[float]]) -> None:
-    assert find_knee(np.array(front)) == 0
+@pytest.mark.parametrize(
+    ("front", "knee"),
+    [
+        ([[0.0, 100.0], [1.0, 20.0], [6.0, 10.0], [10.0, 0.0]], 1),
+        ([[1.0, 2.0]], 0),
+        ([[1.0, 2.0], [2.0, 1.0]], 0),
+    ],
+)
+def test_the_knee_is_where_both_are_small(front: list[list[float]], knee: int) -> None:
+    assert find_knee(np.array(front)) == knee
 
 
 def measure(shares: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -29,13 +29,17 @@ def make_points_of(axes: list[str]) -> list[Point]:
     return make_points(find("slow_press"), SHORT, [read_axis(axis) for axis in axes])
 
 
-def test_a_point_is_the_scene_with_its_values() -> None:
+def test_a_point_is_the_scene_with_its_values_in_the_same_batch_whatever_is_known_of_others() -> None:
     keys = [axis.partition("=")[0] for axis in AXES]
     rows = itertools.product(*(axis.partition("=")[2].split(",") for axis in AXES))
-    made = make_points_of(AXES)
-    for point, words in zip(made, rows, strict=True):
+    known = Findings()
+    for point, words in zip(make_points_of(AXES), rows, strict=True):
         varied = [Setting(key, word) for key, word in zip(keys, words, strict=True)]
-        assert point.scene == load(find("slow_press"), [*SHORT, *varied])
+        scene = load(find("slow_press"), [*SHORT, *varied])
+        assert point.scene == scene
+        assert describe_structure(scene, known) == describe_structure(scene)
+        system = assemble(scene)
+        assert count_rows(scene, system.grid, make_motion(scene)) == system.rows
 
 
 def test_the_number_of_points_is_that_of_their_scene_files() -> None:
@@ -45,16 +49,6 @@ def test_the_number_of_points_is_that_of_their_scene_files() -> None:
     for point in made:
         plain.update((NOTE.sub("", format_scene(point.scene)) if point.scene else point.error).encode())
     assert hash_points(made) == plain.hexdigest()
-
-
-def test_points_stand_in_the_same_batches_whatever_is_known_of_others() -> None:
-    known = Findings()
-    for point in make_points_of(AXES):
-        assert point.scene is not None
-        assert describe_structure(point.scene, known) == describe_structure(point.scene)
-        assert count_rows(point.scene, assemble(point.scene).grid, make_motion(point.scene)) == (
-            assemble(point.scene).rows
-        )
 
 
 def test_points_share_each_part_that_is_not_varied_also_a_duration_taken_from_the_path() -> None:

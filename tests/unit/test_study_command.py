@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
 import shutil
 import signal
@@ -138,19 +137,8 @@ def test_a_study_that_is_stopped_goes_on_from_there(
 def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here: Path) -> None:
     # A bed of 3 x 4 has no room for a recording of a million seconds.
     durations = ["--vary", "simulation.duration=0.08,0.1,1e6", "--vary", "control.position_gain=100:1000"]
-    command = [
-        "study",
-        "my.toml",
-        *durations,
-        "--samples",
-        "4",
-        "--workers",
-        "1",
-        "--metric",
-        "rfd",
-        "--quiet",
-    ]
-    assert main([*command, "--out", "out"]) == 0
+    options = "--samples 4 --workers 1 --metric rfd --quiet --out out"
+    assert main(["study", "my.toml", *durations, *options.split()]) == 0
     found = rows(here / "out" / "points.csv")
     failed = [row for row in found if row["error"]]
     assert 0 < len(failed) < len(found) - 1
@@ -181,22 +169,19 @@ def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is
         (["--metric", "rdf"], "--metric must be a known metric (got 'rdf')."),
         (["--set", "recorder=absent"], "Metrics need a recorder, and the scene has recorder = 'absent'."),
         (["--set", "simulation.duration=1e6"], "The unchanged scene fails: recorder.every must be at least"),
+        ([], "A study needs at least two --vary"),
         (["--method", "no"], "--method: control.method must be one of"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_told_in_one_line_and_leaves_no_point(
     arguments: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([*QUIET, *arguments]) == 2
+    study = ["study", "my.toml", *GAINS[:2], "--quiet", "--out", "out"] if arguments == [] else QUIET
+    assert main([*study, *arguments]) == 2
     err = capsys.readouterr().err
     assert err.startswith(message)
     assert err.count("\n") == 1
     assert len(list(here.glob("out/points/*"))) <= 1
-
-
-def test_one_parameter_is_no_study(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["study", "my.toml", *GAINS[:2], "--out", "out"]) == 2
-    assert capsys.readouterr().err.startswith("A study needs at least two --vary")
 
 
 @pytest.mark.parametrize(
@@ -217,15 +202,6 @@ def test_a_folder_of_another_study_is_refused(
     err = capsys.readouterr().err
     assert err == f"out holds another study ({said}): choose another folder with --out.\n"
     assert files(here / "out") == before
-
-
-def test_a_folder_of_a_sweep_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (here / "out" / "points").mkdir(parents=True)
-    (here / "out" / "sweep.json").write_text(json.dumps({}), encoding="utf-8")
-    assert main(QUIET) == 2
-    assert (
-        capsys.readouterr().err == "out holds other things than a study: choose another folder with --out.\n"
-    )
 
 
 @pytest.mark.parametrize(("command", "library"), [("study", "SALib"), ("tune", "optuna")])

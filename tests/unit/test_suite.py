@@ -15,21 +15,22 @@ from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.studies.league import find_interval, find_league
-from digiclay.core.studies.method_trials import (
+from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
+from scipy.stats import t as student
+
+from digiclay_study.league import find_interval, find_league
+from digiclay_study.method_trials import (
     GROUPS,
     OUTCOMES,
     RANDOM,
     Trial,
+    draw_drags,
+    list_paths,
     list_trials,
     measure_trial,
     place_trial,
 )
-from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
-from digiclay.core.studies.trial_paths import draw_drags, list_paths
-from digiclay.plots.league_figures import draw_measures, draw_rfd
-from scipy.stats import t as student
-
+from digiclay_study.study_plots import draw_measures, draw_rfd
 from tests.own_methods import forgotten, write_method
 from tests.scene_files import folder_with, left, scene_text
 
@@ -55,15 +56,14 @@ def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "league"
 
 
-def test_the_folder_holds_page_tables_and_plots(league: Path) -> None:
+def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_seed(
+    league: Path,
+) -> None:
     files = {path.name for path in league.iterdir() if not path.name.startswith(".")}
     assert files == {
         "index.html", "league.csv", "trajectories.csv", "results.csv", "rfd.svg", "measures.svg",
         "suite.json", "points",
     }  # fmt: skip
-
-
-def test_every_trial_is_a_row_and_differs_with_the_seed(league: Path) -> None:
     _, rows = read_table(league / "results.csv")
     assert [(row["method"], row["trajectory"], row["seed"]) for row in rows] == [
         (method, "session", seed) for method in BOTH for seed in "12"
@@ -139,6 +139,7 @@ def test_another_suite_does_not_go_into_the_folder(
         (["--suite", "--overwrite"], "--overwrite is not for --suite"),
         (["--suite", "--speed"], "--speed is not for --suite"),
         (["--repeats", "2"], "--repeats is for --suite"),
+        ([], "The following arguments are required: SCENE, or --suite."),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_nothing(
@@ -149,7 +150,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     folder_with(SCENE, tmp_path, monkeypatch)
-    code = main(["compare", "my.toml", *arguments])
+    code = main(["compare", *(["my.toml"] if arguments else []), *arguments])
     err = capfd.readouterr().err
     assert (code, err.count("\n"), said in err) == (2, 1, True), err
     assert left(tmp_path) == []
@@ -168,11 +169,6 @@ def test_a_method_of_one_s_own_enters_by_one_option(
     assert [bool(row["rfd (N)"]) for row in ranks] == [True, False]
     comments, _ = read_table(tmp_path / "mine" / "results.csv")
     assert "--methods virtual_master,pad.py:SoftPad" in comments[1]
-
-
-def test_without_a_scene_compare_needs_the_suite(capfd: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare"]) == 2
-    assert capfd.readouterr().err == "The following arguments are required: SCENE, or --suite.\n"
 
 
 def test_an_interval_is_student_s_and_one_value_has_none() -> None:

@@ -10,27 +10,15 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.metrics.summary import METRICS
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.accuracy import estimate_errors
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.axes import Axis, make_points, read_axis
-from digiclay.core.studies.evaluation import FIGURES, find_figure
 
 from tests.scene_files import folder_with, scene_text
 
-ADDON = Path(__file__).parents[2] / "addon"
-GAINS = [
-    "sweep",
-    "my.toml",
-    "--vary",
-    "control.force_gain=2,5",
-    "--metric",
-    "rfd",
-    "--workers",
-    "1",
-    "--quiet",
-]
+GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=2,5", "--metric", "rfd"]
+GAINS += ["--workers", "1", "--quiet", "--out", "out"]
 SCENE = scene_text(11, 11, (0.0, 0.041), (0.05, 0.037), (0.1, 0.05))
 
 
@@ -142,37 +130,30 @@ def test_the_points_are_all_combinations_and_the_last_axis_varies_fastest() -> N
     assert [point.scene.layout.rows for point in found if point.scene] == [11, 13, 15] * 2
 
 
-def test_lag_stands_for_its_mean() -> None:
-    assert find_figure("lag") == "lag_mean"
-
-
-def test_every_metric_of_a_run_can_be_asked_for() -> None:
-    assert FIGURES.keys() >= METRICS.keys()
-
-
-def test_a_point_is_the_run_with_that_setting() -> None:
-    assert main([*GAINS, "--out", "out"]) == 0
-    alone = run(load(find("my.toml"), [Setting("control.force_gain", "5")]))
+@pytest.mark.parametrize(
+    ("options", "settings"),
+    [
+        ([], []),
+        (
+            ["--tolerance", "0.1 um"],
+            [Setting("simulation.stepper", "adaptive"), Setting("simulation.tolerance", "0.1 um")],
+        ),
+    ],
+)
+def test_a_point_is_the_run_with_that_setting_also_within_a_tolerance(
+    options: list[str], settings: list[Setting]
+) -> None:
+    assert main([*GAINS, *options]) == 0
+    alone = run(load(find("my.toml"), [Setting("control.force_gain", "5"), *settings]))
     assert rows("out")[1]["rfd (N)"] == repr(alone.metrics["rfd"])
 
 
-def test_every_point_keeps_to_the_tolerance() -> None:
-    assert main([*GAINS, "--out", "out", "--tolerance", "0.1 um"]) == 0
-    kept_to = [Setting("simulation.stepper", "adaptive"), Setting("simulation.tolerance", "0.1 um")]
-    alone = run(load(find("my.toml"), [Setting("control.force_gain", "5"), *kept_to]))
-    assert rows("out")[1]["rfd (N)"] == repr(alone.metrics["rfd"])
-
-
-def test_the_table_names_axes_and_metrics_with_their_units() -> None:
-    main([*GAINS, "--out", "out", "--metric", "rfd,lag,contact_share"])
+def test_the_table_names_axes_and_metrics_with_their_si_units() -> None:
+    axes = ["--vary", "layout.pitch=3 mm:3.5 mm:2", "--metric", "rfd,lag,contact_share"]
+    main(["sweep", "my.toml", "--quiet", *axes, "--out", "out"])
     assert list(rows("out")[0]) == [
-        "control.force_gain (1/N)", "rfd (N)", "lag_mean (m)", "contact_share (1)", "error",
+        "layout.pitch (m)", "rfd (N)", "lag_mean (m)", "contact_share (1)", "error",
     ]  # fmt: skip
-    assert [line["control.force_gain (1/N)"] for line in rows("out")] == ["2.0", "5.0"]
-
-
-def test_the_table_is_in_si_units() -> None:
-    main(["sweep", "my.toml", "--quiet", "--vary", "layout.pitch=3 mm:3.5 mm:2", "--out", "out"])
     assert [line["layout.pitch (m)"] for line in rows("out")] == ["0.003", "0.0035"]
 
 
@@ -182,14 +163,14 @@ def test_one_worker_and_two_come_to_the_same_bit_for_bit(here: Path) -> None:
     assert (here / "1" / "sweep.csv").read_bytes() == (here / "2" / "sweep.csv").read_bytes()
 
 
-FAILING = ["sweep", "my.toml", "--vary", "simulation.duration=0.1,1e6,0.05", "--out", "out"]
-
-
 def test_a_point_that_fails_is_recorded_and_the_others_go_on(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(FAILING) == 0
+    vary = ["sweep", "my.toml", "--vary"]
+    assert main([*vary, "simulation.duration=0.1,1e6,0.05", "--out", "out"]) == 0
     assert [bool(line["rfd (N)"]) for line in rows("out")] == [True, False, True]
     assert rows("out")[1]["error"].startswith("recorder.every must be at least")
     assert "1 of them failed" in capsys.readouterr().out
+    assert main([*vary, "simulation.duration=1e6,9e5", "--out", "none"]) == 2
+    assert capsys.readouterr().err.startswith("Every point failed; the first one: recorder.every must be")
 
 
 def test_values_that_do_not_go_together_are_a_failed_point() -> None:
@@ -199,62 +180,44 @@ def test_values_that_do_not_go_together_are_a_failed_point() -> None:
     assert "must be below spring_trigger, 0.02 N (got 0.03 N)" in rows("out")[2]["error"]
 
 
-def test_a_sweep_in_which_every_point_fails_ends_with_the_first_error(
-    capsys: pytest.CaptureFixture[str],
+def test_finished_points_are_kept_for_another_metric_too_and_unreadable_ones_run_again(
+    here: Path,
 ) -> None:
-    assert main(["sweep", "my.toml", "--vary", "simulation.duration=1e6,9e5", "--out", "out"]) == 2
-    assert capsys.readouterr().err.startswith("Every point failed; the first one: recorder.every must be")
-
-
-def test_what_is_done_is_not_done_again(here: Path) -> None:
-    main([*GAINS, "--out", "out"])
-    file = here / "out" / "points" / "000000.json"
-    file.write_text(json.dumps({"figures": {"rfd": 42.0}}), encoding="utf-8")
-    assert main([*GAINS, "--out", "out"]) == 0
+    main(GAINS)
+    before, files = rows("out"), kept("out")
+    assert main([*GAINS, "--metric", "highest"]) == 0
+    assert float(rows("out")[0]["highest (m)"]) > 0.03
+    assert kept("out") == files
+    (here / "out" / "points" / "000001.json").write_text('{"figures"', encoding="utf-8")
+    assert main(GAINS) == 0
+    assert rows("out") == before
+    (here / "out" / "points" / "000000.json").write_text('{"figures": {"rfd": 42.0}}', encoding="utf-8")
+    assert main(GAINS) == 0
     assert rows("out")[0]["rfd (N)"] == "42.0"
 
 
-def test_a_point_whose_file_cannot_be_read_is_done_again(here: Path) -> None:
-    main([*GAINS, "--out", "out"])
-    before = rows("out")
-    (here / "out" / "points" / "000001.json").write_text('{"figures"', encoding="utf-8")
-    assert main([*GAINS, "--out", "out"]) == 0
-    assert rows("out") == before
-
-
-def test_another_metric_can_be_had_of_a_finished_sweep() -> None:
-    main([*GAINS, "--out", "out"])
+def test_a_folder_with_another_sweep_is_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    main(GAINS)
     before = kept("out")
-    assert main([*GAINS, "--out", "out", "--metric", "highest"]) == 0
-    assert float(rows("out")[0]["highest (m)"]) > 0.03
-    assert kept("out") == before
-
-
-@pytest.mark.parametrize(
-    "change", [["--vary", "layout.rows=11,13"], ["--set", "layout.rows=13"], ["--stepper", "runge_kutta_4"]]
-)
-def test_a_folder_with_another_sweep_is_refused_in_one_line(
-    change: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    main([*GAINS, "--out", "out"])
-    before = kept("out")
-    assert main([*GAINS, "--out", "out", *change]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith("out holds another sweep (2 points over control.force_gain, digiclay ")
-    assert (err.count("\n"), kept("out")) == (1, before)
-
-
-def test_a_folder_with_other_things_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*GAINS, "--out", str(here)]) == 2
-    assert "holds other things than a sweep" in capsys.readouterr().err
-    assert sorted(path.name for path in here.iterdir()) == ["my.toml"]
+    for change in (
+        ["--vary", "layout.rows=11,13"],
+        ["--set", "layout.rows=13"],
+        ["--stepper", "runge_kutta_4"],
+    ):
+        assert main([*GAINS, *change]) == 2
+        err = capsys.readouterr().err
+        assert err.startswith("out holds another sweep (2 points over control.force_gain, digiclay ")
+        assert (err.count("\n"), kept("out")) == (1, before)
 
 
 ERRORS = ["--metric", "rfd,height_error,force_error,total_force_error"]
 
 
-def test_errors_are_estimated_where_they_are_asked_for() -> None:
-    assert main([*GAINS, "--out", "out", *ERRORS]) == 0
+def test_errors_are_estimated_where_they_are_asked_for_and_then_stay() -> None:
+    main(GAINS)
+    before = rows("out")
+    assert not any("height_error" in point["figures"] for point in kept("out").values())
+    assert main([*GAINS, *ERRORS]) == 0
     scene = load(find("my.toml"), [Setting("control.force_gain", "5")])
     history = run(scene).history
     assert history is not None
@@ -262,24 +225,12 @@ def test_errors_are_estimated_where_they_are_asked_for() -> None:
     assert expected is not None
     assert rows("out")[1]["height_error (m)"] == repr(expected.height)
     assert rows("out")[1]["total_force_error (N)"] == repr(expected.total_force)
-
-
-def test_errors_are_not_estimated_where_nobody_asks_for_them() -> None:
-    main([*GAINS, "--out", "out"])
-    assert not any("height_error" in point["figures"] for point in kept("out").values())
-
-
-def test_errors_can_be_had_of_a_finished_sweep_and_then_stay() -> None:
-    main([*GAINS, "--out", "out"])
-    before = rows("out")
-    assert main([*GAINS, "--out", "out", *ERRORS]) == 0
-    assert all(float(line["height_error (m)"]) > 0.0 for line in rows("out"))
     judged = kept("out")
-    assert main([*GAINS, "--out", "out"]) == 0
+    assert main(GAINS) == 0
     assert (rows("out"), kept("out")) == (before, judged)
 
 
 def test_of_rows_that_leave_out_commands_there_are_no_errors() -> None:
-    assert main([*GAINS, "--out", "out", "--set", "recorder.every=2", *ERRORS]) == 0
+    assert main([*GAINS, "--set", "recorder.every=2", *ERRORS]) == 0
     assert [line["height_error (m)"] for line in rows("out")] == ["", ""]
     assert all(line["rfd (N)"] for line in rows("out"))

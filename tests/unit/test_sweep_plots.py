@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.scene.scene_source import Setting, find
-from digiclay.core.studies.axes import Column, make_columns, make_points, read_axis
+from digiclay.core.studies.axes import Column
 from digiclay.plots.sweep import sweep_figure
 
 
@@ -33,12 +32,9 @@ def test_one_axis_is_a_line_with_markers_labeled_with_units() -> None:
     np.testing.assert_allclose(line.get_xydata(), [[1.0, 1.0], [2.0, 2.0], [4.0, 3.0]], rtol=1e-12)
 
 
-def test_values_in_any_order_make_a_line_from_left_to_right() -> None:
+def test_numbers_in_any_order_make_a_line_from_left_to_right_and_words_make_none() -> None:
     picture = sweep_figure([Column("a.b", "", (3, 1, 2), False)], "rfd", np.array([0.3, 0.1, 0.2]))
     assert picture.axes[0].get_lines()[0].get_xydata().tolist() == [[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]]
-
-
-def test_words_are_not_joined_by_a_line() -> None:
     picture = sweep_figure([WORDS], "rfd", np.array([0.3, 0.1, 0.2]))
     assert [text.get_text() for text in picture.axes[0].get_xticklabels()] == list(WORDS.values)
     assert picture.axes[0].get_lines()[0].get_linestyle() == "None"
@@ -63,41 +59,14 @@ def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns: list[Co
     assert crosses + sum(text.get_text() == "×" for text in picture.axes[0].texts) == nothing.size
 
 
-def test_a_sweep_over_two_axes_leaves_a_picture_of_each_metric(here: Path) -> None:
-    two = ["--vary", "valve_lag.time_constant=1 ms,2 ms", "--vary", "delay.dead_time=0,0.001"]
-    assert (
-        main(
-            [
-                "sweep",
-                "slow_press",
-                "--set",
-                "simulation.duration=0.1",
-                *two,
-                "--metric",
-                "rfd,highest",
-                "--out",
-                "out",
-                "--quiet",
-            ]
-        )
-        == 0
-    )
-    assert sorted(path.name for path in (here / "out").glob("*.png")) == ["highest.png", "rfd.png"]
-
-
-def test_a_sweep_over_three_axes_says_that_there_is_a_table_only(
+def test_a_sweep_over_two_axes_leaves_pictures_and_over_three_a_table_only(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    three = [
-        f"--vary={key}" for key in ("valve_lag.time_constant=1 ms", "delay.dead_time=0", "layout.rows=11,13")
-    ]
-    assert main(["sweep", "slow_press", "--set", "simulation.duration=0.1", *three, "--out", "out"]) == 0
+    sweep = ["sweep", "slow_press", "--set", "simulation.duration=0.1", "--metric", "rfd,highest"]
+    two = ["--vary", "valve_lag.time_constant=1 ms,2 ms", "--vary", "delay.dead_time=0,0.001"]
+    assert main([*sweep, *two, "--out", "out", "--quiet"]) == 0
+    assert sorted(path.name for path in (here / "out").glob("*.png")) == ["highest.png", "rfd.png"]
+    three = ["valve_lag.time_constant=1 ms", "delay.dead_time=0", "layout.rows=11,13"]
+    assert main([*sweep, *(f"--vary={axis}" for axis in three), "--out", "three"]) == 0
     assert "3 axes: a table only, no pictures" in capsys.readouterr().out
-    assert list((here / "out").glob("*.png")) == []
-
-
-def test_an_axis_of_numbers_is_what_the_scenes_made_of_its_words() -> None:
-    axes = [read_axis("valve_lag.time_constant=1 ms:2 ms:2")]
-    points = make_points(find("slow_press"), [Setting("simulation.duration", "0.1")], axes)
-    (column,) = make_columns(points, axes)
-    assert (column.values, column.unit, column.numeric) == ((1e-3, 2e-3), "s", True)
+    assert list((here / "three").glob("*.png")) == []

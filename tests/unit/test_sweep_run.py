@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -17,13 +17,12 @@ from typing import Any
 
 import pytest
 from digiclay.cli import main
-from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere
-from digiclay.commands.executors import finish
+from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere, finish
 from digiclay.commands.worker import Processes
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import Setting, find
-from digiclay.core.studies.axes import Point, make_points, read_axis
-from digiclay.core.studies.evaluation import Record, evaluate, evaluate_bundle
+from digiclay.core.studies.axes import Point, Record, make_points, read_axis
+from digiclay.core.studies.evaluation import evaluate, evaluate_bundle
 
 from tests.timeouts import TIMEOUT, wait_until
 
@@ -48,74 +47,41 @@ def some(count: int = 3) -> list[Point]:
     return make_points(find("slow_press"), SHORT, [read_axis(f"valve_lag.time_constant=1 ms:2 ms:{count}")])
 
 
-class AtOnce(Executor):
-    """An executor that runs what it is given when it is given."""
-
-    def submit(self, task: Any, /, *arguments: Any, **known: Any) -> Future[Any]:
-        """Run."""
-        future: Future[Any] = Future()
-        try:
-            future.set_result(task(*arguments, **known))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-
-class Broken(Executor):
-    """An executor whose workers die."""
-
-    def submit(self, task: Any, /, *arguments: Any, **known: Any) -> Future[Any]:
-        """Fail."""
-        future: Future[Any] = Future()
-        future.set_exception(BrokenExecutor("gone"))
-        return future
-
-
 def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> dict[int, Record]:
     """Run points, each in a bundle of its own; return what was kept."""
     done: dict[int, Record] = {}
     finish(
-        executor,
-        task,
-        [(point,) for point in todo],
+        executor, task, [(point,) for point in todo],
         lambda bundle, records: done.update({bundle[0].index: records[0]}),
         lambda bundle, why: done.update({bundle[0].index: {"error": why}}),
-        **known,
-    )
+        **{"stopped": lambda: False, **known},
+    )  # fmt: skip
     return done
 
 
-def never() -> bool:
-    """Nobody asks to stop."""
-    return False
-
-
 def test_any_executor_will_do() -> None:
-    at_once = finished(AtOnce(), evaluate_bundle, some(), stopped=never)
     with ThreadPoolExecutor(2) as threads:
-        in_threads = finished(threads, evaluate_bundle, some(), stopped=never)
+        in_threads = finished(threads, evaluate_bundle, some())
     # Processes that are started afresh get and give values: nothing of this one is theirs.
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as processes:
-        in_processes = finished(processes, partial(evaluate_bundle, errors=True), some(), stopped=never)
-    figures = [[done[i]["figures"]["rfd"] for i in range(3)] for done in (at_once, in_threads, in_processes)]
-    assert figures[0] == figures[1] == figures[2]
+        in_processes = finished(processes, partial(evaluate_bundle, errors=True), some())
+    figures = [[done[i]["figures"]["rfd"] for i in range(3)] for done in (in_threads, in_processes)]
+    assert figures[0] == figures[1]
     assert "height_error" in in_processes[2]["figures"]
 
 
-def test_a_fault_in_one_point_is_recorded_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = some()[0].scene
+    assert scene is not None
+    assert evaluate(scene, stopped=lambda: True) is None
+
     def faulty(*given: Any, **known: Any) -> None:
         raise ZeroDivisionError("one line\nand another")
 
     monkeypatch.setattr("digiclay.core.studies.evaluation.run", faulty)
-    scene = some()[0].scene
-    assert scene is not None
     assert evaluate(scene) == {"error": "ZeroDivisionError: one line and another"}
-
-
-def test_a_session_that_was_stopped_is_no_finished_point() -> None:
-    scene = some()[0].scene
-    assert scene is not None
-    assert evaluate(scene, stopped=lambda: True) is None
 
 
 def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
@@ -147,17 +113,21 @@ def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on() -> None:
             raise KeyError("own fault")
         return [{"figures": {}}]
 
-    assert finished(AtOnce(), task, some(4), stopped=never) == {
-        0: {"figures": {}},
-        1: {"error": "killed too often"},
-        2: {"error": "KeyError: 'own fault'"},
-        3: {"figures": {}},
-    }
+    with ThreadPoolExecutor(1) as threads:
+        assert finished(threads, task, some(4)) == {
+            0: {"figures": {}},
+            1: {"error": "killed too often"},
+            2: {"error": "KeyError: 'own fault'"},
+            3: {"figures": {}},
+        }
 
 
 def test_workers_that_die_are_told_in_one_line() -> None:
-    with pytest.raises(OutputError, match=r"gone What is done is kept"):
-        finished(Broken(), evaluate_bundle, some(), stopped=never)
+    def die(bundle: list[Point]) -> list[Record | None]:
+        raise BrokenExecutor("gone")
+
+    with ThreadPoolExecutor(1) as threads, pytest.raises(OutputError, match=r"gone What is done is kept"):
+        finished(threads, die, some())
 
 
 @pytest.fixture(scope="module")
@@ -225,15 +195,7 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
 
 def idle() -> Processes:
     """Return the processes of a series that nobody stops."""
-    return Processes(never, lambda: None)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no sessions of processes")
-def test_ctrl_c_on_a_terminal_reaches_no_worker() -> None:
-    with idle() as processes:
-        worker = processes.start(Evaluator)
-        assert worker is not None
-        assert os.getpgid(worker.process.pid) != os.getpgid(0)
+    return Processes(lambda: False, lambda: None)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
@@ -266,10 +228,12 @@ def test_a_bundle_that_no_worker_survives_is_told() -> None:
             evaluate_elsewhere(processes, dead, some(2), errors=False)
 
 
-def test_a_worker_that_cannot_read_its_bundle_ends() -> None:
+def test_a_worker_is_out_of_reach_of_ctrl_c_and_ends_when_it_cannot_read_its_bundle() -> None:
     with idle() as processes:
         worker = processes.start(Evaluator)
         assert worker is not None
+        if os.name != "nt":
+            assert os.getpgid(worker.process.pid) != os.getpgid(0)
         worker.input.write(b"cdigiclay.no_such_module\nPoint\n.")  # as another version may send it
         worker.input.flush()
         assert worker.process.wait(TIMEOUT) == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,11 +28,7 @@ class Help(argparse.RawDescriptionHelpFormatter):
 
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
-    """Add SCENE, or --scene where there is a default, and the options that change it.
-
-    `default`: the scene where none is given; empty: one must be given; `optional`: whether SCENE may be
-    missing, None then.
-    """
+    """Add SCENE, or --scene where there is a default, and the options that change it."""
     said = "a .toml file, a sample's name, or the folder of a run"
     if default:
         parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{said}; default {default}")
@@ -92,35 +88,26 @@ def name_methods(varied: str) -> str:
 
 
 def load_by_option(word: str, option: str) -> str:
-    """Return the name of the method that a word of the command line names; load one of the user's own.
-
-    `word`: name of a method, or ``path/to/mine.py:Mine``; `option`: that has the word, for messages. Raises
-    MethodError: in one line.
-    """
+    """Return the name of the method that a word of the command line names; load one of the user's own."""
     try:
         return load_method(word)
     except MethodError as error:
         raise MethodError(f"{option}: {error}") from None
 
 
-def add_command(commands: Any, name: str, help: str, epilog: str, said: str = "") -> argparse.ArgumentParser:
-    """Add a command; its own help begins with `said`, or with `help` as a sentence.
-
-    `commands` argparse's subparsers; `help`: in the list of commands; `epilog`: examples; `said`: beginning
-    of the command's own help.
-    """
+def add_command(
+    commands: Any, name: str, help: str, epilog: str, description: str = "", *, listed: bool = True
+) -> argparse.ArgumentParser:
+    """Add a command; its own help begins with `description`, by default `help` as a sentence."""
     parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=help, description=said or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
-        formatter_class=Help, allow_abbrev=False,
+        name, description=description or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
+        formatter_class=Help, allow_abbrev=False, **({"help": help} if listed else {}),
     )  # fmt: skip
     return parser
 
 
 def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.ArgumentParser:
-    """Add a command that works on a finished run.
-
-    `commands` argparse's subparsers; `help`: in the list of commands; `epilog`: examples.
-    """
+    """Add a command that works on a finished run, see `add_command`."""
     parser = add_command(commands, name, help, epilog)
     parser.add_argument("run", metavar="RUN", type=Path, help="run folder of 'digiclay run'")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
@@ -129,10 +116,7 @@ def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.Argume
 
 @contextmanager
 def told_as_options(*owners: str, **names: str) -> Iterator[None]:
-    """Rename parameters of some owners to their options in an error, by equal name or `names`.
-
-    `owners`: classes of parameters; `names`: option of a field where it has another name.
-    """
+    """Rename parameters of some owners to their options in an error, by equal name or `names`."""
     try:
         yield
     except ParameterError as error:
@@ -148,6 +132,18 @@ def _setting(text: str) -> Setting:
     if not equals or not key.strip():
         raise argparse.ArgumentTypeError(f"must be KEY=VALUE (got {text!r})")
     return Setting(key.strip(), value.strip())
+
+
+def whole_number(least: int, most: int) -> Callable[[str], int]:
+    """Return the reader of a whole number within bounds."""
+
+    def read(text: str) -> int:
+        digits = text.isascii() and text.isdecimal() and len(text) < 12
+        if not digits or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most} (got {text!r})")
+        return int(text)
+
+    return read
 
 
 def seconds(text: str) -> float:

@@ -19,9 +19,8 @@ from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series
 from ..plugins.method_loader import write_code
 from .gallery import NAMES, Card, page
-from .job_steps import ERROR, find_error, read_tail
+from .job_steps import ERROR, RUNS, TIMING, find_error, is_done, read_tail
 from .progress import format_duration
-from .run_state import RUNS, TIMING, is_done
 
 #: The file by which a folder is known as a batch's, its other folders, and its page.
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"
@@ -98,10 +97,7 @@ class Folder:
         return median(known) if known else None
 
     def write_index(self, failed: Mapping[str, str], said: str) -> Path:
-        """Write the page about all jobs; `failed` has the reasons by name.
-
-        `failed`: why jobs have failed, by their names; `said`: what is said of all.
-        """
+        """Write the page about all jobs; `failed` has the reasons by name."""
         cards = []
         for job in self.batch.jobs:
             error = failed.get(job.name, "") or job.error
@@ -154,10 +150,7 @@ class Folder:
 
 @contextmanager
 def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
-    """Make a batch's folder, or go on with one; nobody else may work in it meanwhile.
-
-    Raises OutputError when it holds other things, cannot be written, or another process works in it.
-    """
+    """Make a batch's folder, or go on with one; nobody else may work in it meanwhile."""
     known = {
         "batch": batch.name, "digiclay": __version__, "jobs": {job.name: job.error for job in batch.jobs},
     }  # fmt: skip
@@ -166,10 +159,7 @@ def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
 
 
 def read_batch(path: Path) -> Folder:
-    """Return a batch's folder with the jobs it has, without their definitions.
-
-    Raises OutputError when it is none.
-    """
+    """Return a batch's folder with the jobs it has, without their definitions."""
     known = read_json(path / MARK)
     if known is None or not isinstance(known.get("batch"), str):
         raise OutputError(f"{path} is no folder of a job series: it has no {MARK} of 'digiclay batch'.")
@@ -191,10 +181,7 @@ def _find_series(job: Path) -> Folder | None:
 
 
 def note_failure(job: Path, error: str) -> None:
-    """Keep for the page why a job has failed that was started by itself, or take back what was noted.
-
-    `job`: the folder of the job's files; `error`: one line; empty when it begins anew.
-    """
+    """Keep for the page why a job has failed that was started by itself, or take back what was noted."""
     with suppress(OSError, DigiclayError):  # the job itself matters more
         series = _find_series(job)
         if series is None:
@@ -208,10 +195,7 @@ def note_failure(job: Path, error: str) -> None:
 
 
 def refresh_page(job: Path) -> None:
-    """Write the page of a job's series anew, unless another job has just done so.
-
-    `job`: the folder of the job's files.
-    """
+    """Write the page of a job's series anew, unless another job has just done so."""
     with suppress(OSError, DigiclayError):
         series = _find_series(job)
         if series is None:

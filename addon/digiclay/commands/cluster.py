@@ -9,21 +9,87 @@ import asyncio
 import importlib
 import logging
 import pickle
+import platform
 import sys
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
+import numpy as np
+
+from .. import __version__
 from ..core.base.addresses import describe_exposure
 from ..core.base.errors import DigiclayError, one_line
-from .cluster_task import UnfitWorkerError, Versions, call_on_worker, describe_versions
+from ..core.studies.axes import Point, Record
+from ..core.studies.evaluation import evaluate_bundle
 from .stop import allow_interrupt
+
+
+class Versions(NamedTuple):
+    """Versions that results depend on."""
+
+    digiclay: str
+    numpy: str
+    python: str
+
+    def __str__(self) -> str:
+        return f"digiclay {self.digiclay}, numpy {self.numpy}, Python {self.python}"
+
+
+class UnfitWorkerError(Exception):
+    """Worker whose versions differ; its text is the worker's address and its versions."""
+
+
+def describe_versions() -> Versions:
+    """Return the versions of this process."""
+    return Versions(__version__, np.__version__, ".".join(platform.python_version_tuple()[:2]))
+
+
+def call_on_worker(packed: bytes, wanted: Versions) -> Any:
+    """Call a pickled function in a task of a Dask worker; UnfitWorkerError where the versions differ."""
+    here = describe_versions()
+    if here != Versions(*wanted):
+        from distributed import get_worker
+
+        raise UnfitWorkerError(f"Worker {get_worker().address} has {here}")
+    task, arguments, known = pickle.loads(packed)
+    return task(*arguments, **known)
+
+
+def evaluate_on_worker(bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
+    """Evaluate a bundle in a task of a Dask worker, until nobody wants its records any more."""
+    from distributed import Reschedule
+
+    records = evaluate_bundle(bundle, _watch_task(), errors=errors)
+    if any(record is None for record in records):
+        raise Reschedule
+    return records
+
+
+def _watch_task() -> Callable[[], bool]:
+    """Return whether nobody wants the task of this thread any more, as a function.
+
+    Dask does not interrupt a task. Its worker marks it as soon as the session releases it, has died, or
+    the scheduler is gone: no event is shared, and a look costs no message.
+    """
+    from distributed import Status, get_worker
+
+    worker = get_worker()
+    key, tasks = worker.get_current_task(), worker.state.tasks
+    ending = {Status.closing, Status.closed, Status.failed}
+
+    def is_cancelled() -> bool:
+        task = tasks.get(key)
+        return task is None or task.state == "cancelled" or worker.status in ending
+
+    return is_cancelled
+
 
 #: Seconds to reach the scheduler, and between two looks whether somebody asked to stop.
 PATIENCE, PAUSE = 10.0, 0.1
@@ -53,10 +119,7 @@ class Cluster(Executor):
         self._workers, self._looked, self._manned = 0, 0.0, time.monotonic()
 
     def submit(self, task: Callable[..., Any], /, *arguments: Any, **known: Any) -> Future[Any]:
-        """Have a worker call a function, and return its result by value.
-
-        `task`: of a module that the workers have too; `arguments`, `known`: handed on to it.
-        """
+        """Have a worker call a function, and return its result by value."""
         future: Future[Any] = Future()
         self._send(future, pickle.dumps((task, arguments, known), pickle.HIGHEST_PROTOCOL))
         return future
@@ -138,10 +201,7 @@ class Cluster(Executor):
         return ", no workers: waiting"
 
     def wait_for_workers(self, stop: Callable[[], bool], draw: Callable[[str], None]) -> None:
-        """Wait for a first worker, visibly.
-
-        `stop`: whether somebody asks to stop; `draw`: told again and again what is waited for.
-        """
+        """Wait for a first worker, visibly."""
         said = self.describe()
         if not self._workers:
             _tell(f"{self._address} has no workers yet: start some with 'dask worker {self._address}'.")
@@ -163,10 +223,7 @@ class Cluster(Executor):
         _refuse_others(found, self._versions)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Release what is left of the tasks: workers stop at the next control period.
-
-        `wait`, `cancel_futures`: without effect: nobody waits, and all are cancelled.
-        """
+        """Release what is left of the tasks: workers stop at the next control period."""
         with suppress(Exception):  # the scheduler may be gone
             if self._client.status == "running" and self._remote:
                 self._client.cancel(list(self._remote), force=True)
@@ -218,10 +275,6 @@ def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], N
     """Connect with a Dask scheduler, wait for workers, and compare versions.
 
     At the end of the block, whatever ends it, the cluster has no task of this process any more.
-
-    `address`: ``tcp://HOST:PORT``, ``tls://HOST:PORT``; `stop`: whether somebody asks to stop; `draw`: told
-    again and again what is waited for. Raises DigiclayError: in one line: without a scheduler there, or with
-    other versions.
     """
     importlib.import_module("distributed")
     if stop():

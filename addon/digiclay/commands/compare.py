@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
@@ -24,10 +24,10 @@ from ..core.session.run_scene import RUN_METRICS, Result, run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
 from ..plugins.method_loader import find_installed, is_file_word
 from .arguments import METHOD, add_command, add_scene, load_by_option, settings_of
+from .outside import SUITE, find_beside, refuse_absent
 from .progress import Bar
 from .progress import table as aligned
 from .stop import allow_interrupt, refuse_without
-from .suite import add_suite, list_suite_methods, run_suite
 
 EXAMPLES = """\
 examples:
@@ -68,8 +68,19 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--overwrite", action="store_true", help="replace an older folder at the end")
     parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
-    add_suite(parser)
+    if suite := find_beside(*SUITE):
+        suite.add_suite(parser)
+    else:
+        parser.add_argument("--suite", nargs=0, action=_AbsentSuite, help="(not part of the extension)")
+        parser.set_defaults(suite=None, **dict.fromkeys(SUITE_ONLY))
     parser.set_defaults(carry_out=carry_out)
+
+
+class _AbsentSuite(argparse.Action):
+    """Refusal of --suite where its package is not installed."""
+
+    def __call__(self, *given: Any) -> NoReturn:
+        refuse_absent("compare --suite", "suite")
 
 
 def _methods(text: str) -> tuple[str, ...]:
@@ -88,9 +99,10 @@ def _methods(text: str) -> tuple[str, ...]:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run every method, print the table, write the folder."""
-    if arguments.suite:
-        words = _list_words(arguments, list_suite_methods())
-        return run_suite(arguments, _list_methods(words), [word for word, _ in words])
+    if arguments.suite and (suite := find_beside(*SUITE)):
+        words = _list_words(arguments, suite.list_suite_methods())
+        code: int = suite.run_suite(arguments, _list_methods(words), [word for word, _ in words])
+        return code
     _refuse_options_of_suite(arguments)
     path, methods = find(arguments.scene), _list_methods(_list_words(arguments, DEFAULT))
     out: Path = arguments.out or Path(f"{find_name(path)}_compare")

@@ -1,24 +1,29 @@
-"""Evaluation of bundles of points: in this process, in processes of this machine, or on a Dask cluster."""
+"""Series of points: options, evaluation in processes or on a Dask cluster, stop, and report."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 from ..core.base.errors import DigiclayError
-from ..core.studies.axes import Point
-from ..core.studies.evaluation import Pool, Record, evaluate_bundle
+from ..core.studies.axes import Point, Record
+from ..core.studies.evaluation import Pool, evaluate_bundle
 from ..core.studies.series import finish_here
 from ..core.studies.sweep_plan import Folder, find_unfinished, select_done
+from .arguments import add_scene, whole_number
 from .progress import Counted
-from .stop import refuse_without
+from .stop import STOPPED, Stop, refuse_without
 from .worker import count_cores, in_blender
 
 #: The most processes of a command.
 MOST = 61
+#: Reads a number of processes.
+read_count = whole_number(1, MOST)
 
 
 def add_pool(parser: argparse.ArgumentParser) -> None:
@@ -28,11 +33,9 @@ def add_pool(parser: argparse.ArgumentParser) -> None:
         "--workers", metavar="N", type=read_count, help="number of processes; default: one a core"
     )
     where.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        type=_read_address,
+        "--scheduler", metavar="ADDRESS", type=_read_address,
         help="a Dask cluster instead, such as tcp://127.0.0.1:8786",
-    )
+    )  # fmt: skip
 
 
 def _read_address(text: str) -> str:
@@ -43,11 +46,18 @@ def _read_address(text: str) -> str:
     return text
 
 
-def read_count(text: str) -> int:
-    """Read a number of processes."""
-    if not text.isdecimal() or not 1 <= int(text) <= MOST:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {MOST} (got {text!r})")
-    return int(text)
+def add_series(parser: argparse.ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:
+    """Add SCENE and the options of what varies, by its `syntax`, what is measured, where, and how."""
+    add_scene(parser)
+    parser.add_argument(
+        "--vary", metavar=f"KEY={varied}", action="append", required=True, help=f"{syntax}; may be repeated"
+    )
+    parser.add_argument(
+        "--metric", metavar="M,...", default=metrics, help=f"metrics of tables and plots; default: {metrics}"
+    )
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder")
+    add_pool(parser)
+    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
 
 
 @contextmanager
@@ -59,70 +69,133 @@ def open_pool(
     *,
     errors: bool = False,
 ) -> Iterator[Pool]:
-    """Open what the options of `add_pool` name, for `pieces` bundles; nothing of it runs on at the end."""
-    # What has threads is not part of the extension's zip, where there is one process.
+    """Open what the options of `add_pool` name, for `pieces` bundles; all of it ends with the block."""
+
+    def draw_and_ask(note: str = "") -> bool:
+        draw(note)
+        return stop()
+
+    # Modules with threads are not part of the extension's zip, where there is one process.
     if arguments.scheduler is not None:
-        from .cluster import open_cluster
-        from .cluster_task import evaluate_on_worker
-        from .executors import finish
+        from .cluster import evaluate_on_worker, open_cluster
+        from .evaluator import finish
 
         with open_cluster(arguments.scheduler, stop, draw) as cluster:
-
-            def stopped() -> bool:
-                draw(cluster.describe())
-                return stop()
-
-            yield partial(finish, cluster, partial(evaluate_on_worker, errors=errors), stopped=stopped)
+            yield partial(
+                finish, cluster, partial(evaluate_on_worker, errors=errors),
+                stopped=lambda: draw_and_ask(cluster.describe()),
+            )  # fmt: skip
         return
-    count = max(1, min(arguments.workers or count_cores(), MOST, pieces)) if not in_blender() else 1
+    count = 1 if in_blender() else min(arguments.workers or count_cores(), MOST, pieces)
     if count > 1:
         from .evaluator import open_evaluators
 
         with open_evaluators(count, stop, partial(draw, ""), errors=errors) as pool:
             yield pool
         return
-
-    def draw_and_ask() -> bool:
-        draw("")
-        return stop()
-
-    yield partial(
-        finish_here, partial(evaluate_bundle, stopped=draw_and_ask, errors=errors), stopped=draw_and_ask
-    )
+    task = partial(evaluate_bundle, stopped=draw_and_ask, errors=errors)
+    yield partial(finish_here, task, stopped=draw_and_ask)
 
 
-def finish_points(
+class Evaluation:
+    """Points of a series under evaluation, with a progress line; each is kept as soon as it is done.
+
+    Parameters
+    ----------
+    label : str
+        At the beginning of the line.
+    total : int
+        Points of the series; their indices are below it.
+    pieces : int
+        Bundles at a time, at most, where they are not known at once.
+
+    Attributes
+    ----------
+    records : dict of int to Record
+        Of the finished points, by index.
+    failed : dict of int to Record
+        Of points that no worker survived. They are not kept: the same command tries them again.
+    """
+
+    def __init__(
+        self,
+        arguments: argparse.Namespace,
+        label: str,
+        folder: Folder,
+        total: int,
+        stop: Stop,
+        *,
+        errors: bool = False,
+        pieces: int = 0,
+    ) -> None:
+        self.folder, self.total, self.stop, self._quiet = folder, total, stop, arguments.quiet
+        self.records = select_done(folder.read_records(), errors=errors)
+        self.failed: dict[int, Record] = {}
+        self._bar = Counted(sys.stderr, label, "points", len(self.records))
+        self._open = partial(open_pool, arguments, stop=stop, draw=self._draw, errors=errors)
+        self._pieces, self._opened = pieces, ExitStack()
+        self._pool: Pool | None = None
+
+    def __enter__(self) -> Evaluation:
+        self._opened.enter_context(self._bar)
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        self._opened.__exit__(*raised)
+
+    def _draw(self, note: str) -> None:
+        if not self._quiet:
+            self._bar(min(len(self.records) + len(self.failed), self.total), self.total, note)
+
+    def collect(self) -> dict[int, Record]:
+        """Return the records of all points of the series, those that failed included."""
+        every = {**self.failed, **self.records}
+        return {index: record for index, record in every.items() if index < self.total}
+
+    def finish(self, bundles: Sequence[Sequence[Point]], keys: Sequence[str]) -> None:
+        """Evaluate the bundles of which a point is missing. `keys`: the varied parameters."""
+
+        def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
+            self.folder.keep_bundle(bundle, found, keys, self.records)
+
+        def fail(bundle: Sequence[Point], why: str) -> None:
+            self.failed.update((point.index, {"error": why}) for point in bundle)
+            first = bundle[0].index
+            which = f"point {first}" if len(bundle) == 1 else f"{len(bundle)} points from {first}"
+            self._bar.tell(f"failed: {which}: {why}")
+
+        todo = find_unfinished(bundles, self.records)
+        if todo:
+            if self._pool is None:
+                self._pool = self._opened.enter_context(self._open(max(len(todo), self._pieces)))
+            self._pool(todo, keep, fail)
+
+
+def run_series(
     arguments: argparse.Namespace,
     label: str,
-    folder: Folder,
-    bundles: Sequence[Sequence[Point]],
-    keys: Sequence[str],
-    stop: Callable[[], bool],
+    total: int,
+    opened: AbstractContextManager[Folder],
+    evaluate: Callable[[Evaluation], object],
+    write: Callable[[dict[int, Record]], Sequence[str]],
     *,
+    noun: str = "points",
     errors: bool = False,
-) -> dict[int, Record]:
-    """Run the points that are not in a folder yet, with a progress line; return the records of all."""
-    records = select_done(folder.read_records(), errors=errors)
-    todo, total = find_unfinished(bundles, records), sum(len(bundle) for bundle in bundles)
-    bar = Counted(sys.stderr, label, "points", len(records))
-
-    def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
-        folder.keep_bundle(bundle, found, keys, records)
-
-    def fail(bundle: Sequence[Point], why: str) -> None:
-        # Told, but not kept: the same command tries them again.
-        for point in bundle:
-            records.setdefault(point.index, {"error": why})
-        which = (
-            f"point {bundle[0].index}" if len(bundle) == 1 else f"{len(bundle)} points from {bundle[0].index}"
-        )
-        bar.tell(f"failed: {which}: {why}")
-
-    def draw(note: str) -> None:
+    pieces: int = 0,
+) -> int:
+    """Evaluate what is missing of a series, write its files, and print; return the exit code."""
+    with opened as folder:
+        with Stop() as stop, Evaluation(
+            arguments, label, folder, total, stop, errors=errors, pieces=pieces
+        ) as evaluation:  # fmt: skip
+            evaluate(evaluation)
+            records = evaluation.collect()
+        if stop() and len(records) < total:
+            if not arguments.quiet:
+                kept = f"{len(records)} of {total} {noun} are done and kept in {folder.path}"
+                print(f"Stopped: {kept}. The same command goes on from there.")
+            return STOPPED
+        lines = write(records)
         if not arguments.quiet:
-            bar(len(records), total, note)
-
-    if todo:
-        with bar, open_pool(arguments, len(todo), stop, draw, errors=errors) as pool:
-            pool(todo, keep, fail)
-    return records
+            print(*lines, sep="\n")
+    return 0

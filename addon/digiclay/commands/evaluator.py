@@ -9,18 +9,75 @@ import os
 import pickle
 import subprocess
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from queue import SimpleQueue
-from typing import Any
+from queue import Empty, SimpleQueue
+from typing import Any, TypeVar
 
-from ..core.base.errors import DigiclayError
-from ..core.studies.axes import Point
-from ..core.studies.evaluation import Pool, Record, evaluate_bundle
-from .executors import finish
+from ..core.base.errors import DigiclayError, OutputError, one_line
+from ..core.studies.axes import Point, Record
+from ..core.studies.evaluation import Pool, evaluate_bundle
+from ..core.studies.series import describe_error
 from .worker import Process, Processes
+
+#: Seconds between two looks at whether somebody asked to stop.
+PAUSE = 0.1
+
+Piece = TypeVar("Piece")
+Outcome = TypeVar("Outcome")
+
+
+def finish(
+    executor: Executor,
+    task: Callable[[Piece], Outcome],
+    pieces: Iterable[Piece],
+    keep: Callable[[Piece, Outcome], None],
+    fail: Callable[[Piece, str], None],
+    *,
+    stopped: Callable[[], bool],
+) -> None:
+    """Have an executor do what is left of a series, by value; OutputError when it breaks down itself."""
+    arrived: SimpleQueue[Future[Outcome]] = SimpleQueue()
+    waiting: dict[Future[Outcome], Piece] = {}
+    looked = -PAUSE
+    try:
+        for piece in pieces:
+            if time.monotonic() - looked >= PAUSE:  # thousands of pieces take seconds to hand over
+                if stopped():
+                    break
+                looked = time.monotonic()
+            future = executor.submit(task, piece)
+            waiting[future] = piece
+            future.add_done_callback(arrived.put)
+        while waiting:
+            if stopped():
+                for future in waiting:
+                    future.cancel()
+            try:
+                future = arrived.get(timeout=PAUSE)
+            except Empty:
+                continue
+            piece = waiting.pop(future)
+            if future.cancelled():
+                continue
+            try:
+                outcome = future.result()
+            except BrokenExecutor:
+                raise
+            except Exception as error:  # the other pieces are worth having
+                fail(piece, describe_error(error))
+            else:
+                keep(piece, outcome)
+    except BrokenExecutor as error:
+        rule = "What is done is kept, and the same command goes on from there."
+        raise OutputError(f"{one_line(error)} {rule}") from None
+    finally:
+        for future in waiting:
+            future.cancel()
+
 
 #: How often a bundle is begun whose process dies.
 TRIES = 2

@@ -1,8 +1,9 @@
-"""``digiclay export``: the formed surface of a run as mesh files."""
+"""``digiclay export`` and ``features``: the formed surface of a run as mesh files, its bosses and creases."""
 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,15 +12,16 @@ from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_files
-from ..core.mesh_io.export_model import KINDS, Model, make_bodies
+from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import Run, find_row, read_run
-from ..core.surface.features import Finding
+from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, make_formed
 from ..core.surface.skins import SKINS
 from .arguments import add_run, millimeters, seconds, told_as_options
+from .progress import table as aligned
 from .stop import require_surface
 
 
@@ -78,10 +80,7 @@ def row_of(run: Run, time: float | None) -> int:
 
 
 def former_of(run: Run, text: str) -> int | float:
-    """Return the row of what was before, or the rest height of all pins, m.
-
-    `text`: value of --former: *rest*, or a time.
-    """
+    """Return the row of what was before, or the rest height of all pins, m."""
     if text.strip() == "rest":
         return float(run.scene.actuator.rest_height)
     try:
@@ -143,10 +142,7 @@ def formats(text: str) -> list[str]:
 
 
 def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
-    """Return the names of the files of a kind of mesh in several formats.
-
-    `kinds`: file formats; `kind`: of the mesh.
-    """
+    """Return the names of the files of a kind of mesh in several formats."""
     return [f"{STEMS[kind]}{find_suffix(one)}" for one in kinds]
 
 
@@ -158,10 +154,7 @@ def exported(
     folder: Path,
     model: Model | None = None,
 ) -> list[Path]:
-    """Write one row of a history in several formats, by default as the solid; return the files.
-
-    `row`: negative rows count from the last one; `kinds`: file formats; `model`: by default the solid.
-    """
+    """Write one row of a history in several formats, by default as the solid; return the files."""
     made = model or Model(cap=scene.actuator.bore / 2.0)
     parts = make_bodies(make_formed(history, row), made, Finding())
     known = list(kinds)
@@ -194,4 +187,42 @@ def carry_out(arguments: argparse.Namespace) -> int:
             write(some, path, arguments.unit, kind, arguments.up, arguments.forward)
             if not arguments.quiet:
                 print(f"{path} ({arguments.up} up)" if kind == "obj" else path)
+    return 0
+
+
+FEATURE_EXAMPLES = """\
+examples:
+  digiclay features ridge_mound_valley
+  digiclay features ridge_mound_valley --time 13.3 --former 10.3 --threshold "1 mm"
+  digiclay features ridge_mound_valley --json > features.json
+
+Areas are in plan, lengths of crests in space. --json writes SI units, with the pins of each feature and the
+points of its crests.
+"""
+
+
+def add_features(commands: Any) -> None:
+    """Add the command."""
+    parser = add_run(commands, "features", "list the bosses and creases of a run", FEATURE_EXAMPLES)
+    add_surface(parser)
+    parser.add_argument("--time", metavar="T", type=seconds, help="instant, s; default: the end")
+    parser.add_argument("--json", action="store_true", help="write JSON")
+    parser.set_defaults(carry_out=list_features)
+
+
+def list_features(arguments: argparse.Namespace) -> int:
+    """List the features."""
+    run = read_run(arguments.run, "height", "position", "force", "mode")
+    require_surface(run.scene, "features")
+    formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
+    features = find_features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
+    if arguments.quiet:
+        return 0
+    if arguments.json:
+        print(json.dumps([feature.figures() for feature in features], indent=1))
+        return 0
+    print(summarize(features))
+    if features:
+        head, *rows = make_table(features)
+        print("\n".join(aligned(head, rows)))
     return 0

@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from ..core.base.errors import DigiclayError
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import find_last_touch
 from .export import exported, file_names
-from .plot import PLOTS, plotted
-from .render import PICTURE, picture
+from .render import PICTURE, PLOTS, STILL, draw_still, plotted
 
 History = Mapping[str, NDArray[Any]]
 
@@ -45,11 +43,7 @@ class Extra:
 def plan_meshes(
     scene: Scene, history: History, kinds: Sequence[str], row: int = -1, within: str = ""
 ) -> Extra:
-    """Return the surface of one row as mesh files, in the run's folder or in one within it.
-
-    `history`: of the run; `kinds`: formats; `row`: of the history; by default the last one; `within`: the
-    name of the folder in the run's.
-    """
+    """Return the surface of one row as mesh files, in the run's folder or in one within it."""
 
     def make(folder: Path) -> None:
         (folder / within).mkdir(exist_ok=True)
@@ -72,7 +66,7 @@ def plan_picture(scene: Scene, history: History) -> Extra:
     """Return the picture of the last touch."""
     return Extra(
         [PICTURE],
-        lambda folder: picture(scene, history, find_last_touch(history), folder / PICTURE),
+        lambda folder: draw_still(scene, history, STILL, folder / PICTURE),
         lambda run: ["render", str(run)],
     )
 
@@ -80,10 +74,7 @@ def plan_picture(scene: Scene, history: History) -> Extra:
 def make_extras(
     extras: Iterable[Extra], folder: Path, stopped: Callable[[], bool]
 ) -> tuple[list[Extra], list[DigiclayError]]:
-    """Make one after the other; return those prevented by a stop, and the errors.
-
-    `folder`: where the run is being written; `stopped`: asked before each.
-    """
+    """Make one after the other; return those prevented by a stop, and the errors."""
     left_out: list[Extra] = []
     wrong: list[DigiclayError] = []
     for extra in extras:
@@ -98,19 +89,13 @@ def make_extras(
 
 
 def print_skipped(left_out: Iterable[Extra], run: Path) -> None:
-    """Print the files that a stop prevented, and the command that makes them.
-
-    `run`: the finished run's folder.
-    """
+    """Print the files that a stop prevented, and the command that makes them."""
     for extra in left_out:
         tell_stopped_before(", ".join(extra.files), extra.later(run))
 
 
 def tell_stopped_before(what: str, later: Sequence[str]) -> None:
-    """Print the output that a stop prevented, and the command that makes it.
-
-    `later`: arguments of the command.
-    """
+    """Print the output that a stop prevented, and the command that makes it."""
     print(f"Stopped before {what}; to have it: {format_command(later)}", file=sys.stderr)
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import base64
-import html
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -41,21 +40,14 @@ def of_picture(still: Path, folder: Path) -> Path:
 
 
 def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Path) -> Path:
-    """Make one of heights (n,), seen from above.
-
-    `height` (n,), m; `rows`, `columns`: of the bed; `folder`: of the thumbnail.
-    """
+    """Make one of heights (n,), seen from above."""
     out = folder / NAMES[1]
     write_whole(out, encode_png(height_map(height.reshape(rows, columns))))
     return out
 
 
 def height_map(height: NDArray[np.float64], wide: int = WIDTH) -> NDArray[np.uint8]:
-    """Return a bed seen from above as pixels (rows, columns, 3): dark is low, bright is high.
-
-    `height` (rows, columns), pin tops, the nearest row first; `wide`: about how many pixels the longer side
-    has; large beds leave pins out.
-    """
+    """Return a bed seen from above as pixels (rows, columns, 3): dark is low, bright is high."""
     every = max(1, -(-max(height.shape) // wide))
     shown = height[::every, ::every][::-1]
     times = max(1, wide // max(shown.shape))
@@ -121,51 +113,48 @@ class Card:
 
 
 def page(title: str, summary: str, cards: Sequence[Card], refresh: int = 0) -> str:
-    """Return the page of a batch.
-
-    `cards`: one a job; `refresh`: seconds after which a browser loads the page again; 0: never.
-    """
-    body = [
-        f"<p>{_safe(summary)}</p>",
-        "<main>",
-        *(_card(card) for card in cards),
-        "</main>",
-    ]
+    """Return the page of a batch; a browser loads it again after `refresh` seconds, never for 0."""
+    body = [f"<p>{escape(summary)}</p>", "<main>", *(_card(card) for card in cards), "</main>"]
     return wrap(title, body, refresh)
 
 
 def wrap(title: str, body: Sequence[str], refresh: int = 0) -> str:
-    """Return a self-contained page.
-
-    `body`: lines of HTML below the title; `refresh`: seconds after which a browser loads the page again; 0:
-    never.
-    """
+    """Return a self-contained page of lines of HTML."""
     again = [f'<meta http-equiv="refresh" content="{refresh}">'] if refresh else []
-    return "\n".join(
-        [
-            "<!doctype html>",
-            '<html lang="en"><head><meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            *again,
-            f"<title>{_safe(title)}</title>",
-            f"<style>\n{STYLE}</style></head><body>",
-            f"<h1>{_safe(title)}</h1>",
-            *body,
-            "</body></html>",
-            "",
-        ]
-    )
+    lines = [
+        "<!doctype html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        *again,
+        f"<title>{escape(title)}</title>",
+        f"<style>\n{STYLE}</style></head><body>",
+        f"<h1>{escape(title)}</h1>",
+        *body,
+        "</body></html>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def make_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a table."""
+    cells = [("th", head), *(("td", row) for row in rows)]
+    lines = ["".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in row) for tag, row in cells]
+    return ["<table>", *(f"<tr>{line}</tr>" for line in lines), "</table>"]
+
+
+def make_links(links: Sequence[tuple[str, str]]) -> str:
+    """Return links to files beside the page."""
+    return "\n".join(f'<a href="{escape(quote(path))}">{escape(name)}</a>' for name, path in links)
 
 
 def _card(card: Card) -> str:
     """Return one job's part of the page."""
+    name, links = escape(card.name), make_links(card.links)
     if card.error:
-        links = _links(card.links)
-        said = f"<strong>failed</strong> <span>{_safe(card.error)}</span>"
-        return f'<article class="failed"><div><h2>{_safe(card.name)}</h2>{said}<br>{links}</div></article>'
-    facts = "".join(f"<dt>{_safe(name)}</dt><dd>{_safe(value)}</dd>" for name, value in card.facts)
-    inside = f"<div><h2>{_safe(card.name)}</h2><dl>{facts}</dl>{_links(card.links)}</div>"
-    return f"<article>{_picture(card)}{inside}</article>"
+        why = f"<strong>failed</strong> <span>{escape(card.error)}</span>"
+        return f'<article class="failed"><div><h2>{name}</h2>{why}<br>{links}</div></article>'
+    facts = "".join(f"<dt>{escape(fact)}</dt><dd>{escape(value)}</dd>" for fact, value in card.facts)
+    return f"<article>{_picture(card)}<div><h2>{name}</h2><dl>{facts}</dl>{links}</div></article>"
 
 
 def _picture(card: Card) -> str:
@@ -174,15 +163,5 @@ def _picture(card: Card) -> str:
         return ""
     kind = "png" if card.thumbnail.startswith(b"\x89PNG") else "jpeg"
     data = base64.b64encode(card.thumbnail).decode("ascii")
-    shown = f'<img alt="{_safe(card.name)}" src="data:image/{kind};base64,{data}">'
-    return f'<a class="picture" href="{_safe(quote(card.leads))}">{shown}</a>' if card.leads else shown
-
-
-def _links(links: Sequence[tuple[str, str]]) -> str:
-    """Return links to files beside the page."""
-    return "\n".join(f'<a href="{_safe(quote(path))}">{_safe(said)}</a>' for said, path in links)
-
-
-def _safe(said: Any) -> str:
-    """Return a text as HTML."""
-    return html.escape(str(said))
+    shown = f'<img alt="{escape(card.name)}" src="data:image/{kind};base64,{data}">'
+    return f'<a class="picture" href="{escape(quote(card.leads))}">{shown}</a>' if card.leads else shown

@@ -1,4 +1,4 @@
-"""``digiclay job``: one job of a series, or a part of it, from its two files alone."""
+"""``digiclay job`` and ``page``: one job of a series, or a part of it, from its files alone; its page."""
 
 from __future__ import annotations
 
@@ -21,10 +21,24 @@ from ..core.scene.scene_source import load
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
 from ..plugins.method_loader import CODE, resolve_word
 from .arguments import add_command, load_by_option
-from .batch_folder import note_failure, refresh_page
-from .job_steps import ERROR, PROGRESS, Tell, check_outputs, make_film, make_frames, make_outputs
+from .batch_folder import note_failure, read_batch, refresh_page
+from .job_steps import (
+    ERROR,
+    FILES,
+    PROGRESS,
+    RUNS,
+    TIMING,
+    RunState,
+    Tell,
+    Work,
+    check_outputs,
+    judge_run,
+    list_lacking,
+    make_film,
+    make_frames,
+    make_outputs,
+)
 from .progress import Counted
-from .run_state import FILES, RUNS, TIMING, RunState, judge_run, list_lacking
 from .stop import STOPPED, WRONG, Stop
 
 EXAMPLES = """\
@@ -48,7 +62,7 @@ GRACE = 20.0
 def add(commands: Any) -> None:
     """Add the command."""
     said = "run one job of a series from its files alone; for render farms"
-    parser = add_command(commands, "job", said, EXAMPLES)
+    parser = add_command(commands, "job", said, EXAMPLES, listed=False)
     parser.add_argument("job", metavar="JOB", type=Path, help="the folder of the job")
     parser.add_argument("--out", metavar="DIR", type=Path, help="default: ../../runs/JOB, as in a series")
     parser.add_argument("--only", choices=("run", *MOVING), help="a part: all but the films, or one film")
@@ -66,38 +80,47 @@ def add(commands: Any) -> None:
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
-    """Do the job."""
-    if not arguments.follow:
-        note_failure(arguments.job, "")
-        try:
-            with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
-                said = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
-        except DigiclayError as error:
-            if not isinstance(error, BusyError):  # another process may still do it
-                note_failure(arguments.job, one_line(error))
-            refresh_page(arguments.job)
-            raise
-        refresh_page(arguments.job)
-        if not arguments.quiet:
-            print(said)
-        return 0
+    """Do the job, by itself or as a process of a batch."""
+    return _follow(arguments) if arguments.follow else _do_alone(arguments)
+
+
+def _do_alone(arguments: argparse.Namespace) -> int:
+    """Do the job with a progress line, and write its failure and its end to the page of its series."""
+    note_failure(arguments.job, "")
     try:
-        _do_job(
-            arguments, has_input_ended, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True)
-        )
+        with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
+            outcome = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
+    except DigiclayError as error:
+        if not isinstance(error, BusyError):  # another process may still do it
+            note_failure(arguments.job, one_line(error))
+        refresh_page(arguments.job)
+        raise
+    refresh_page(arguments.job)
+    if not arguments.quiet:
+        print(outcome)
+    return 0
+
+
+def _follow(arguments: argparse.Namespace) -> int:
+    """Do the job for a batch, which reads progress and error from this process's output."""
+
+    def tell(step: str, share: float) -> None:
+        print(f"{PROGRESS}{step} {share:.4f}", flush=True)
+
+    try:
+        _do_job(arguments, has_input_ended, tell)
         return 0
     except KeyboardInterrupt:
         return STOPPED
     except DigiclayError as error:
-        print(f"{ERROR}{one_line(error)}", flush=True)
-        return WRONG
+        code, why = WRONG, one_line(error)
     except MemoryError:
-        print(f"{ERROR}There is not enough memory: use fewer cells, or a higher recorder.every.", flush=True)
-        return WRONG
-    except Exception as error:  # the batch goes on, and has to tell what this was
+        code, why = WRONG, "There is not enough memory: use fewer cells, or a higher recorder.every."
+    except Exception as error:  # the batch continues, and has to report this
         traceback.print_exc()
-        print(f"{ERROR}{type(error).__name__}: {one_line(error)}", flush=True)
-        return 1
+        code, why = 1, f"{type(error).__name__}: {one_line(error)}"
+    print(f"{ERROR}{why}", flush=True)
+    return code
 
 
 def has_input_ended() -> bool:
@@ -114,7 +137,7 @@ def has_input_ended() -> bool:
 
 
 def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> str:
-    """Do the job or a part of it, and return what came of it; KeyboardInterrupt when it was stopped."""
+    """Do the job or a part of it, and return its outcome; KeyboardInterrupt when it was stopped."""
     folder, only, frames = arguments.job, arguments.only, arguments.frames
     if not os.path.isfile(folder / JOB):
         raise OutputError(f"{folder} is no job's folder: it has no {JOB}.")
@@ -122,14 +145,14 @@ def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Te
         raise OutputError("--frames must be given with --only film or --only turntable.")
     if arguments.method is not None:
         load_by_option(resolve_word(arguments.method, folder), "--method")
-    outputs = read_outputs(folder / JOB)
     out: Path = arguments.out or _find_place(folder)
+    work = Work(folder, out, read_outputs(folder / JOB), stopped, tell)
     if only not in MOVING:
-        return _do_run(arguments, outputs, out, stopped, tell)
+        return _do_run(arguments, work)
     if frames is not None:
-        drawn = make_frames(folder, out, outputs, only, frames, stopped, tell)
+        drawn = make_frames(work, only, frames)
         return f"frames {frames} of {out / only}.mp4 {'drawn' if drawn else 'were there already'}"
-    made = make_film(folder, out, outputs, only, stopped, tell)
+    made = make_film(work, only)
     return f"{'written to' if made else 'was done already:'} {out / only}.mp4"
 
 
@@ -139,28 +162,24 @@ def _find_place(job: Path) -> Path:
     return full.parent.parent / RUNS / full.name
 
 
-def _do_run(
-    arguments: argparse.Namespace, outputs: Outputs, out: Path, stopped: Callable[[], bool], tell: Tell
-) -> str:
+def _do_run(arguments: argparse.Namespace, work: Work) -> str:
     """Do the run, or only what is missing of it."""
-    wanted = replace(outputs, turntable=None, film=None) if arguments.only else outputs
-    done = arguments.overwrite or judge_run(arguments.job, out) is not RunState.WHOLE
+    wanted = replace(work.outputs, turntable=None, film=None) if arguments.only else work.outputs
+    done = arguments.overwrite or judge_run(work.job, work.run) is not RunState.WHOLE
     if done:
-        done = _write_run(arguments, wanted, out, stopped, tell)
-    for kind in list_lacking(out, wanted):
-        done |= make_film(arguments.job, out, outputs, kind, stopped, tell)
-    return f"written to {out}" if done else f"was done already: {out}"
+        done = _write_run(arguments, work, wanted)
+    for kind in list_lacking(work.run, wanted):
+        done |= make_film(work, kind)
+    return f"written to {work.run}" if done else f"was done already: {work.run}"
 
 
-def _write_run(
-    arguments: argparse.Namespace, outputs: Outputs, out: Path, stopped: Callable[[], bool], tell: Tell
-) -> bool:
+def _write_run(arguments: argparse.Namespace, work: Work, outputs: Outputs) -> bool:
     """Write the folder of the run; False when another process has just done so."""
-    folder: Path = arguments.job
+    folder, out = work.job, work.run
     scene = load(folder / SCENE)
     check_outputs(scene, outputs)
     timing: dict[str, Any] = {"start_up": time.time() - arguments.since if arguments.since else None}
-    # What a series keeps there is its own; a folder elsewhere may be somebody's.
+    # What a series keeps there is its own; a folder elsewhere may be the user's.
     overwrite = arguments.overwrite or out.resolve() == _find_place(folder)
     patience = GRACE if arguments.follow else 0.0
     with claim_folder(out, overwrite=overwrite, patience=patience) as claim:
@@ -170,10 +189,37 @@ def _write_run(
         if state in (RunState.CHANGED, RunState.INCOMPLETE) and not arguments.quiet:
             print(f"The run in {out} is {state.value}: it is done again.", flush=True)
         with claim.write() as staged:
-            make_outputs(scene, outputs, staged, timing, stopped, tell)
-            # As they were given: by them a batch knows what this is the run of.
+            make_outputs(work, scene, outputs, staged, timing)
+            # As they were given: by them a batch recognizes what this is the run of.
             for file in (SCENE, JOB, *([CODE] if (folder / CODE).is_file() else [])):
                 shutil.copyfile(folder / file, staged / file)
             timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
             write_whole(staged / TIMING, format_json(timing))
     return True
+
+
+PAGE_EXAMPLES = """\
+examples:
+  digiclay batch first --submit openjd      files for a render farm; its last task is this command
+  digiclay page first                       write first/index.html from the runs that are done
+
+It needs neither the JOBS file nor Blender. Exit code 0 also while jobs are missing.
+"""
+
+
+def add_page(commands: Any) -> None:
+    """Add the command."""
+    said = "write the page of a job series from the runs that are done"
+    parser = add_command(commands, "page", said, PAGE_EXAMPLES, listed=False)
+    parser.add_argument("series", metavar="DIR", type=Path, help="the folder of the series")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
+    parser.set_defaults(carry_out=write_page)
+
+
+def write_page(arguments: argparse.Namespace) -> int:
+    """Write the page."""
+    series = read_batch(arguments.series)
+    said = series.write_page()
+    if not arguments.quiet:
+        print(f"{said}; written to {arguments.series / 'index.html'}")
+    return 0

@@ -6,26 +6,111 @@ import argparse
 import hashlib
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.base.errors import OutputError, one_line
-from ..core.files.run_folder import claim_files, lock_name, remove_abandoned
+from ..core.base.errors import DigiclayError, OutputError, one_line
+from ..core.files.run_folder import (
+    claim_files,
+    format_json,
+    lock_name,
+    read_json,
+    remove_abandoned,
+    write_whole,
+)
+from ..core.scene.scene_source import load, load_recorded
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
-from ..core.session.finished_run import Run, read_run
+from ..core.session.finished_run import Run, has_files, is_whole, read_run
 from ..core.session.render_settings import format_range, list_missing, name_frame, read_range
 from ..core.session.run_scene import run, save
-from ..core.studies.job_table import JOB, SCENE, Outputs
-from ..plugins.method_loader import describe_origin
+from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
+from ..plugins.method_loader import CODE, describe_origin
 from .export import exported, formats
 from .gallery import of_heights, of_picture
-from .render import ARRAYS, draw_film, draw_still, draw_turntable, stage_moving
-from .run_state import PATIENCE, RunState, judge_run, list_lacking, note_film
+from .render import ARRAYS, draw_moving, draw_still, stage_moving
 from .stop import refuse_without_blender, require_surface
+
+#: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.
+RUNS, TIMING, FILES = "runs", "timing.json", "files"
+#: Seconds to wait for another process that makes or notes another film of the same run.
+PATIENCE = 20.0
+
+
+class RunState(Enum):
+    """State of a job's run, without regard to its films."""
+
+    ABSENT = "absent"
+    CHANGED = "of another definition"
+    INCOMPLETE = "incomplete"
+    WHOLE = "whole"
+
+
+def judge_run(job: Path, run: Path) -> RunState:
+    """Return what there is of a run. `job`: the folder of the job's files; `run`: the folder of its run."""
+    if not run.is_dir() or not any(run.iterdir()):
+        return RunState.ABSENT
+    if not all((run / name).is_file() for name in (SCENE, JOB)):
+        return RunState.INCOMPLETE
+    if not (_is_same(job / SCENE, run / SCENE, load) and _is_same(job / JOB, run / JOB, read_outputs)):
+        return RunState.CHANGED
+    if _read_code(job) != _read_code(run):
+        return RunState.CHANGED
+    timing = read_json(run / TIMING)
+    if timing is None:
+        return RunState.INCOMPLETE
+    sizes = timing.get(FILES)
+    whole = has_files(run, sizes) if isinstance(sizes, dict) else is_whole(run, load_recorded(run / SCENE))
+    return RunState.WHOLE if whole else RunState.INCOMPLETE
+
+
+def _read_code(folder: Path) -> bytes | None:
+    """Return the code of a method of one's own in a folder; None without one."""
+    try:
+        return (folder / CODE).read_bytes()
+    except FileNotFoundError:
+        return None
+
+
+def _is_same(one: Path, other: Path, read: Callable[[Path], object]) -> bool:
+    """Return whether two files say the same; older versions wrote it otherwise."""
+    try:
+        return one.read_bytes() == other.read_bytes() or read(one) == read(other)
+    except (OSError, DigiclayError):
+        return False
+
+
+def list_lacking(run: Path, outputs: Outputs) -> list[str]:
+    """Return those of `MOVING` that are wanted and not there."""
+    files = (read_json(run / TIMING) or {}).get(FILES)
+    # Older runs have not noted their files.
+    there = files if isinstance(files, Mapping) else {path.name for path in run.iterdir()}
+    return [kind for kind in MOVING if getattr(outputs, kind) and f"{kind}.mp4" not in there]
+
+
+def is_done(job: Path, run: Path) -> bool:
+    """Return whether a job is done, its films too. `job`, `run`: as for `judge_run`."""
+    try:
+        return judge_run(job, run) is RunState.WHOLE and not list_lacking(run, read_outputs(job / JOB))
+    except (OSError, DigiclayError):
+        return False
+
+
+def note_film(run: Path, kind: str, seconds: float, *, encoded: bool) -> None:
+    """Note in a run what was drawn for one of its films, and its file once there is one."""
+    with lock_name(run / TIMING, PATIENCE):
+        timing: dict[str, Any] = read_json(run / TIMING) or {}
+        timing[kind] = (timing.get(kind) or 0.0) + seconds
+        if encoded and isinstance(timing.get(FILES), dict):
+            name = f"{kind}.mp4"
+            timing[FILES] = {**timing[FILES], name: (run / name).stat().st_size}
+        write_whole(run / TIMING, format_json(timing))
+
 
 #: What the lines begin with that are meant for the series.
 PROGRESS, ERROR = "@ ", "! "
@@ -64,8 +149,27 @@ def read_fraction(lines: list[str]) -> float:
 #: Seconds between two lines of progress.
 PAUSE = 0.2
 
-#: Told of a step, and of how much of the whole job is done.
+#: Gets a step, and how much of the whole job is done.
 Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Work:
+    """A job that is being done.
+
+    Attributes
+    ----------
+    job, run : Path
+        Folder of the job's files, and that of its run.
+    stopped : callable
+        Returns whether to stop. All steps raise KeyboardInterrupt then; what is drawn is kept.
+    """
+
+    job: Path
+    run: Path
+    outputs: Outputs
+    stopped: Callable[[], bool]
+    tell: Tell
 
 
 def check_outputs(scene: Scene, outputs: Outputs) -> None:
@@ -82,32 +186,20 @@ def check_outputs(scene: Scene, outputs: Outputs) -> None:
         refuse_without_blender()
 
 
-def make_outputs(
-    scene: Scene,
-    outputs: Outputs,
-    out: Path,
-    timing: dict[str, Any],
-    stopped: Callable[[], bool],
-    tell: Tell,
-) -> None:
-    """Run the session, and make all that belongs to it.
-
-    `out`: the folder; `timing`: gets the seconds of each step; `stopped`: whether to stop; asked all the
-    time; `tell`: told of a step, and of how much of the whole job is done. Raises KeyboardInterrupt when it
-    was stopped.
-    """
-    names = ["run", *(n for n in ("errors", "export", "still", "turntable", "film") if getattr(outputs, n))]
-    told = 0.0
+def make_outputs(work: Work, scene: Scene, outputs: Outputs, out: Path, timing: dict[str, Any]) -> None:
+    """Run the session, and make all outputs in a folder; `timing` gets the seconds of each step."""
+    names = ["run", *(n for n in ("errors", "export", "still", *MOVING) if getattr(outputs, n))]
+    drawn, stopped = 0.0, work.stopped
 
     @contextmanager
     def step(name: str) -> Iterator[Callable[[int, int], None]]:
-        """Time a step; give what is to be called with how much of it is done."""
+        """Time a step; give the callback of its progress."""
 
         def progress(done: int, total: int) -> None:
-            nonlocal told
-            if time.monotonic() - told >= PAUSE:
-                told = time.monotonic()
-                tell(name, (names.index(name) + done / total) / len(names))
+            nonlocal drawn
+            if time.monotonic() - drawn >= PAUSE:
+                drawn = time.monotonic()
+                work.tell(name, (names.index(name) + done / total) / len(names))
 
         if stopped():
             raise KeyboardInterrupt
@@ -138,15 +230,11 @@ def make_outputs(
     if outputs.still:
         with step("still"):
             draw_still(scene, history, outputs.still, out / "still.png")
-    if outputs.turntable:
-        with step("turntable") as progress:
-            path = out / "turntable.mp4"
-            if not draw_turntable(scene, history, outputs.turntable, path, progress, stopped):
-                raise KeyboardInterrupt
-    if outputs.film:
-        with step("film") as progress:
-            if not draw_film(scene, history, outputs.film, out / "film.mp4", progress, stopped):
-                raise KeyboardInterrupt
+    for kind in MOVING:
+        if looks := getattr(outputs, kind):
+            with step(kind) as progress:
+                if not draw_moving(scene, history, looks, out / f"{kind}.mp4", progress, stopped):
+                    raise KeyboardInterrupt
     with step("thumbnail"):
         if outputs.still:
             of_picture(out / "still.png", out)
@@ -155,49 +243,32 @@ def make_outputs(
 
 
 def find_frames(run: Path, kind: str) -> Path:
-    """Return the folder of a film's frames: another one for each definition, and each version of digiclay.
-
-    `run`: the folder of the job's run; `kind`: of `MOVING`.
-    """
-    known = [__version__.encode(), *((run / name).read_bytes() for name in (SCENE, JOB))]
-    return run / f"frames-{kind}-{hashlib.sha256(b'|'.join(known)).hexdigest()[:12]}"
+    """Return the folder of a film's frames, its own for each definition and each version of digiclay."""
+    parts = [__version__.encode(), *((run / name).read_bytes() for name in (SCENE, JOB))]
+    return run / f"frames-{kind}-{hashlib.sha256(b'|'.join(parts)).hexdigest()[:12]}"
 
 
-def make_frames(
-    job: Path, run: Path, outputs: Outputs, kind: str, text: str, stopped: Callable[[], bool], tell: Tell
-) -> bool:
-    """Draw those frames of a range that are missing; return whether there were any.
-
-    `job`: the folder of the job's files; `run`: that of its finished run; `outputs`: of the job; `kind`: of
-    `MOVING`; `text`: the range, see `read_range`; `stopped`: asked before each frame; `tell`: told of a step,
-    and of how much of it is done. Raises KeyboardInterrupt when it was stopped; frames that are drawn are
-    kept. Raises OutputError when there is no finished run, or another process draws the same range.
-    """
-    looks = _find_looks(job, run, outputs, kind)
-    if kind not in list_lacking(run, outputs):
+def make_frames(work: Work, kind: str, text: str) -> bool:
+    """Draw the missing frames of a range of a film, see `read_range`; return whether there were any."""
+    looks, run = _find_looks(work, kind), work.run
+    if kind not in list_lacking(run, work.outputs):
         return False
-    found = read_run(run, "time")
-    frames = read_range(text, looks.count(found.history["time"]))
+    frames = read_range(text, looks.count(read_run(run, "time").history["time"]))
     folder = find_frames(run, kind)
     if not list_missing(folder, frames):
         return False
     refuse_without_blender()
     began = time.perf_counter()
     with lock_name(_make_folder(folder) / format_range(frames)):
-        _draw(read_run(run, *ARRAYS), looks, frames, folder, run / f"{kind}.mp4", stopped, tell)
+        _draw(work, read_run(run, *ARRAYS), looks, kind, frames, folder)
     note_film(run, kind, time.perf_counter() - began, encoded=False)
     return True
 
 
-def make_film(
-    job: Path, run: Path, outputs: Outputs, kind: str, stopped: Callable[[], bool], tell: Tell
-) -> bool:
-    """Make the film of its frames, and draw those that are missing; return whether there was none yet.
-
-    `job`, `run`, `outputs`, `kind`, `stopped`, `tell`: as for `make_frames`.
-    """
-    looks, out = _find_looks(job, run, outputs, kind), run / f"{kind}.mp4"
-    if kind not in list_lacking(run, outputs):
+def make_film(work: Work, kind: str) -> bool:
+    """Make the film of its frames, and draw those that are missing; return whether there was none yet."""
+    looks, run, out = _find_looks(work, kind), work.run, work.run / f"{kind}.mp4"
+    if kind not in list_lacking(run, work.outputs):
         return False
     refuse_without_blender()
     from ..compat import scratch
@@ -208,8 +279,7 @@ def make_film(
         found = read_run(run, *ARRAYS)
         frames = range(looks.count(found.history["time"]))
         folder = _make_folder(find_frames(run, kind))
-        if list_missing(folder, frames):
-            _draw(found, looks, frames, folder, out, stopped, tell)
+        _draw(work, found, looks, kind, frames, folder)
         with scratch():
             encode_film([name_frame(folder, frame) for frame in frames], out, looks)
         note_film(run, kind, time.perf_counter() - began, encoded=True)
@@ -217,14 +287,14 @@ def make_film(
     return True
 
 
-def _find_looks(job: Path, run: Path, outputs: Outputs, kind: str) -> Any:
+def _find_looks(work: Work, kind: str) -> Any:
     """Return the settings of a film; refuse one that the job does not have, or that has no run yet."""
-    looks = getattr(outputs, kind)
+    looks = getattr(work.outputs, kind)
     if looks is None:
-        raise OutputError(f"{job / JOB} has no section [{kind}].")
-    state = judge_run(job, run)
+        raise OutputError(f"{work.job / JOB} has no section [{kind}].")
+    state = judge_run(work.job, work.run)
     if state is not RunState.WHOLE:
-        rule = f"the run in {run} is {state.value}: do 'digiclay job {job} --only run' first"
+        rule = f"the run in {work.run} is {state.value}: do 'digiclay job {work.job} --only run' first"
         raise OutputError(f"--only {kind} needs a finished run, and {rule}.")
     return looks
 
@@ -239,15 +309,16 @@ def _make_folder(folder: Path) -> Path:
     return folder
 
 
-def _draw(
-    found: Run, looks: Any, frames: range, folder: Path, out: Path, stopped: Callable[[], bool], tell: Tell
-) -> None:
-    """Draw those frames that are missing; KeyboardInterrupt when it was stopped."""
+def _draw(work: Work, run: Run, looks: Any, kind: str, frames: range, folder: Path) -> None:
+    """Draw those frames that are missing."""
+    if not list_missing(folder, frames):
+        return
     from ..pictures.film import draw_frames
 
     def progress(done: int, total: int) -> None:
-        tell(out.stem, done / total)
+        work.tell(kind, done / total)
 
-    with stage_moving(found.scene, found.history, looks) as shots:
-        if not draw_frames(shots, list_missing(folder, frames), folder, out, progress, stopped):
+    out = work.run / f"{kind}.mp4"
+    with stage_moving(run.scene, run.history, looks) as shots:
+        if not draw_frames(shots, list_missing(folder, frames), folder, out, progress, work.stopped):
             raise KeyboardInterrupt

@@ -1,8 +1,7 @@
-"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve`` and ``benchmark``.
+"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve``, ``compare --suite``.
 
-The paper's reproduction, the studies and the server are packages of their own beside this one, which add
-their commands themselves where they are installed. Here stands what is said where they are not, and where
-the benchmarks are.
+They are in packages beside this one, where those are installed. ``digiclay benchmark`` says where the
+benchmarks are.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import argparse
 from importlib import import_module
 from importlib.util import find_spec
+from types import ModuleType
 from typing import Any, NoReturn
 
 from ..core.base.errors import DigiclayError
@@ -23,27 +23,42 @@ COMMANDS = {
     "tune": ("digiclay_study", "tune_command", "study", "find the best trade-off of two metrics"),
     "serve": ("digiclay_serve", "serve_command", "serve", "run a session for other programs"),
 }
+#: The package and the module of ``digiclay compare --suite``.
+SUITE = ("digiclay_study", "suite_command")
 NO_BENCHMARK = "The benchmarks are run from a checkout: 'python -m benchmarks --help' lists them."
+
+
+def find_beside(package: str, module: str) -> ModuleType | None:
+    """Return a module of a package beside this one, None where the package is not installed."""
+    return import_module(f"{BESIDE}{package}.{module}") if find_spec(f"{BESIDE}{package}") else None
+
+
+def refuse_absent(name: str, extra: str) -> NoReturn:
+    """Refuse a command of a package that is not installed."""
+    rule = f"is not part of the extension: run 'pip install digiclay[{extra}]' first."
+    raise DigiclayError(f"digiclay {name} {rule}")
 
 
 def add(commands: Any) -> None:
     """Add the commands of other packages, or their install messages, and the place of the benchmarks."""
     for name, (package, module, extra, help) in COMMANDS.items():
-        if find_spec(f"{BESIDE}{package}"):
-            import_module(f"{BESIDE}{package}.{module}").add(commands)
+        if found := find_beside(package, module):
+            found.add(commands)
         else:
-            said = f"digiclay {name} is not part of the extension: run 'pip install digiclay[{extra}]' first."
-            _add_absent(commands, name, f"{help} (not part of the extension)", said)
-    _add_absent(commands, "benchmark", "where the benchmarks are", NO_BENCHMARK)
+            parser = _add_any(commands, name, help=f"{help} (not part of the extension)")
+            parser.set_defaults(carry_out=lambda _, name=name, extra=extra: refuse_absent(name, extra))
+    _add_any(commands, "benchmark", description="Where the benchmarks are.").set_defaults(
+        carry_out=_refuse_benchmark
+    )
 
 
-def _add_absent(commands: Any, name: str, help: str, said: str) -> None:
-    """Add a command that takes any arguments and refuses in one line."""
+def _refuse_benchmark(arguments: argparse.Namespace) -> NoReturn:
+    raise DigiclayError(NO_BENCHMARK)
 
-    def refuse(arguments: argparse.Namespace) -> NoReturn:
-        raise DigiclayError(said)
 
+def _add_any(commands: Any, name: str, **listed: str) -> argparse.ArgumentParser:
+    """Add a command that takes any arguments."""
     # No argument begins with this, so all are taken alike, --help too.
-    parser = commands.add_parser(name, help=help, prefix_chars="\0", add_help=False)
+    parser: argparse.ArgumentParser = commands.add_parser(name, prefix_chars="\0", add_help=False, **listed)
     parser.add_argument("rest", nargs=argparse.REMAINDER)
-    parser.set_defaults(carry_out=refuse)
+    return parser

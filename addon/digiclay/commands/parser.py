@@ -16,13 +16,10 @@ from . import (
     compare,
     describe,
     export,
-    features,
     form,
     job,
     new_method,
     outside,
-    page,
-    plot,
     render,
     run,
     sweep,
@@ -71,10 +68,7 @@ class Parser(argparse.ArgumentParser):
             )
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
-        """Refuse unknown arguments here, where their command is known.
-
-        `args`: by default those of the process; `namespace` argparse.Namespace, optional.
-        """
+        """Refuse unknown arguments here, where their command is known."""
         self._given = sys.argv[1:] if args is None else args
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
@@ -103,9 +97,9 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
     every = (
-        run, batch, job, page, form, describe, export, features, plot, render, sweep, compare, new_method,
-        outside,
+        run.add, batch.add, job.add, job.add_page, form.add, describe.add, export.add, export.add_features,
+        render.add_plot, render.add, sweep.add, compare.add, new_method.add, outside.add,
     )  # fmt: skip
-    for command in every:
-        command.add(commands)
+    for add in every:
+        add(commands)
     return top

@@ -1,4 +1,4 @@
-"""``digiclay render``: picture, turntable or film of a run, drawn by Blender."""
+"""``digiclay render`` and ``plot``: a run as picture, turntable or film by Blender, and as plots."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +16,22 @@ from ..core.base.errors import DigiclayError
 from ..core.files.run_folder import claim_files
 from ..core.metrics.summary import compute_metrics
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import find_last_touch, find_row, read_run
+from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size, told_as_options
 from .progress import Counted
-from .stop import STOPPED, Stop, refuse_file, refuse_without_blender
+from .stop import (
+    STOPPED,
+    Stop,
+    refuse_file,
+    refuse_unwritable,
+    refuse_without,
+    refuse_without_blender,
+    require_surface,
+)
 
 if TYPE_CHECKING:
+    from ..device.instant import Instant
     from ..pictures.film import Shots
 
 EXAMPLES = """\
@@ -33,6 +43,8 @@ examples:
 """
 #: What a picture is called unless told otherwise.
 PICTURE = "pins.png"
+#: How a picture looks unless told otherwise.
+STILL = Still(width=1600, height=1000, engine="cycles")
 #: What drawing needs of a history.
 ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force")
 #: Options of one kind of picture only.
@@ -80,29 +92,25 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Render."""
     with told_as_options("Still", "Film", "Turntable", width="size", height="size"):
-        looks = _looks(arguments)
-        return _drawn(arguments, looks)
+        return _draw(arguments, _looks(arguments))
 
 
-def _drawn(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int:
+def _draw(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int:
     """Draw, and print the path."""
-    name, ending = ("film" if isinstance(looks, Film) else "turntable"), ".mp4"
-    if isinstance(looks, Still):
-        name, ending = Path(PICTURE).stem, ".png"
-    out: Path = arguments.out or arguments.run / f"{name}{ending}"
-    refuse_file(out, ending)
+    default = Path(PICTURE if isinstance(looks, Still) else f"{type(looks).__name__.lower()}.mp4")
+    out: Path = arguments.out or arguments.run / default
+    name = default.stem
+    refuse_file(out, default.suffix)
     refuse_without_blender()
     run = read_run(arguments.run, *ARRAYS)
     row = None if arguments.time is None else find_row(run.history, arguments.time, "--time")
     path: Path | None
     with claim_files([out]), Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
         told = None if arguments.quiet else bar
-        if isinstance(looks, Film):
-            path = draw_film(run.scene, run.history, looks, out, told, stop)
-        elif isinstance(looks, Turntable):
-            path = draw_turntable(run.scene, run.history, looks, out, told, stop, row)
-        else:  # Blender does not stop within a picture
+        if isinstance(looks, Still):  # Blender does not stop within a picture
             path = draw_still(run.scene, run.history, looks, out, row)
+        else:
+            path = draw_moving(run.scene, run.history, looks, out, told, stop, row)
     if path is None:
         print("Stopped; nothing was written.", file=sys.stderr)
         return STOPPED
@@ -127,11 +135,9 @@ def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
         raise DigiclayError("--time must not be given with --film: give --start and --stop.")
     names = ("engine", "color", "arrows", *own)
     given = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
-    if kind is Still:
-        given = {"engine": "cycles", "width": 1600, "height": 1000, **given}
     if arguments.size is not None:
         given["width"], given["height"] = arguments.size
-    return kind(**given)
+    return replace(STILL, **given) if kind is Still else kind(**given)
 
 
 def sizes(scene: Scene) -> dict[str, Any]:
@@ -141,85 +147,45 @@ def sizes(scene: Scene) -> dict[str, Any]:
     return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoid(scene)}
 
 
-def picture(
-    scene: Scene,
-    history: Mapping[str, NDArray[Any]],
-    row: int,
-    out: Path,
-    *,
-    width: int = 1600,
-    height: int = 1000,
-    engine: str = "cycles",
-) -> Path:
-    """Draw one row of a history. `row`: of the history; `width`, `height`: pixels."""
-    return draw_still(scene, history, Still(width=width, height=height, engine=engine), out, row)
-
-
 def draw_still(
     scene: Scene, history: Mapping[str, NDArray[Any]], looks: Still, out: Path, row: int | None = None
 ) -> Path:
-    """Draw an instant, or one row of a history; Blender is imported only now.
-
-    `row`: of the history; by default the instant of `looks`.
-    """
-    from ..device.instant import Instant
+    """Draw the instant of `looks`, or one row of a history; Blender is imported only now."""
     from ..pictures.still import render_still
 
-    instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
     names = ("width", "height", "engine", "samples", "color", "arrows")
+    instant = _find_instant(scene, history, looks, row)
     return render_still(instant, out, **{name: getattr(looks, name) for name in names})
 
 
-def draw_turntable(
+def draw_moving(
     scene: Scene,
     history: Mapping[str, NDArray[Any]],
-    looks: Turntable,
+    looks: Film | Turntable,
     out: Path,
     progress: Callable[[int, int], None] | None = None,
     stopped: Callable[[], bool] | None = None,
     row: int | None = None,
 ) -> Path | None:
-    """Draw an instant, or one row of a history, turning once; None when it was stopped.
+    """Draw a session, or one rotation at the instant of `looks` or at a row; None when it was stopped."""
+    from ..pictures.film import render_film, render_turntable
 
-    `progress`: told of frames done, and of all; `stopped`: whether to stop; asked before each frame; `row`:
-    of the history; by default the instant of `looks`.
-    """
-    from ..device.instant import Instant
-    from ..pictures.film import render_turntable
-
-    instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
+    if isinstance(looks, Film):
+        session = _describe_session(scene, history)
+        return render_film(history, out, looks, progress=progress, stopped=stopped, **session)
+    instant = _find_instant(scene, history, looks, row)
     return render_turntable(instant, out, looks, progress=progress, stopped=stopped)
-
-
-def draw_film(
-    scene: Scene,
-    history: Mapping[str, NDArray[Any]],
-    looks: Film,
-    out: Path,
-    progress: Callable[[int, int], None] | None = None,
-    stopped: Callable[[], bool] | None = None,
-) -> Path | None:
-    """Draw a session; None when it was stopped.
-
-    `progress`: told of frames done, and of all; `stopped`: whether to stop; asked before each frame.
-    """
-    from ..pictures.film import render_film
-
-    return render_film(
-        history, out, looks, progress=progress, stopped=stopped, **_describe_session(scene, history)
-    )
 
 
 def stage_moving(
     scene: Scene, history: Mapping[str, NDArray[Any]], looks: Film | Turntable
 ) -> AbstractContextManager[Shots]:
-    """Set the stage for single frames of the film `draw_film` or `draw_turntable` would draw."""
-    from ..device.instant import Instant
+    """Set the stage for single frames of the film that `draw_moving` would draw."""
     from ..pictures.film import stage_film, stage_turntable
 
     if isinstance(looks, Film):
         return stage_film(history, looks, **_describe_session(scene, history))
-    return stage_turntable(Instant.of(history, _row(history, looks.when, None), **sizes(scene)), looks)
+    return stage_turntable(_find_instant(scene, history, looks, None), looks)
 
 
 def _describe_session(scene: Scene, history: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
@@ -227,8 +193,51 @@ def _describe_session(scene: Scene, history: Mapping[str, NDArray[Any]]) -> dict
     return {"set_point": compute_metrics(history, scene.set_point)["set_point"], **sizes(scene)}
 
 
-def _row(history: Mapping[str, NDArray[Any]], when: str, row: int | None) -> int:
-    """Return the row asked for, or that of an instant by its name."""
-    if row is not None:
-        return row
-    return find_last_touch(history) if when == "last touch" else len(history["time"]) - 1
+def _find_instant(
+    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Still | Turntable, row: int | None
+) -> Instant:
+    """Return a row of a history for drawing, by default the instant of `looks`."""
+    from ..device.instant import Instant
+
+    if row is None:
+        row = find_last_touch(history) if looks.when == "last touch" else len(history["time"]) - 1
+    return Instant.of(history, row, **sizes(scene))
+
+
+PLOT_EXAMPLES = """\
+examples:
+  digiclay plot ridge_mound_valley
+  digiclay plot ridge_mound_valley --out pictures
+"""
+#: The files.
+PLOTS = ("session.png", "surface.png")
+
+
+def add_plot(commands: Any) -> None:
+    """Add the command."""
+    said = "draw heights and force of a run over time, and its final surface"
+    parser = add_run(commands, "plot", said, PLOT_EXAMPLES)
+    parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")
+    parser.set_defaults(carry_out=plot)
+
+
+def plotted(scene: Scene, history: Mapping[str, NDArray[Any]], folder: Path) -> list[Path]:
+    """Draw a history into a folder; return the files."""
+    from ..plots.run import session, surface
+
+    paths = [folder / name for name in PLOTS]
+    return [session(history, paths[0], scene.set_point), surface(history, paths[1])]
+
+
+def plot(arguments: argparse.Namespace) -> int:
+    """Plot."""
+    folder: Path = arguments.out or arguments.run
+    refuse_without("matplotlib", "digiclay plot", "pip install digiclay[plots]")
+    run = read_run(arguments.run, *(name for name in SHAPES if name != "time"))
+    require_surface(run.scene, "plot")
+    refuse_unwritable(folder)
+    with claim_files([folder / name for name in PLOTS]):
+        for path in plotted(run.scene, run.history, folder):
+            if not arguments.quiet:
+                print(path)
+    return 0

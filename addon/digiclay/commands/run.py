@@ -34,10 +34,7 @@ from .stop import STOPPED, Stop, refuse_without, refuse_without_blender, require
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
-    """Leave out of a scene what a budget of height error, m, allows; print what that is.
-
-    `budget`, m; `quiet`: print nothing.
-    """
+    """Leave out of a scene what a budget of height error, m, allows; print what that is."""
     with Line(sys.stderr) as line:
         told = None if quiet else lambda said: line.draw(f"trying: {said}")
         with told_as_options("run"):

@@ -84,10 +84,7 @@ def allow_interrupt() -> Iterator[None]:
 
 @contextmanager
 def defer_interrupt() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of the block: libraries take an interrupted import for a broken one.
-
-    Raises KeyboardInterrupt: at the end, when somebody has asked to stop.
-    """
+    """Let Ctrl-C wait for the end of the block: libraries take an interrupted import for a broken one."""
     with Stop() as stop:
         yield
     if stop():
@@ -103,10 +100,7 @@ def require_surface(scene: Scene, option: str) -> None:
 
 
 def refuse_without(module: str, option: str, remedy: str) -> None:
-    """Refuse what needs a library that is not installed.
-
-    `option`: what needs it; `remedy`: the command that installs it.
-    """
+    """Refuse what needs a library that is not installed."""
     if importlib.util.find_spec(module) is None:
         raise OutputError(f"{option} needs {module}: run '{remedy}'.")
 
@@ -127,10 +121,7 @@ def refuse_unwritable(folder: Path) -> None:
 
 
 def refuse_file(out: Path, ending: str) -> None:
-    """Refuse a file that cannot be written, or whose name promises another format.
-
-    `ending`: of its name, with the dot.
-    """
+    """Refuse a file that cannot be written, or whose name promises another format."""
     if out.suffix.lower() != ending:
         raise OutputError(f"--out must end with {ending} (got {out}).")
     if os.path.isdir(out):

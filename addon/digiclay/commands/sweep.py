@@ -5,27 +5,20 @@ from __future__ import annotations
 import argparse
 import itertools
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.base.errors import DigiclayError, OutputError, ParameterError
+from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import write_whole
 from ..core.metrics.metric_table import ERRORS
-from ..core.scene.scene_source import Setting, find
-from ..core.studies.axes import Axis, Column, make_columns, make_points, read_axis
-from ..core.studies.evaluation import (
-    Record,
-    explain_failed_batches,
-    find_figure,
-    make_bundles,
-)
+from ..core.scene.scene_source import find
+from ..core.studies.axes import Axis, Column, Record, make_columns, make_points, read_axis
+from ..core.studies.evaluation import explain_failed_batches, make_bundles, read_metrics
 from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
-from .arguments import add_scene, name_methods, settings_of
-from .evaluation_pool import add_pool, finish_points
+from .arguments import add_command, name_methods, settings_of
+from .evaluation_pool import add_series, run_series
 from .progress import Counted
-from .stop import STOPPED, Stop
 
 EXAMPLES = """\
 examples:
@@ -43,78 +36,51 @@ force_error and total_force_error every point is integrated once more.
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Run a scene at many points of its parameters."
-    parser = commands.add_parser(
-        "sweep", help="run a scene over a grid of parameter values", description=said, epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
-    add_scene(parser)
-    parser.add_argument(
-        "--vary", metavar="KEY=VALUES", action="append", required=True,
-        help="START:STOP:COUNT, START:STOP:COUNT:log or A,B,C; may be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--metric", metavar="M,...", default="rfd,lag", help="metrics of table and plot; default: rfd,lag"
+    listed, purpose = (
+        "run a scene over a grid of parameter values",
+        "Run a scene at many points of its parameters.",
     )
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder")
-    add_pool(parser)
-    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
+    parser = add_command(commands, "sweep", listed, EXAMPLES, purpose)
+    add_series(parser, "START:STOP:COUNT, START:STOP:COUNT:log or A,B,C", "rfd,lag", "VALUES")
     parser.set_defaults(carry_out=carry_out)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run what is not done yet, and write the table and the pictures."""
-    names = list(dict.fromkeys(find_figure(word.strip()) for word in arguments.metric.split(",")))
-    axes = [read_axis(name_methods(said)) for said in arguments.vary]
+    names = read_metrics(arguments.metric)
+    axes = [read_axis(name_methods(varied)) for varied in arguments.vary]
     with Counted(sys.stderr, "sweep", "points read") as bar:
-        told = None if arguments.quiet else bar
-        points = make_points(find(arguments.scene), _read_settings(arguments, axes), axes, told)
+        progress = None if arguments.quiet else bar
+        points = make_points(find(arguments.scene), settings_of(arguments), axes, progress)
         if not any(point.scene and point.scene.recorder for point in points):
             raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
         errors = any(name in ERRORS for name in names)
         bundles = make_bundles(points, errors=errors)
-    with open_sweep(arguments.out, points, axes, __version__) as folder:
-        with Stop() as stop:
-            every = (*bundles.batches, *bundles.alone)
-            keys = [one.key for one in axes]
-            records = finish_points(arguments, "sweep", folder, every, keys, stop, errors=errors)
-            if stop() and len(records) < len(points):
-                if not arguments.quiet:
-                    said = f"{len(records)} of {len(points)} points are done and kept in {folder.path}"
-                    print(f"Stopped: {said}. The same command goes on from there.")
-                return STOPPED
+
+    def write(records: dict[int, Record]) -> list[str]:
         columns = make_columns(points, axes)
-        values = itertools.product(*(one.values for one in columns))
-        found = [record for _, record in sorted(records.items())]
-        table = format_table([(one.key, one.unit) for one in columns], values, found, names)
+        values = itertools.product(*(column.values for column in columns))
+        rows = [records[point.index] for point in points]
+        table = format_table([(column.key, column.unit) for column in columns], values, rows, names)
         write_whole(arguments.out / "sweep.csv", table.encode("utf-8"))
         notes = _draw_pictures(arguments.out, columns, axes, records, names)
-        failed = [record["error"] for record in found if "error" in record]
+        failed = [record["error"] for record in rows if "error" in record]
         if len(failed) == len(points):
             raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
-        if not arguments.quiet:
-            tail = f", {len(failed)} of them failed: see the column error" if failed else ""
-            lines = [*bundles.describe(), *explain_failed_batches(records), *notes]
-            print(f"{len(points)} points{tail}", *lines, f"written to {arguments.out}", sep="\n")
-        return 0
+        tail = f", {len(failed)} of them failed: see the column error" if failed else ""
+        ways = [*bundles.describe(), *explain_failed_batches(records)]
+        return [f"{len(points)} points{tail}", *ways, *notes, f"written to {arguments.out}"]
 
-
-def _read_settings(arguments: argparse.Namespace, axes: Sequence[Axis]) -> list[Setting]:
-    """Return what the options change of the scene; what varies is given by --vary alone."""
-    settings = settings_of(arguments)
-    varied = [one.key for one in axes]
-    for key, _, option in settings[len(arguments.settings) :]:
-        if key in varied:
-            raise ParameterError(f"--vary {key}", "", f"must not be given to {option} as well", key)
-    return settings
+    keys = [axis.key for axis in axes]
+    opened = open_sweep(arguments.out, points, axes, __version__)
+    return run_series(
+        arguments, "sweep", len(points), opened, lambda series: series.finish(bundles.every, keys), write,
+        errors=errors,
+    )  # fmt: skip
 
 
 def _draw_pictures(
-    out: Path,
-    columns: Sequence[Column],
-    axes: Sequence[Axis],
-    records: dict[int, Record],
-    names: Sequence[str],
+    out: Path, columns: list[Column], axes: list[Axis], records: dict[int, Record], names: tuple[str, ...]
 ) -> list[str]:
     """Draw the figures over one or two axes; return the messages."""
     if len(axes) > 2:
@@ -124,6 +90,6 @@ def _draw_pictures(
     try:
         for name in names:
             picture(columns, name, make_grid(records, axes, name), out / f"{name}.png")
-    except OutputError as error:  # the table is there, and pictures can be had later
+    except OutputError as error:  # the table is written, and pictures can be drawn later
         return [str(error)]
     return []

@@ -1,7 +1,7 @@
-"""Tasks of a job series on a render farm, and their templates for OpenJD, Flamenco and OpenCue.
+"""Tasks of a job series on a render farm, and their files for OpenJD, Flamenco and OpenCue.
 
-Of each job: the run, the frames of its films in ranges, and one task a film that encodes them; the page
-last. Each task is a command of digiclay that does nothing, with exit code 0, where it is done already.
+Of each job: the run, the frames of its films in ranges, and a task a film that encodes them; the page last.
+Each task is a command of digiclay that does nothing, with exit code 0, where it is done already.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -74,11 +74,7 @@ class Task:
 
 
 def plan_series(series: JobSeries, chunk: int) -> tuple[Task, ...]:
-    """Return the tasks of all jobs whose values go together, each after those it needs.
-
-    `chunk`: frames of a film that a task draws, at most. Raises DigiclayError when a film shows what is not
-    in the session of its job, or there is no job.
-    """
+    """Return the tasks of all jobs that have a scene, each after those it needs; `chunk` frames a task."""
     tasks = [task for job in series.jobs for task in _plan_job(job, series.outputs, chunk)]
     if not tasks:
         raise OutputError("No job can be submitted: the values of none go together.")
@@ -88,7 +84,7 @@ def plan_series(series: JobSeries, chunk: int) -> tuple[Task, ...]:
 
 
 def _plan_job(job: Job, outputs: Outputs, chunk: int) -> list[Task]:
-    """Return the tasks of a job."""
+    """Return the tasks of a job; OutputError where a film shows what is not in its session."""
     if job.scene is None:
         return []
     time = (0.0, job.scene.periods * job.scene.simulation.control_period)
@@ -111,39 +107,53 @@ def _plan_job(job: Job, outputs: Outputs, chunk: int) -> list[Task]:
     return tasks
 
 
-def split_frames(tasks: tuple[Task, ...]) -> tuple[Task, ...]:
+def split_frames(tasks: Sequence[Task]) -> list[Task]:
     """Return tasks of which each draws one range of frames at most, for farms without ranges of their own."""
-    parts: dict[str, tuple[str, ...]] = {}
-    found: list[Task] = []
+    parts: dict[str, list[Task]] = {}
     for task in tasks:
-        needs = tuple(name for need in task.needs for name in parts[need])
-        if task.frames is None:
-            own = [replace(task, needs=needs)]
-        else:
-            own = [
-                replace(
-                    task, name=f"{task.name} {text}", options=(*task.options, FRAME_OPTION, text),
-                    needs=needs, frames=None,
-                )
-                for text in task.frames.list_ranges()
-            ]  # fmt: skip
-        parts[task.name] = tuple(part.name for part in own)
-        found += own
-    return tuple(found)
+        whole = replace(
+            task, needs=tuple(part.name for need in task.needs for part in parts[need]), frames=None
+        )
+        parts[task.name] = [
+            replace(whole, name=f"{task.name} {text}", options=(*task.options, FRAME_OPTION, text))
+            for text in task.frames.list_ranges()
+        ] if task.frames else [whole]  # fmt: skip
+    return [part for group in parts.values() for part in group]
 
 
+@dataclass(frozen=True)
+class Submission:
+    """Series as a farm gets it: its name, folder and tasks, and the program with its first arguments."""
+
+    name: str
+    series: str
+    tasks: Sequence[Task]
+    program: Sequence[str]
+
+    def show(self, *words: str) -> str:
+        """Return a command as it is typed into a terminal."""
+        return join_words(words, windows=os.name == "nt")
+
+    def find(self, name: str) -> str:
+        """Return the path of a file in the folder of the series."""
+        return os.path.join(self.series, name)
+
+
+#: What a format makes: the text of each file by its path in the folder, and how they are submitted.
+Written = tuple[dict[str, str], list[str]]
 #: Characters of a step's name, and seconds a task gets to stop by itself.
 LONGEST, GRACE = 64, 30
 #: Names of the parameter that is the program, by the first of its arguments: the others fit that kind alone.
 PROGRAMS = {"-m": "Python", "--background": "Blender", "": "Digiclay"}
 
 
-def format_template(name: str, tasks: Sequence[Task], leading: Sequence[str]) -> str:
-    """Return the template of a series; `leading` are the program's arguments before those of digiclay."""
-    steps, program = name_steps(tasks), name_program(leading)
+def write_openjd(made: Submission) -> Written:
+    """Return the job template of OpenJD."""
+    path, *leading = made.program
+    program, steps = PROGRAMS[leading[0] if leading else ""], _name_steps(made.tasks)
     template = {
         "specificationVersion": "jobtemplate-2023-09",
-        "name": name,
+        "name": made.name,
         "description": "A series of digiclay: runs, frames, films and the page.",
         "parameterDefinitions": [
             {
@@ -156,17 +166,21 @@ def format_template(name: str, tasks: Sequence[Task], leading: Sequence[str]) ->
                 "description": f"The path of {program}; it is started with: {' '.join([*leading, 'job'])}",
             },
         ],
-        "steps": [_make_step(task, steps, program, leading) for task in tasks],
+        "steps": [_make_step(task, steps, program, leading) for task in made.tasks],
     }  # fmt: skip
-    return json.dumps(template, indent=1, ensure_ascii=False) + "\n"
+    name = "openjd.json"
+    return {name: _format(template)}, [
+        f"check: {made.show('openjd', 'check', made.find(name))}",
+        f"run on this machine: {made.show('openjd', 'run', made.find(name), '-p', f'{program}={path}')}",
+    ]
 
 
-def name_program(leading: Sequence[str]) -> str:
-    """Return the name of the parameter that is the program, by its arguments before those of digiclay."""
-    return PROGRAMS[leading[0] if leading else ""]
+def _format(table: dict[str, Any]) -> str:
+    """Return a table as JSON."""
+    return json.dumps(table, indent=1, ensure_ascii=False) + "\n"
 
 
-def name_steps(tasks: Sequence[Task]) -> dict[str, str]:
+def _name_steps(tasks: Sequence[Task]) -> dict[str, str]:
     """Return the names of steps by those of their tasks: a long one is cut and gets a number."""
     steps = {}
     for number, task in enumerate(tasks, 1):
@@ -193,19 +207,15 @@ def _make_step(task: Task, steps: dict[str, str], program: str, leading: Sequenc
     return {**step, "script": {"actions": {"onRun": run}}}
 
 
-#: The job type's script; its name without ending, with - for _, is the type's.
+#: The script of Flamenco's job type; its name without ending, with - for _, is the type's.
 SCRIPT = Path(__file__).with_name("digiclay_series.js")
 #: Flamenco's names of systems.
 PLATFORMS = {"win32": "windows", "darwin": "darwin"}
 
 
-def format_job(name: str, tasks: Sequence[Task], program: Sequence[str], series: str) -> str:
-    """Return a job as the Manager takes it.
-
-    `tasks`: each after those it needs; `program`: path of the program, and its arguments before those of
-    digiclay; `series`: folder of the series.
-    """
-    parts = split_frames(tuple(tasks))
+def write_flamenco(made: Submission) -> Written:
+    """Return the job type of Flamenco, and the job as its Manager takes it."""
+    parts = split_frames(made.tasks)
     places = {part.name: number for number, part in enumerate(parts)}
     plan = [
         {
@@ -214,46 +224,51 @@ def format_job(name: str, tasks: Sequence[Task], program: Sequence[str], series:
         }
         for part in parts
     ]  # fmt: skip
-    settings = {
-        "program": program[0],
-        "program_args": json.dumps(program[1:], ensure_ascii=False),
-        "series": series,
-        "tasks": json.dumps(plan, ensure_ascii=False),
-    }
-    job = {
-        "name": name,
+    table = {
+        "name": made.name,
         "type": SCRIPT.stem.replace("_", "-"),
         "priority": 50,
         "submitter_platform": PLATFORMS.get(sys.platform, "linux"),
         "metadata": {"project": "digiclay"},
-        "settings": settings,
+        "settings": {
+            "program": made.program[0],
+            "program_args": json.dumps(made.program[1:], ensure_ascii=False),
+            "series": made.series,
+            "tasks": json.dumps(plan, ensure_ascii=False),
+        },
     }
-    return json.dumps(job, indent=1, ensure_ascii=False) + "\n"
+    script, job = f"flamenco/{SCRIPT.name}", "flamenco/job.json"
+    post = ("curl", "--header", "Content-Type: application/json", "--data-binary", f"@{made.find(job)}")
+    return {script: SCRIPT.read_text(encoding="utf-8"), job: _format(table)}, [
+        f"once: put {made.find(script)} into the folder 'scripts' beside flamenco-manager, and restart it",
+        f"submit: {made.show(*post, 'http://MANAGER:8080/api/v3/jobs')}",
+    ]
 
 
-def format_lists(tasks: Sequence[Task], program: Sequence[str], series: str) -> dict[str, str]:
-    """Return the lists by their names, in the order in which they are to be submitted.
-
-    `tasks`: each after those it needs; `program`: path of the program, and its arguments before those of
-    digiclay; `series`: folder of the series. Raises OutputError when a path cannot stand in a line.
-    """
+def write_cuecmd(made: Submission) -> Written:
+    """Return lists of commands for OpenCue, in the order in which they are to be submitted."""
     depth: dict[str, int] = {}
     lists: dict[tuple[int, str], list[str]] = {}
-    for task in split_frames(tuple(tasks)):
+    for task in split_frames(made.tasks):
         depth[task.name] = 1 + max((depth[need] for need in task.needs), default=0)
-        line = join_words([*program, *task.list_arguments(series)], windows=os.name == "nt")
+        line = made.show(*made.program, *task.list_arguments(made.series))
         lists.setdefault((depth[task.name], task.stage), []).append(line)
-    return {
-        f"{number}-{stage}.txt": "\n".join(lines) + "\n" for (number, stage), lines in sorted(lists.items())
+    files = {
+        f"cuecmd/{number}-{stage}.txt": "\n".join(lines) + "\n"
+        for (number, stage), lines in sorted(lists.items())
     }
+    submits = [made.show("cuecmd", made.find(name)) for name in files]
+    return files, ["submit each when the one before has ended:", *submits]
+
+
+#: The formats by their names.
+FORMATS: dict[str, Callable[[Submission], Written]] = {
+    "openjd": write_openjd, "flamenco": write_flamenco, "cuecmd": write_cuecmd,
+}  # fmt: skip
 
 
 def join_words(words: Sequence[str], *, windows: bool) -> str:
-    """Return a command as one line of a shell.
-
-    `windows`: for cmd.exe, where double quotes protect all but themselves and percent signs. Raises
-    OutputError when a word cannot stand in a line.
-    """
+    """Return a command as one line of a shell; OutputError when a word cannot stand in a line."""
     for word in words:
         if re.search(r"[\x00-\x1f\x7f]", word) or (windows and re.search('[%"]', word)):
             raise OutputError(
@@ -261,5 +276,6 @@ def join_words(words: Sequence[str], *, windows: bool) -> str:
             )
     if not windows:
         return shlex.join(words)
+    # In cmd.exe double quotes protect all but themselves and percent signs.
     quoted = (re.sub(r"(\\+)$", r"\1\1", word) for word in words)
     return " ".join(word if re.fullmatch(r"[\w.:\\/+-]+", word) else f'"{word}"' for word in quoted)

@@ -29,21 +29,12 @@ LABELS = 12
 
 
 def picture(columns: Sequence[Column], name: str, values: Floats, out: str | Path) -> Path:
-    """Write `sweep_figure` as a PNG and return its path; OutputError when it cannot be written.
-
-    `columns`: the varied parameters; `name`: of the metric; `values`: one dimension a column; NaN where a
-    point failed or has no such figure; `out`: the PNG.
-    """
+    """Write `sweep_figure` as a PNG and return its path; OutputError when it cannot be written."""
     return save(sweep_figure(columns, name, values), out)
 
 
 def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure:
-    """Draw a figure over the one or two axes of a sweep.
-
-    `columns`: one or two; `name`: a key of `evaluation.FIGURES`; `values`: one dimension a column; NaN where
-    a point failed or has no such figure. Returns its axes, by label: ``sweep``; with two columns also
-    ``scale``.
-    """
+    """Draw a figure over the one or two axes of a sweep."""
     meaning = FIGURES[name].doc
     factor, read = read_unit(FIGURES[name].unit, values)
     label = f"{name} ({read})" if read else name
@@ -59,10 +50,7 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
 
 
 def read_unit(unit: str, values: Any) -> tuple[float, str]:
-    """Return factor and name of the unit people read; times below half a second are read in ms.
-
-    `unit`: SI; empty or 1 for none; `values` array_like, in SI.
-    """
+    """Return factor and name of the unit people read; times below half a second are read in ms."""
     if unit == "s":
         known = [abs(value) for value in np.ravel(values) if np.isfinite(value)]
         return (1e3, "ms") if known and max(known) < 0.5 else (1.0, "s")

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,12 @@ from ..files.tables import ReadParts
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
 
+#: Result of a point: its ``figures``, or the ``error`` it ended in.
+Record = dict[str, Any]
+#: Measurement of a scene, given a function that says whether to stop; None after a stop.
+Measure = Callable[[Scene, Callable[[], bool] | None], Record | None]
 #: More points than this are refused: a slip of the keyboard, not a sweep.
 MOST = 10_000
-SYNTAX = "must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C"
 
 
 @dataclass(frozen=True)
@@ -54,15 +57,14 @@ class Point:
     scene : Scene or None
         None where the values do not go together; `error` says why.
     measure : callable or None
-        What is measured of it, see `evaluation.evaluate`; None: the figures of its session. Told the scene
-        and whether somebody asks to stop; returns the record, None after a stop.
+        By default the figures of the session, see `evaluation.evaluate`.
     """
 
     index: int
     words: tuple[str, ...]
     scene: Scene | None
     error: str = ""
-    measure: Callable[[Scene, Callable[[], bool] | None], dict[str, Any] | None] | None = None
+    measure: Measure | None = None
 
 
 @dataclass(frozen=True)
@@ -88,52 +90,89 @@ class Column:
         return all(isinstance(value, (int, float)) for value in self.values)
 
 
-def read_axis(said: str) -> Axis:
-    """Read what varies, and how: ``control.force_gain=1:10:10``.
+class Varied(NamedTuple):
+    """Reading of ``--vary``: words, or two ends as they were written, with a unit behind both."""
 
-    Raises ParameterError: in one line: key, rule, value.
-    """
-    key, _, values = (part.strip() for part in said.partition("="))
+    key: str
+    words: tuple[str, ...] = ()
+    ends: tuple[str, str] = ("", "")
+    unit: str = ""
+    steps: str = ""
+    logarithmic: bool = False
+
+
+def read_varied(text: str, *names: str) -> Varied:
+    """Read what varies: KEY=A,B,C or KEY=LOW:HIGH[:log], with a count if `names` has three for its parts."""
+    form = ":".join(names)
+    key, _, values = (part.strip() for part in text.partition("="))
     if not key or not values:
-        raise ParameterError("--vary", "", SYNTAX, repr(said))
-    owner, ends = f"--vary {key}", [part.strip() for part in values.split(":")]
-    if len(ends) > 1:
-        return _read_range(key, owner, ends, values)
-    words = tuple(word.strip() for word in values.split(","))
-    if not all(words):
-        raise ParameterError(owner, "", "must have a value between commas", repr(values))
-    if len(set(words)) < len(words):
-        raise ParameterError(owner, "", "must not name a value twice", repr(values))
-    return Axis(key, words)
+        rule = f"must be KEY={form}, KEY={form}:log or KEY=A,B,C"
+        raise ParameterError("--vary", "", rule, repr(text))
+
+    def require(holds: bool, rule: str) -> None:
+        if not holds:
+            raise ParameterError(f"--vary {key}", "", rule, repr(values))
+
+    parts = [part.strip() for part in values.split(":")]
+    if len(parts) == 1:
+        words = tuple(word.strip() for word in values.split(","))
+        require(all(words), "must have a value between commas")
+        require(len(set(words)) == len(words), "must not name a value twice")
+        return Varied(key, words)
+    logarithmic, at = parts[len(names) :] == ["log"], f"at {names[0]} and {names[1]}"
+    count = "" if len(names) > 2 else ", without a count"
+    require(len(parts) == len(names) + logarithmic, f"must be {form} or {form}:log{count}")
+    (low, _, unit), (high, _, other) = (end.partition(" ") for end in parts[:2])
+    require(unit.strip() == other.strip(), f"must have the same unit {at}")
+    require(all(map(_is_number, (low, high))), f"must have a number {at}")
+    start, stop = float(low), float(high)
+    require(
+        math.isfinite(start) and math.isfinite(stop) and start != stop,
+        f"must have two different finite numbers {at}",
+    )
+    require(
+        not logarithmic or min(start, stop) > 0.0,
+        f"must have numbers above 0 {at} for a logarithmic scale",
+    )
+    return Varied(key, (), (low, high), unit.strip(), "".join(parts[2 : len(names)]), logarithmic)
 
 
-def _read_range(key: str, owner: str, ends: list[str], said: str) -> Axis:
-    """Read START:STOP:COUNT and its logarithmic kind."""
-
-    def refusal(rule: str) -> ParameterError:
-        return ParameterError(owner, "", rule, repr(said))
-
-    logarithmic = ends[3:] == ["log"]
-    if len(ends) != 3 and not logarithmic:
-        raise refusal("must be START:STOP:COUNT or START:STOP:COUNT:log")
-    (low, _, unit), (high, _, other) = (end.partition(" ") for end in ends[:2])
-    if unit != other:
-        raise refusal("must have the same unit at START and STOP")
+def _is_number(word: str) -> bool:
+    """Return whether a word is a number."""
     try:
-        start, stop = float(low), float(high)
+        float(word)
     except ValueError:
-        raise refusal("must have a number at START and STOP") from None
-    if not (math.isfinite(start) and math.isfinite(stop)) or start == stop:
-        raise refusal("must have two different finite numbers at START and STOP")
-    if logarithmic and not (start > 0.0 and stop > 0.0):
-        raise refusal("must have numbers above 0 at START and STOP for a logarithmic scale")
-    if not ends[2].isdecimal() or not 2 <= int(ends[2]) <= MOST:
-        raise refusal(f"must have a whole number from 2 to {MOST} at COUNT")
-    values = (np.geomspace if logarithmic else np.linspace)(start, stop, int(ends[2])).tolist()
+        return False
+    return True
+
+
+def read_axis(text: str) -> Axis:
+    """Read an axis, ``control.force_gain=1:10:10``; ParameterError in one line: key, rule, value."""
+    varied = read_varied(text, "START", "STOP", "COUNT")
+    if varied.words:
+        return Axis(varied.key, varied.words)
+    if not varied.steps.isdecimal() or not 2 <= int(varied.steps) <= MOST:
+        rule = f"must have a whole number from 2 to {MOST} at COUNT"
+        raise ParameterError(f"--vary {varied.key}", "", rule, repr(text.partition("=")[2].strip()))
+    low, high = varied.ends
+    spread = np.geomspace if varied.logarithmic else np.linspace
+    values = spread(float(low), float(high), int(varied.steps)).tolist()
     # Twelve digits: 0.3, and not 0.30000000000000004.
-    inner = [f"{value:.12g}" for value in values[1:-1]]
-    words = [f"{number} {unit}".strip() for number in (low, *inner, high)]
-    return Axis(key, tuple(words), logarithmic)
+    numbers = [low, *(f"{value:.12g}" for value in values[1:-1]), high]
+    return Axis(
+        varied.key, tuple(f"{number} {varied.unit}".strip() for number in numbers), varied.logarithmic
+    )
+
+
+def refuse_twice(keys: Sequence[str], settings: Sequence[Setting]) -> None:
+    """Refuse a parameter that is varied twice, or that another option changes as well."""
+    for key in keys:
+        if keys.count(key) > 1:
+            raise ParameterError(f"--vary {key}", "", "must be given once", f"{keys.count(key)} times")
+        for setting in settings:
+            if setting.key == key:
+                rule = f"must not be given to {setting.option} as well"
+                raise ParameterError(f"--vary {key}", "", rule, key)
 
 
 def make_points(
@@ -142,28 +181,20 @@ def make_points(
     axes: Sequence[Axis],
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Point]:
-    """Make the scenes of all points of a sweep.
-
-    A value that no point can have is refused; values that only do not go together with some
-    of the other axes' make a point with an error.
-
-    `path`: the scene's file, which is read once; `settings`: what is changed of it at every point;
-    `progress`: told how many points are made, and of how many. Raises ParameterError, SceneError: in one
-    line.
-    """
-    keys = [one.key for one in axes]
-    for key in keys:
-        if keys.count(key) > 1:
-            raise ParameterError(f"--vary {key}", "", "must be given once", f"{keys.count(key)} times")
-        if key in [setting.key for setting in settings]:
-            raise ParameterError(f"--vary {key}", "", "must not be given to --set as well", key)
-    count = math.prod(len(one.words) for one in axes)
+    """Make the scenes of all points of a sweep; refuse a value with which no point has a scene."""
+    keys = [axis.key for axis in axes]
+    refuse_twice(keys, settings)
+    count = math.prod(len(axis.words) for axis in axes)
     if count > MOST:
         raise ParameterError("--vary", "", f"must come to {MOST} points at most", f"{count} points")
-    load(path, settings)  # what is wrong without the axes is told of first
-    rows = list(itertools.product(*(one.words for one in axes)))
+    load(path, settings)  # an error without the axes is reported first
+    rows = list(itertools.product(*(axis.words for axis in axes)))
     points = place_points(path, settings, keys, rows, progress=progress)
-    _refuse_hopeless_values(points, axes)
+    for number, axis in enumerate(axes):
+        sound = {point.words[number] for point in points if point.scene}
+        for word in axis.words:
+            if word not in sound:
+                raise SceneError(next(point.error for point in points if point.words[number] == word))
     return points
 
 
@@ -176,17 +207,12 @@ def place_points(
     first: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Point]:
-    """Make the scenes of points anywhere; values that do not go together make a point with an error.
-
-    `path`: the scene's file, which is read once; `settings`: what is changed of it at every point; `keys`:
-    varied parameters; `rows`: their values at each point; `first`: index of the first point; `progress`: told
-    how many points are made, and of how many.
-    """
-    table, known, points = read_table(path), ReadParts(), []
+    """Make the scenes of points anywhere; values that do not go together make a point with an error."""
+    table, parts, points = read_table(path), ReadParts(), []
     for index, words in enumerate(rows, first):
         varied = [Setting(key, word, "--vary") for key, word in zip(keys, words, strict=True)]
         try:
-            points.append(Point(index, words, make_scene(path, table, [*settings, *varied], known)))
+            points.append(Point(index, words, make_scene(path, table, [*settings, *varied], parts)))
         except SceneError as error:
             points.append(Point(index, words, None, str(error)))
         if progress:
@@ -194,25 +220,16 @@ def place_points(
     return points
 
 
-def _refuse_hopeless_values(points: Sequence[Point], axes: Sequence[Axis]) -> None:
-    """Refuse values that no point can have."""
-    for number, one in enumerate(axes):
-        sound = {point.words[number] for point in points if point.scene}
-        for word in one.words:
-            if word not in sound:
-                raise SceneError(next(point.error for point in points if point.words[number] == word))
-
-
 def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
     """Return the axes in numbers: what the scenes made of their words. `points`: of the whole sweep."""
     columns = []
-    for number, one in enumerate(axes):
+    for number, axis in enumerate(axes):
         scenes = {point.words[number]: point.scene for point in reversed(points) if point.scene}
-        values = tuple(find_value(scenes[word], one.key, word) for word in one.words)
-        section, _, name = one.key.partition(".")
+        values = tuple(find_value(scenes[word], axis.key, word) for word in axis.words)
+        section, _, name = axis.key.partition(".")
         part = next((scene.section(section) for scene in scenes.values()), None)
-        known = list_quantities(part).get(name) if name and part else None
-        columns.append(Column(one.key, known.unit if known else "", values, one.logarithmic))
+        declared = list_quantities(part).get(name) if name and part else None
+        columns.append(Column(axis.key, declared.unit if declared else "", values, axis.logarithmic))
     return columns
 
 

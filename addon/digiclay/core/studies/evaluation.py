@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
@@ -17,14 +16,12 @@ from ..metrics.metric_table import ERRORS, METRICS, RUN
 from ..scene.schema import Scene
 from ..session.accuracy import estimate_errors, has_every_command, make_reference
 from ..session.run_scene import Result, run
-from .axes import Point
+from .axes import Measure, Point, Record
 from .series import describe_error
 
-#: What is kept of a point: its ``figures``, or the ``error`` it ended in.
-Record = dict[str, Any]
-#: Evaluation of bundles, in any order, until all are done or somebody asks to stop. It tells of each bundle
-#: that is done, with its records, None for a point that was stopped; and of each that no worker survives, and
-#: why in one line. OutputError when there is nobody any more to evaluate them.
+#: Evaluation of bundles in any order, until all are done or a stop is requested. Its callbacks get each
+#: bundle that is done with its records, None for a point that was stopped, and each that no worker survives
+#: with the reason in one line. OutputError when no worker is left.
 Pool = Callable[
     [
         Sequence[Sequence[Point]],
@@ -54,16 +51,18 @@ ALONE = "alone"
 
 
 def find_figure(word: str) -> str:
-    """Return the full name of a metric, such as ``lag``.
-
-    Raises ParameterError when there is none; the nearest is suggested.
-    """
+    """Return the full name of a metric, such as ``lag``; ParameterError suggests the nearest."""
     name = SHORT.get(word, word)
     if name in FIGURES:
         return name
     close = find_nearest_name(word, [*FIGURES, *SHORT])
     hint = f"Did you mean {close}?" if close else f"Known: {', '.join(FIGURES)}."
     raise ParameterError("--metric", "", "must be a known metric", repr(word), hint)
+
+
+def read_metrics(text: str) -> tuple[str, ...]:
+    """Return the full names of metrics in a list such as ``rfd,lag``."""
+    return tuple(dict.fromkeys(find_figure(word.strip()) for word in text.split(",")))
 
 
 @dataclass(frozen=True)
@@ -84,26 +83,27 @@ class Bundles:
     alone: tuple[tuple[Point, ...], ...]
     why: tuple[str, ...]
 
+    @property
+    def every(self) -> tuple[tuple[Point, ...], ...]:
+        """All bundles, in the order in which they run."""
+        return (*self.batches, *self.alone)
+
     def describe(self) -> list[str]:
         """Return how the points run, as lines for a person."""
-        lines = []
-        if self.batches:
-            count = sum(len(batch) for batch in self.batches)
-            lines.append(f"{count} points run in {_count(len(self.batches), 'stack')}")
+        count = sum(len(batch) for batch in self.batches)
+        lines = [f"{count} points run in {_count(len(self.batches), 'stack')}"] if self.batches else []
         return [*lines, *self.why]
 
 
 def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
     """Put points of one structure together, as many as make a batch; in the order of the points.
 
-    Which stand together depends on the points alone, not on what is done already or how many
-    workers there are: the same sweep comes to the same results to the last bit.
-
-    `points`: all of the sweep; `errors`: whether errors are to be estimated: those that judge the points must
-    then be of one structure too.
+    The bundles depend on the points alone, not on what is done already or on the number of workers: the same
+    sweep has the same results to the last bit. `points`: all of the sweep; `errors`: whether errors are
+    estimated: the references of a batch must then be of one structure too.
     """
     alike: dict[object, list[Point]] = {}
-    known = Findings()
+    findings = Findings()
     alone: list[Point] = []
     why: Counter[str] = Counter()
     for point in points:
@@ -111,26 +111,23 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
             alone.append(point)
             continue
         try:
-            judge = describe_structure(make_reference(point.scene), known) if errors else None
-        except ParameterError:  # it is told when the point is run
+            judge = describe_structure(make_reference(point.scene), findings) if errors else None
+        except ParameterError:  # reported when the point runs
             alone.append(point)
-            continue
-        alike.setdefault((describe_structure(point.scene, known), judge), []).append(point)
+        else:
+            alike.setdefault((describe_structure(point.scene, findings), judge), []).append(point)
     batches: list[tuple[Point, ...]] = []
     for group in alike.values():
         most = _limit_runs(group[0].scene)
-        if min(len(group), most) < LEAST:
-            alone += group
-            few = len(group) < LEAST
-            why[
-                f"fewer than {LEAST} have the same bed, parts and steps"
-                if few
-                else "they have too many rows to keep for many at once"
-            ] += len(group)
+        if len(group) >= LEAST and most >= LEAST:
+            pieces = max(1, len(group) // RUNS, -(-len(group) // most))
+            edges = [len(group) * i // pieces for i in range(pieces + 1)]
+            batches += [tuple(group[a:b]) for a, b in pairwise(edges)]
             continue
-        pieces = max(1, len(group) // RUNS, -(-len(group) // most))
-        edges = [len(group) * i // pieces for i in range(pieces + 1)]
-        batches += [tuple(group[a:b]) for a, b in pairwise(edges)]
+        alone += group
+        few = len(group) < LEAST
+        reason = f"fewer than {LEAST} have the same bed, parts and steps"
+        why[reason if few else "they have too many rows to keep for many at once"] += len(group)
     alone.sort(key=lambda point: point.index)
     return Bundles(tuple(batches), tuple((point,) for point in alone), _explain(why))
 
@@ -142,9 +139,9 @@ def _limit_runs(scene: Scene | None) -> int:
     return BUDGET // (rows * BYTES_A_ROW)
 
 
-def _count(count: int, what: str) -> str:
+def _count(count: int, noun: str) -> str:
     """Return a count with its noun."""
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _explain(why: Mapping[str, int]) -> tuple[str, ...]:
@@ -158,34 +155,25 @@ def explain_failed_batches(records: Mapping[int, Record]) -> tuple[str, ...]:
 
 
 def evaluate(
-    scene: Scene, stopped: Callable[[], bool] | None = None, *, errors: bool = False
+    scene: Scene,
+    stopped: Callable[[], bool] | None = None,
+    *,
+    errors: bool = False,
+    measure: Measure | None = None,
 ) -> Record | None:
-    """Run one point; return its record, None when it was stopped.
-
-    `stopped`: asked after each control period; `errors`: estimate `ERRORS` too.
-    """
+    """Return the record of a session, or what `measure` makes of its scene; None when it was stopped."""
     try:
+        if measure is not None:
+            return measure(scene, stopped)
         result = run(scene, stopped=stopped)
         if errors and not result.incomplete and has_every_command(scene):
-            found = estimate_errors(scene, result.history, stopped=stopped)
-            if found is None:
+            estimated = estimate_errors(scene, result.history, stopped=stopped)
+            if estimated is None:
                 return None
-            result = result.with_errors(found)
-    except Exception as error:  # whatever is wrong with one point, the others are worth having
+            result = result.with_errors(estimated)
+    except Exception as error:  # the other points are independent of this failure
         return {"error": describe_error(error)}
     return None if result.incomplete else _make_record(result, errors=errors)
-
-
-def _measure(
-    point: Point, scene: Scene, stopped: Callable[[], bool] | None, *, errors: bool
-) -> Record | None:
-    """Return the record of a point that runs by itself."""
-    if point.measure is None:
-        return evaluate(scene, stopped, errors=errors)
-    try:
-        return point.measure(scene, stopped)
-    except Exception as error:  # whatever is wrong with one point, the others are worth having
-        return {"error": describe_error(error)}
 
 
 def _make_record(result: Result, *, errors: bool) -> Record:
@@ -203,14 +191,10 @@ def evaluate_bundle(
 ) -> list[Record | None]:
     """Run a bundle; return the record of each of its points, None for one that was stopped.
 
-    When a batch fails as a whole, its points are run one by one, and each record says why under
-    ``alone``.
-
-    `bundle`: one, or several of one batch; `stopped`, `errors`: as `evaluate` has them; `StackWarning`: when
-    a batch failed neither for lack of memory nor by an error a user can cause.
+    When a batch fails as a whole, its points are run one by one, and each record states why as ``alone``;
+    `BatchWarning` if it was neither lack of memory nor an error a user can cause.
     """
-    alone = [point for point in bundle if point.scene]
-    scenes = [point.scene for point in alone if point.scene]
+    scenes = [point.scene for point in bundle if point.scene]
     if not scenes:  # values that do not go together are in no batch
         return [{"error": point.error} for point in bundle]
     records: list[Record | None] = [None] * len(scenes)
@@ -224,14 +208,14 @@ def evaluate_bundle(
                     records[number] = _make_record(result, errors=errors)
         except MemoryError:
             why = "there is not enough memory for a stack"
-        except Exception as error:  # each point meets it again by itself, and says what it is
+        except Exception as error:  # each point raises it again by itself, and is recorded with it
             why = describe_error(error)
             if not isinstance(error, DigiclayError):
                 warnings.warn(f"A batch of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2)
         if why:
             records = [None] * len(scenes)
-    for number, scene in enumerate(scenes):
+    for number, (point, scene) in enumerate(zip(bundle, scenes, strict=True)):
         if records[number] is None and not (stopped and stopped()):
-            record = _measure(alone[number], scene, stopped, errors=errors)
+            record = evaluate(scene, stopped, errors=errors, measure=point.measure)
             records[number] = {**record, ALONE: why} if record and why else record
     return records

@@ -83,10 +83,7 @@ class Outputs:
 
 
 def make_outputs(table: Mapping[str, Any]) -> Outputs:
-    """Read what is made of each run from a table of `KEYS`.
-
-    Raises ParameterError: its owner is the section.
-    """
+    """Read what is made of each run from a table of `KEYS`."""
     refuse_unknown("", table, KEYS)
     export = table.get("export", [])
     if not isinstance(export, list) or not all(isinstance(kind, str) for kind in export):
@@ -151,8 +148,6 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
 
     Every scene is combined with every method and every setting. A combination whose values do
     not go together makes a job with an error; what no job could have is refused.
-
-    `more`: names of methods besides those of the file. Raises SceneError: one line: file, key, rule, value.
     """
     table = read_table(path)
     try:

@@ -45,12 +45,7 @@ class ReliefError(NamedTuple):
 def find_nominal(
     scene: Scene, history: Mapping[str, NDArray[Any]], following: NDArray[Any], pressed: float = 0.0
 ) -> Floats:
-    """Return the nominal heights over the bed at rest, shape (n,), m.
-
-    `scene`: with a blister; `history`: ``fingertip`` (t, 7) and ``position`` (n, 2) as in ``history.npz``;
-    all rows count; `following` int (t,), number of cells that follow the force; `pressed`: how deep the pins
-    press into the fingertip, m.
-    """
+    """Return the nominal heights over the bed at rest, shape (n,), m."""
     assert scene.blister is not None
     rest, place, tip = scene.actuator.rest_height, history["position"], history["fingertip"]
     patch = measure_reach(scene, place, following)
@@ -66,11 +61,7 @@ def find_nominal(
 def measure_relief(
     scene: Scene, history: Mapping[str, NDArray[Any]], following: NDArray[Any], pressed: float | None
 ) -> ReliefError:
-    """Return how far the final heights are from the nominal ones.
-
-    `history`: the arrays of ``history.npz``; `following` int (t,), number of cells that follow the force;
-    `pressed`: mean height of what is left behind over the path, the metric ``ridge_offset``, m.
-    """
+    """Return how far the final heights are from the nominal ones."""
     if scene.blister is None or pressed is None:
         return ReliefError(None, None)
     touching = find_contact_rows(history["total_force"]) & (following > 0)
@@ -89,10 +80,7 @@ def measure_relief(
 
 
 def measure_reach(scene: Scene, position: Floats, following: NDArray[Any]) -> Floats:
-    """Return how far the middles of the cells under the fingertip reach, (t,), m; 0 but for Method II.
-
-    `position` (n, 2), m; `following` int (t,), number of cells that follow the force.
-    """
+    """Return how far the middles of the cells under the fingertip reach, (t,), m; 0 but for Method II."""
     if scene.method != "cell_states":
         return np.zeros(len(following))
     side = np.sqrt(compute_cell_area(position) or 0.0)

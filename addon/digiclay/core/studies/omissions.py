@@ -111,10 +111,7 @@ class Fitted:
 
 
 def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
-    """Give what a scene could do without: parts, physics steps, and cells that creep to their height.
-
-    `budget`: error of height, m.
-    """
+    """Give what a scene could do without: parts, physics steps, and cells that creep to their height."""
     simulation = scene.simulation
     steps = simulation.steps
     for fewer in range(1, steps):
@@ -132,12 +129,7 @@ def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
 
 
 def find_omissions(scene: Scene, budget: float, *, told: Callable[[str], None] | None = None) -> Fitted:
-    """Leave out of a scene what its results can do without.
-
-    `scene`: the full model; `budget`: largest error of any height at any time, m: difference from the full
-    model, and error of the integration; `told`: told what is tried, before it is. Raises ParameterError when
-    the budget is not above 0, or below the error of the full scene's own integration.
-    """
+    """Leave out of a scene what its results can do without."""
     if not (math.isfinite(budget) and budget > 0.0):
         raise ParameterError("run", "budget", "must be above 0 m", f"{budget:g} m")
     say = told or (lambda said: None)
@@ -188,11 +180,7 @@ def _with_dead_band(scene: Scene, band: float) -> Scene:
 
 
 def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
-    """Run two scenes in step.
-
-    Returns `departure`: largest difference of a height, m; infinite as soon as it is beyond the budget;
-    `work`: work of the second as a share of the first's.
-    """
+    """Run two scenes in step."""
     apart, done = 0.0, np.zeros(2)
     pair = [assemble(full), assemble(less)]
     runs = (periods(one, full.trajectories(), begin(one), full.periods) for one in pair)

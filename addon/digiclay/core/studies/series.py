@@ -52,11 +52,6 @@ def open_series(
     """Make a series' folder, or go on with one; nobody else may work in it until the block ends.
 
     A description that cannot be read counts as none where nothing has been done: the disk was full.
-
-    `description`: what is written to the file `kind.mark`; `refuse_another`: told the description that is
-    there, None where it cannot be read; raises OutputError when the folder cannot be gone on with. By default
-    any of this kind can. Raises OutputError when it holds other things, cannot be written, leads elsewhere,
-    or somebody else works in it.
     """
     with ExitStack() as until_the_end:
         with ExitStack() as while_it_is_made:

@@ -13,6 +13,7 @@ from ..metrics.finger_path import measure_lag, sum_cells
 from ..metrics.force import compute_rfd, find_contact_ends
 from ..model.control_interface import find_set_point
 from ..model.trajectory import Path, Waypoint
+from ..scene.assembly import assemble
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
 from ..session.run_scene import Result, run, select_rows
@@ -77,10 +78,7 @@ class Drag(Parameters):
     length: float = quantity(42e-3, "how far it drags", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the finger's path, and when it starts and ends to drag, s, for a surface at `rest`, m.
-
-        `speed`: of the drag, m/s; `rest`: height of the surface, m.
-        """
+        """Return the finger's path, and when it starts and ends to drag, s, for a surface at `rest`, m."""
         left, right, down, level = (
             -0.5 * self.length,
             0.5 * self.length,
@@ -109,10 +107,7 @@ class Lift(Parameters):
     rise: float = quantity(18e-3, "how far it lifts", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the finger's path, and when it starts and ends to lift, s, for a surface at `rest`, m.
-
-        `speed`: the greatest on the way, m/s; `rest`: height of the surface, m.
-        """
+        """Return the finger's path, and when it starts and ends to lift, s, for a surface at `rest`, m."""
         down, start = rest - self.press, 2.0
         # A cubic that starts and ends at rest is 1.5 times as fast in the middle as on the whole.
         end = start + 1.5 * self.rise / speed
@@ -132,21 +127,14 @@ def _through(points: tuple[tuple[float, float, float], ...], interpolation: str)
 
 
 def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result]:
-    """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it.
-
-    `scene`: its device and method; its trajectory is left aside; `speed`, m/s.
-    """
+    """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it."""
     placed, start, end = place_way(scene, way, speed)
     done = run(placed)
     return judge(done, start, end, speed), done
 
 
 def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, float, float]:
-    """Return a scene with a drag or a lift as its trajectory, and when the judged phase starts and ends, s.
-
-    `scene`: its device and method; its trajectory is left aside; `speed`, m/s. Raises ParameterError when the
-    bed is smaller than the drag.
-    """
+    """Return a scene with a drag or a lift as its trajectory, and start and end of the judged phase, s."""
     _refuse_small(scene, way)
     path, start, end = way.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)
@@ -183,11 +171,7 @@ def _refuse_small(scene: Scene, way: Drag | Lift) -> None:
 
 
 def bisect(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
-    """Return the largest value known to hold, to within a resolution, by bisection.
-
-    `holds`: whether a value holds; up to some value it does, beyond it does not; `low`, `high`: where to
-    look; `resolution`: above 0. Returns a value that held; `high` if that does; None if `low` does not.
-    """
+    """Return the largest value known to hold, to within a resolution, by bisection."""
     if not holds(low):
         return None
     if holds(high):
@@ -208,11 +192,7 @@ def find_largest_speed(
     resolution: float = 0.5e-3,
     told: Callable[[Follows], None] | None = None,
 ) -> float | None:
-    """Return the largest speed, m/s, at which a finger is followed, by bisection; see `bisect`.
-
-    `scene`: its device and method; its trajectory is left aside; `low`, `high`, `resolution`, m/s; `told`:
-    told of every speed tried.
-    """
+    """Return the largest speed, m/s, at which a finger is followed, by bisection; see `bisect`."""
 
     def holds(speed: float) -> bool:
         judged, _ = track(scene, way, speed)
@@ -221,3 +201,17 @@ def find_largest_speed(
         return judged.meets(criterion)
 
     return bisect(holds, low, high, resolution)
+
+
+def find_free_speed(scene: Scene) -> float:
+    """Return how fast a pin without load rises through an open valve, m/s."""
+    fastest: float = assemble(scene).fastest
+    return fastest
+
+
+def find_unintended_losses(done: Result) -> list[float]:
+    """Return when contact ended, s, though the fingertip rose no faster than a pin can just then."""
+    limit, moments = find_free_speed(done.scene), done.history["time"]
+    rise = np.gradient(done.history["fingertip"][:, 2], moments)
+    lost = find_contact_ends(moments, done.history["total_force"])
+    return [float(t) for t in lost if rise[(moments > t - 0.2) & (moments <= t + 0.1)].max() <= limit]

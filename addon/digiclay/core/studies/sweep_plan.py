@@ -1,4 +1,4 @@
-"""Folder of a sweep: its definition, one small file a finished point, and the table of all."""
+"""Folder of a series of points: its definition, one small file a finished point, and the table of all."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import hashlib
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,19 +21,19 @@ from ..control.methods import find_method
 from ..files.run_folder import format_json, read_json, write_whole
 from ..metrics.metric_table import ERRORS
 from ..scene.toml_table import format_scene, write_part
-from .axes import Axis, Point
-from .evaluation import FIGURES, TIMES, Record, evaluate
+from .axes import Axis, Point, Record
+from .evaluation import FIGURES, TIMES, evaluate
 from .series import Kind, open_series
 
-#: The file by which a folder is known as a sweep's, and the folder of its points.
-MARK, POINTS = "sweep.json", "points"
+#: The folder of the points.
+POINTS = "points"
 #: The comment at the end of a line of a scene file.
 NOTE = re.compile(r'  # [^"\n]*$', re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class Folder:
-    """Folder of a sweep."""
+    """Folder of a series of points."""
 
     path: Path
 
@@ -58,11 +58,7 @@ class Folder:
         keys: Sequence[str],
         records: dict[int, Record],
     ) -> None:
-        """Write the files of the finished points of a bundle, and add their records to those of all.
-
-        `found`: none for a point that was stopped; `keys`: the varied parameters; `records`: of all points
-        that are done, by their index; what is there stays.
-        """
+        """Write the files of the finished points of a bundle, and add their records to those of all."""
         for point, record in zip(bundle, found, strict=True):
             if record is not None and point.index not in records:
                 self.keep(point, keys, record)
@@ -70,10 +66,7 @@ class Folder:
 
 
 def select_done(records: Mapping[int, Record], *, errors: bool) -> dict[int, Record]:
-    """Return the records of points that need not be run again.
-
-    `records`: that are kept; `errors`: whether errors are asked for: a point without them is not done.
-    """
+    """Return the records of points that need not be run again; `errors`: whether they must have `ERRORS`."""
     return {
         index: record
         for index, record in records.items()
@@ -84,12 +77,7 @@ def select_done(records: Mapping[int, Record], *, errors: bool) -> dict[int, Rec
 def find_unfinished(
     bundles: Iterable[Sequence[Point]], records: Mapping[int, Record]
 ) -> list[Sequence[Point]]:
-    """Return the bundles that are to be run: those of which a point is missing, whole.
-
-    Without the others of its batch the results of a point would be others in the last bit.
-
-    `records`: of the points that are done.
-    """
+    """Return the bundles of which a point is missing, whole: alone its last bit would be another one."""
     return [bundle for bundle in bundles if any(point.index not in records for point in bundle)]
 
 
@@ -115,35 +103,48 @@ def hash_points(points: Sequence[Point]) -> str:
 
 
 @contextmanager
-def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str) -> Iterator[Folder]:
-    """Make a sweep's folder, or go on with one that holds the same sweep; nobody else works in it meanwhile.
-
-    `points`: all of the sweep; `version`: of digiclay: another one may come to other figures. Raises
-    OutputError when it holds anything else, cannot be written, or another process works in it.
-    """
-    plan = {
-        "digiclay": version,
-        "axes": [{"key": one.key, "values": list(one.words)} for one in axes],
-        "points": len(points),
-    }
-    description = {**plan, "scenes": hash_points(points)}
-    folder = Folder(path)
+def open_points(
+    path: Path,
+    name: str,
+    description: Mapping[str, Any],
+    describe: Callable[[Mapping[str, Any]], str],
+    accept: Callable[[Mapping[str, Any], Folder], bool] = lambda there, folder: False,
+) -> Iterator[Folder]:
+    """Make the folder of a series of points, or continue one of the same description, locked meanwhile."""
+    folder, mark = Folder(path), f"{name}.json"
 
     def refuse_another(there: Any) -> None:
-        if there == description:
-            return
-        older = isinstance(there, dict) and there == {**plan, "identity": there.get("identity")}
-        if older and _agrees(folder.read_records(), points):
+        if there == description or (isinstance(there, dict) and accept(there, folder)):
             return
         try:
-            varied = " and ".join(one["key"] for one in there["axes"])
-            said = f"{there['points']} points over {varied}, digiclay {there['digiclay']}"
-        except (KeyError, TypeError):
-            said = f"its {MARK} cannot be read"
-        raise OutputError(f"{path} holds another sweep ({said}): choose another folder with --out.")
+            content = describe(there)
+        except (AttributeError, KeyError, TypeError):
+            content = f"its {mark} cannot be read"
+        raise OutputError(f"{path} holds another {name} ({content}): choose another folder with --out.")
 
-    with open_series(path, Kind("sweep", MARK, (POINTS,)), description, refuse_another):
+    with open_series(path, Kind(name, mark, (POINTS,)), description, refuse_another):
         yield folder
+
+
+def open_sweep(
+    path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str
+) -> AbstractContextManager[Folder]:
+    """Open the folder of a sweep, see `open_points`; another version of digiclay may have other figures."""
+    plan = {
+        "digiclay": version,
+        "axes": [{"key": axis.key, "values": list(axis.words)} for axis in axes],
+        "points": len(points),
+    }
+
+    def describe(there: Mapping[str, Any]) -> str:
+        varied = " and ".join(axis["key"] for axis in there["axes"])
+        return f"{there['points']} points over {varied}, digiclay {there['digiclay']}"
+
+    def accept(there: Mapping[str, Any], folder: Folder) -> bool:
+        older = there == {**plan, "identity": there.get("identity")}
+        return older and _agrees(folder.read_records(), points)
+
+    return open_points(path, "sweep", {**plan, "scenes": hash_points(points)}, describe, accept)
 
 
 def _agrees(records: Mapping[int, Record], points: Sequence[Point]) -> bool:
@@ -154,9 +155,9 @@ def _agrees(records: Mapping[int, Record], points: Sequence[Point]) -> bool:
     for index, record in sorted(records.items()):
         scene = points[index].scene if index < len(points) else None
         if scene is not None and "figures" in record:
-            known, again = record["figures"], (evaluate(scene) or {}).get("figures", {})
-            names = known.keys() - {*TIMES, *ERRORS}
-            return all(_is_close(known[name], again.get(name)) for name in names)
+            kept, again = record["figures"], (evaluate(scene) or {}).get("figures", {})
+            names = kept.keys() - {*TIMES, *ERRORS}
+            return all(_is_close(kept[name], again.get(name)) for name in names)
     return not records
 
 
@@ -168,11 +169,8 @@ def _is_close(one: float | None, other: float | None) -> bool:
 
 
 def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) -> NDArray[np.float64]:
-    """Return a figure at all points, one dimension an axis; NaN where there is none.
-
-    `records`: by the index of their point; `name`: a key of `evaluation.FIGURES`.
-    """
-    shape = [len(one.words) for one in axes]
+    """Return a figure of `evaluation.FIGURES` at all points, a dimension an axis; NaN where it is absent."""
+    shape = [len(axis.words) for axis in axes]
     values = np.full(int(np.prod(shape)), np.nan)
     for index, record in records.items():
         value = record.get("figures", {}).get(name)
@@ -186,11 +184,7 @@ def format_table(
     records: Iterable[Record],
     names: Sequence[str],
 ) -> str:
-    """Return points as CSV: the varied parameters, the metrics, and the error; SI units, in the header.
-
-    `varied` (str, str), key and unit of each parameter; `rows`: their values at each point; `records`: of
-    each point; `names`: keys of `evaluation.FIGURES`.
-    """
+    """Return points as CSV: the varied parameters, the metrics, and the error; SI units, in the header."""
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")
     units = [*varied, *((name, FIGURES[name].unit) for name in names)]

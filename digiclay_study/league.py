@@ -1,0 +1,148 @@
+"""League of control methods: confidence intervals over seeds of the noise, and one row a method.
+
+An interval is Student's t for the mean over the seeds, of which each has the same trajectories. It states
+what other noise would do, and nothing about other trajectories.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import fmean, median, stdev
+
+from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
+
+from .method_trials import LIMITS, RANDOM
+
+#: Of the intervals, and how they are named.
+CONFIDENCE = 0.95
+KIND = f"{CONFIDENCE:.0%} interval of the mean, Student's t over the seeds"
+#: Measures of a league, which are means over the trajectories.
+MEANS = (
+    "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "ridge_unevenness", "ridge_unevenness_touch",
+    "relief_rms", "contact_loss_share",
+)  # fmt: skip
+#: Measures of a league, in the order of its columns; those of `LIMITS` are speeds.
+MEASURES: dict[str, Metric] = {
+    name: METHOD.get(name) or METRICS.get(name) or Metric("m/s", "", name.replace("-", " "), "mm/s")
+    for name in (
+        "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "ridge_unevenness", "ridge_unevenness_touch",
+        "relief_rms", "max_total_force", "losses", "contact_loss_share", *LIMITS, "period_cost", "cost_ratio",
+    )
+}  # fmt: skip
+#: Other measures over the trajectories: the largest, the number, and the usual one.
+REDUCED: dict[str, Callable[[list[float]], float]] = {
+    "max_total_force": max, "losses": sum, "period_cost": median,
+}  # fmt: skip
+
+#: Method, trajectory and seed of a trial.
+Cell = tuple[str, str, int]
+#: Measured values by trial; None where there is none.
+Table = Mapping[Cell, Mapping[str, float | None]]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Mean and its confidence interval.
+
+    Attributes
+    ----------
+    half : float or None
+        Half the width; None of a single value.
+    count : int
+        Values.
+    """
+
+    mean: float
+    half: float | None
+    count: int
+
+
+@dataclass(frozen=True)
+class Row:
+    """Row of the league.
+
+    Attributes
+    ----------
+    measures : mapping of str to Interval or None
+        `MEANS`, ``max_total_force``, ``losses``, ``period_cost``, ``cost_ratio`` and a limit a motion.
+    worse : int or None
+        On how many trajectories the mean RFD is above that of the first method; None of that one.
+    trajectories : int
+        With an RFD.
+    searched : frozenset of str
+        Motions whose largest speed was searched.
+    """
+
+    method: str
+    measures: Mapping[str, Interval | None]
+    worse: int | None
+    trajectories: int
+    searched: frozenset[str] = frozenset()
+
+
+def find_interval(values: Sequence[float | None]) -> Interval | None:
+    """Return the mean of the finite values and half = t(0.975, n - 1) s / sqrt(n); None without values."""
+    finite = [value for value in values if value is not None and math.isfinite(value)]
+    if not finite:
+        return None
+    if len(finite) == 1:
+        return Interval(finite[0], None, 1)
+    from scipy.stats import t
+
+    width = float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(finite) - 1)) / math.sqrt(len(finite))
+    return Interval(fmean(finite), width * stdev(finite), len(finite))
+
+
+def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
+    """Return a row a method, the smallest mean RFD first; all are compared with the first method."""
+    seeds = sorted({seed for _, _, seed in table})
+    worse = count_worse(table, methods)
+    rows = []
+    for method in methods:
+        names = (*MEANS, *REDUCED)
+        measures = {
+            name: find_interval([_reduce(table, method, name, seed) for seed in seeds]) for name in names
+        }
+        costs = [
+            [_reduce(table, each, "period_cost", seed) for each in (method, methods[0])] for seed in seeds
+        ]
+        measures["cost_ratio"] = find_interval([own / first for own, first in costs if own and first])
+        for limit in LIMITS:
+            found = [table.get((method, limit, seed), {}).get("speed_limit") for seed in seeds]
+            measures[limit] = find_interval(found)
+        searched = frozenset(name for own, name, _ in table if own == method and name in LIMITS)
+        rows.append(Row(method, measures, *worse[method], searched))
+    return sorted(rows, key=lambda row: math.inf if row.measures["rfd"] is None else row.measures["rfd"].mean)
+
+
+def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | None, int]]:
+    """Return on how many trajectories, of how many, a method has a greater mean RFD than the first one."""
+    found: dict[str, dict[str, list[float]]] = {method: {} for method in methods}
+    for (method, name, _), figures in table.items():
+        if figures.get("rfd") is not None:
+            found[method].setdefault(name, []).append(figures["rfd"] or 0.0)
+    first, *others = methods
+    counted: dict[str, tuple[int | None, int]] = {first: (None, len(found[first]))}
+    for method in others:
+        both = found[method].keys() & found[first].keys()
+        greater = sum(fmean(found[method][name]) > fmean(found[first][name]) for name in both)
+        counted[method] = (greater, len(both))
+    return counted
+
+
+def _reduce(table: Table, method: str, name: str, seed: int) -> float | None:
+    """Return a measure over all trajectories of a seed: as `REDUCED` has it, or the mean."""
+    groups: dict[str, list[float]] = {}
+    for (own, trajectory, number), figures in table.items():
+        value = figures.get(name)
+        if (own, number) == (method, seed) and value is not None and math.isfinite(value):
+            # The random drags together count as one trajectory of a mean.
+            random = trajectory.startswith(f"{RANDOM}-")
+            groups.setdefault(RANDOM if random else trajectory, []).append(value)
+    if not groups:
+        return None
+    if name in REDUCED:
+        return float(REDUCED[name]([value for values in groups.values() for value in values]))
+    return fmean(map(fmean, groups.values()))

@@ -1,0 +1,292 @@
+"""Trials of control methods: trajectories by name, each run with sensor noise, and what is measured of it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.quantity import find_nearest_name
+from digiclay.core.metrics.finger_path import sum_cells
+from digiclay.core.metrics.force import perceive
+from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
+from digiclay.core.metrics.summary import compute_metrics
+from digiclay.core.model.trajectory import Path, Waypoint
+from digiclay.core.scene.recorder import Recorder
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_scene import run, select_rows
+from digiclay.core.studies.nominal_relief import measure_relief
+from digiclay.core.studies.speed_limits import (
+    Criterion,
+    Drag,
+    Follows,
+    Lift,
+    find_largest_speed,
+    find_unintended_losses,
+    judge,
+    place_way,
+)
+
+#: Time, s; x, y and height above the bed at rest, mm; turn, pitch and roll of the fingertip, rad.
+Pose = tuple[float, float, float, float, float, float, float]
+
+#: How far a fingertip is lifted at the end, m, in which time, and how long it then stays away, s.
+AWAY, LIFTED, SETTLED = 40e-3, 0.3, 1.5
+#: Seed of the random drags, and how far their fingertips are pitched and rolled, rad: 30 degrees in all.
+DRAG_SEED, TILT = 1, 0.37
+
+
+def with_path(scene: Scene, poses: Sequence[Pose], interpolation: str = "smooth") -> Scene:
+    """Return a scene with a path of its fingertip, as long as that path."""
+    rest = scene.actuator.rest_height
+    points = tuple(
+        Waypoint(
+            time=t,
+            position=(1e-3 * x, 1e-3 * y, rest + 1e-3 * z),
+            orientation=_turn(turn, pitch, roll),
+        )
+        for t, x, y, z, turn, pitch, roll in poses
+    )
+    path, timing = Path(interpolation, points), replace(scene.simulation, duration=poses[-1][0])
+    return scene.with_sections(trajectory=path, simulation=timing)
+
+
+def lift_off(scene: Scene) -> Scene:
+    """Return a scene that ends with a quick lift, and a rest in which pins come to their final heights."""
+    fingers = tuple(
+        replace(finger, trajectory=_lift_after(finger.trajectory, scene.actuator.rest_height))
+        for finger in scene.fingers
+    )
+    lasting = max(finger.trajectory.waypoints[-1].time for finger in fingers)
+    return replace(scene, fingers=fingers, simulation=replace(scene.simulation, duration=lasting))
+
+
+def _lift_after(path: Path, rest: float) -> Path:
+    """Return the path with a lift at its end, above the bed at rest, m."""
+    last = path.waypoints[-1]
+    away = (*last.position[:2], max(last.position[2], rest) + AWAY)
+    end = last.time + LIFTED
+    after = tuple(replace(last, time=t, position=away) for t in (end, end + SETTLED))
+    return replace(path, waypoints=(*path.waypoints, *after))
+
+
+def _turn(turn: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of a roll, then a pitch, then a turn, rad."""
+    halves = [(math.cos(0.5 * angle), math.sin(0.5 * angle)) for angle in (turn, pitch, roll)]
+    (ct, st), (cp, sp), (cr, sr) = halves
+    return (
+        cr * cp * ct + sr * sp * st,
+        sr * cp * ct - cr * sp * st,
+        cr * sp * ct + sr * cp * st,
+        cr * cp * st - sr * sp * ct,
+    )
+
+
+def _lift(x: float, y: float, height: float, turn: Sequence[float] = (0.0, 0.0, 0.0)) -> list[Pose]:
+    """Return a press of 3 mm in 0.8 s, then 5 mm/s to a height, mm, and a rest there."""
+    up = 1.1 + max(abs(height + 3.0) / 5.0, 0.3) * 1.2
+    ways = ((0.0, 1.5), (0.8, -3.0), (1.1, -3.0), (up, height), (up + 0.4, height))
+    return [(t, x, y, z, *turn) for t, z in ways]  # type: ignore[misc]
+
+
+def _drag(
+    x: float,
+    y: float,
+    height: float,
+    speed: float,
+    hold: float = 0.5,
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> list[Pose]:
+    """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
+    poses = _lift(x, y, height, turn)
+    end = poses[-1][0] + abs(2.0 * x) / speed
+    return [*poses, *((t, -x, y, height, *turn) for t in (end, end + hold))]
+
+
+def drag_row(turn: float, pitch: float) -> list[Pose]:
+    """Return a drag between two rows of pins, 15 mm/s, 1.5 mm below the surface, with turn and pitch, rad."""
+    return _drag(-20.0, 1.5, -1.5, 15.0, turn=(turn, pitch, 0.0))
+
+
+def list_paths() -> dict[str, tuple[str, list[Pose]]]:
+    """Return the paths by name: interpolation and poses."""
+    eight = _lift(0.0, 0.0, 8.0)
+    for angle in np.linspace(0.0, 2.0 * math.pi, 81)[1:].tolist():
+        time = eight[4][0] + 10.0 * angle / (2.0 * math.pi)
+        eight.append((time, 20.0 * math.sin(angle), 12.0 * math.sin(2.0 * angle), 8.0, 0.0, 0.0, 0.0))
+    twisted = _lift(-20.0, -5.0, 10.0)
+    begun = twisted[-1][0]
+    for share, turn, pitch, roll in (
+        (0.25, 0.8, 0.0, 0.2),
+        (0.5, 0.0, 0.25, 0.0),
+        (0.75, -0.8, 0.0, -0.2),
+        (1.0,) + 3 * (0.0,),
+    ):
+        y = -5.0 + 4.0 * math.sin(2.0 * math.pi * share)
+        twisted.append((begun + 4.0 * share, -20.0 + 40.0 * share, y, 10.0, turn, pitch, roll))
+    return {
+        "figure-eight": ("smooth", eight),
+        "dead-stop": ("linear", _drag(-18.0, 0.0, 12.0, 15.0, hold=1.0)),
+        "edge": ("smooth", _drag(-25.0, -35.0, 8.0, 12.0)),
+        "twisted": ("smooth", twisted),
+        "across": ("linear", drag_row(0.5 * math.pi, 0.0)),
+    }
+
+
+def draw_drags(count: int) -> list[tuple[str, list[Pose]]]:
+    """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, the fingertip turned."""
+    random, drags = np.random.default_rng(DRAG_SEED), []
+    for number in range(count):
+        height, speed = random.uniform(-8.0, 15.0), random.uniform(5.0, 16.0)
+        angle, length = random.uniform(0.0, 2.0 * math.pi), random.uniform(20.0, 36.0)
+        (x, y), (dx, dy) = (
+            random.uniform(-10.0, 10.0, 2),
+            0.5 * length * np.array((math.cos(angle), math.sin(angle))),
+        )
+        facing, turned = random.uniform((-math.pi, -1.0), (math.pi, 1.0)).tolist()
+        first, last = ((turn, *random.uniform(-TILT, TILT, 2).tolist()) for turn in (facing, facing + turned))
+        poses = _lift(float(x - dx), float(y - dy), height, first)
+        end = poses[-1][0] + length / speed
+        poses += [(t, float(x + dx), float(y + dy), height, *last) for t in (end, end + 0.5)]
+        drags.append(("smooth" if number % 2 else "linear", poses))
+    return drags
+
+
+Record = dict[str, Any]
+Stopped = Callable[[], bool] | None
+
+#: Groups of the random drags and of the paper's session.
+RANDOM, SESSION = "random", "session"
+#: Judged phases of drags and lifts: name, motion, speed, m/s.
+PHASES: dict[str, tuple[Drag | Lift, float]] = {
+    "ridge-15": (Drag(), 15e-3),
+    "ridge-25": (Drag(), 25e-3),
+    "ridge-40": (Drag(), 40e-3),
+    "surface": (Drag(height=-1.5e-3), 15e-3),
+    "valley": (Drag(height=-10e-3), 15e-3),
+    "lift": (Lift(), 15e-3),
+}
+#: Motions whose largest speed is searched.
+LIMITS: dict[str, Drag | Lift] = {"ridge-limit": Drag(), "lift-limit": Lift()}
+#: Between which speeds, m/s.
+LOW, HIGH = 5e-3, 80e-3
+#: All trajectories, and those of a quick suite.
+GROUPS = (SESSION, *list_paths(), *PHASES, RANDOM, *LIMITS)
+QUICK = ("ridge-25", "surface", "lift")
+
+#: Metrics of a trial.
+OUTCOMES: dict[str, Metric] = {
+    name: METHOD.get(name) or METRICS[name]
+    for name in (
+        "set_point", "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "lag_max", "ridge_unevenness",
+        "ridge_unevenness_touch", "relief_rms", "relief_largest", "max_total_force", "contact_loss_share",
+        "losses", "speed_limit", "period_cost",
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Trial of a method.
+
+    Attributes
+    ----------
+    name : str
+        Of its trajectory; a random drag has a number.
+    group : str
+        Name by which it is chosen, in `GROUPS`.
+    number : int
+        Of a random drag; 0 otherwise.
+    """
+
+    name: str
+    group: str
+    number: int = 0
+
+
+class _StoppedError(Exception):
+    """Stop in the middle of a search."""
+
+
+def read_groups(words: Sequence[str]) -> tuple[str, ...]:
+    """Return trajectories in the order of `GROUPS`; an unknown one is refused."""
+    if not words:
+        raise ParameterError("--trajectories", "", "must name at least one trajectory", "none")
+    for word in words:
+        if word not in GROUPS:
+            close = find_nearest_name(word, list(GROUPS))
+            hint = f"Did you mean {close}?" if close else ""
+            raise ParameterError("--trajectories", "", f"must be among {', '.join(GROUPS)}", repr(word), hint)
+    return tuple(group for group in GROUPS if group in words)
+
+
+def list_trials(groups: Sequence[str], drags: int) -> list[Trial]:
+    """Return the trials of trajectories. `groups`: among `GROUPS`; `drags`: number of random drags."""
+    trials: list[Trial] = []
+    for group in groups:
+        if group == RANDOM:
+            trials += [Trial(f"{RANDOM}-{number + 1}", RANDOM, number) for number in range(drags)]
+        else:
+            trials.append(Trial(group, group))
+    return trials
+
+
+def place_trial(scene: Scene, trial: Trial) -> tuple[Scene, Callable[[Scene, Stopped], Record | None]]:
+    """Return a scene with the trajectory of a trial, and what measures it."""
+    if trial.group in LIMITS:
+        way = LIMITS[trial.group]
+        place_way(scene, way, HIGH)
+        return scene, partial(search_limit, way=way)
+    if trial.group in PHASES:
+        placed, start, end = place_way(scene, *PHASES[trial.group])
+        return lift_off(placed), partial(measure_trial, phase=(start, end))
+    recorded = replace(scene, recorder=Recorder())
+    if trial.group == SESSION:
+        return recorded, measure_trial
+    drawn = draw_drags(trial.number + 1)[-1] if trial.group == RANDOM else list_paths()[trial.group]
+    interpolation, poses = drawn
+    return lift_off(with_path(recorded, poses, interpolation)), measure_trial
+
+
+def measure_trial(
+    scene: Scene, stopped: Stopped = None, *, phase: tuple[float, float] | None = None
+) -> Record | None:
+    """Run a trial, and return its record; None after a stop."""
+    begun = time.thread_time()
+    done = run(scene, stopped=stopped)
+    spent = time.thread_time() - begun
+    if done.incomplete:
+        return None
+    found = dict(done.figures)
+    found["losses"] = float(len(find_unintended_losses(done)))
+    if phase is not None:
+        judged, part = judge(done, *phase, 0.0), select_rows(done.history, *phase)
+        own = compute_metrics(part, scene.set_point)
+        found |= {name: own[name] for name in ("lag_mean", "lag_max", "max_total_force")}
+        found |= {"rfd": own["rfd_session"], "losses": float(judged.losses)}
+        found["contact_loss_share"] = judged.loss_share
+        felt = perceive(found["rfd"], found["set_point"], found["ridge_unevenness"])
+        found |= felt.figures()
+    relief = measure_relief(scene, done.history, sum_cells(done.history).following, found["ridge_offset"])
+    found |= {"relief_rms": relief.rms, "relief_largest": relief.largest}
+    found["period_cost"] = spent / done.periods
+    return {"figures": {name: found.get(name) for name in OUTCOMES}}
+
+
+def search_limit(scene: Scene, stopped: Stopped = None, *, way: Drag | Lift) -> Record | None:
+    """Search the largest speed at which a motion is followed, and return the record; None after a stop."""
+
+    def told(_: Follows) -> None:
+        if stopped and stopped():
+            raise _StoppedError
+
+    try:
+        speed = find_largest_speed(scene, way, Criterion(), low=LOW, high=HIGH, told=told)
+    except _StoppedError:
+        return None
+    return {"figures": {**dict.fromkeys(OUTCOMES), "speed_limit": speed}}

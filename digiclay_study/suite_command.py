@@ -1,0 +1,222 @@
+"""``digiclay compare --suite``: control methods over many trajectories with noise, and their league."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from digiclay import __version__
+from digiclay.commands.arguments import METHOD, settings_of, whole_number
+from digiclay.commands.evaluation_pool import add_pool, run_series
+from digiclay.commands.extras import format_command
+from digiclay.commands.stop import refuse_without
+from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
+from digiclay.core.control.methods import METHODS, find_method
+from digiclay.core.files.run_folder import find_name, write_whole
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.studies.axes import Point, Record
+from digiclay.core.studies.sweep_plan import hash_points, open_points
+from digiclay.plots.figure import save
+from digiclay.plugins.method_loader import OwnRow
+
+from .league import Table, find_league
+from .method_trials import GROUPS, QUICK, list_trials, place_trial, read_groups
+from .study_plots import draw_measures, draw_rfd
+from .suite_page import (
+    Provenance,
+    describe_machine,
+    format_league,
+    format_page,
+    format_results,
+    format_trajectories,
+    print_league,
+)
+
+#: Scene of a suite where none is given: the paper's session.
+SCENE = "ridge_mound_valley"
+#: Columns of a point.
+KEYS = ("method", "trajectory", "seed")
+#: Largest number of seeds, and of random drags.
+MOST_REPEATS, MOST_DRAGS = 100, 200
+#: The pictures.
+RFD_PICTURE, MEASURES_PICTURE = "rfd.svg", "measures.svg"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Plan of a suite.
+
+    Attributes
+    ----------
+    seeds : tuple of int
+        Of the noise.
+    points : tuple of Point
+        A trial each; words are method, trajectory and seed.
+    noise : float
+        Standard deviation of the force sensors, N.
+    title : str
+        Name of the scene.
+    identity : str
+        Hash of all scenes with all parameters, and of the code of methods of one's own.
+    """
+
+    methods: tuple[str, ...]
+    groups: tuple[str, ...]
+    seeds: tuple[int, ...]
+    points: tuple[Point, ...]
+    noise: float
+    title: str
+    identity: str
+
+
+def add_suite(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a suite."""
+    group = parser.add_argument_group("benchmark of methods (--suite)")
+    group.add_argument(
+        "--suite", action="store_true", help=f"many trajectories with repeated noise; default scene {SCENE}"
+    )
+    group.add_argument("--trajectories", metavar="T,...", help=f"some of {', '.join(GROUPS)}; default: all")
+    group.add_argument(
+        "--repeats", metavar="N", type=whole_number(1, MOST_REPEATS),
+        help="number of seeds of the noise; default: 5",
+    )  # fmt: skip
+    group.add_argument("--first-seed", metavar="N", type=whole_number(0, 2**31), help="default: 1")
+    group.add_argument("--noise", metavar="FORCE", help='noise of the force sensors; default: "2 mN"')
+    group.add_argument(
+        "--drags", metavar="N", type=whole_number(1, MOST_DRAGS), help="number of random drags; default: 20"
+    )
+    group.add_argument("--quick", action="store_true", help=f"{', '.join(QUICK)}, 2 seeds: for a first look")
+    add_pool(parser)
+
+
+def list_suite_methods() -> tuple[str, ...]:
+    """Return the methods of a suite where none are named: those that carry a blister."""
+    return tuple(name for name, method in METHODS.items() if method.blister is not None)
+
+
+def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequence[str]) -> int:
+    """Run what is not done yet, and write tables, page and plots."""
+    if arguments.overwrite:
+        raise OutputError("--overwrite is not for --suite, which continues its folder: choose another --out.")
+    if arguments.speed:
+        raise OutputError("--speed is not for --suite: its trajectories ridge-limit and lift-limit are that.")
+    for module in ("matplotlib", "scipy"):
+        refuse_without(module, "digiclay compare --suite", "pip install digiclay[suite]")
+    plan = make_plan(arguments, methods)
+    out: Path = arguments.out or Path(f"{plan.title}_suite")
+    description = {
+        "digiclay": __version__,
+        "methods": list(plan.methods),
+        "trajectories": list(plan.groups),
+        "seeds": list(plan.seeds),
+        "points": len(plan.points),
+        "scenes": plan.identity,
+    }
+
+    def describe(there: Mapping[str, Any]) -> str:
+        return f"{there.get('points', '?')} trials, digiclay {there.get('digiclay', '?')}"
+
+    return run_series(
+        arguments, "suite", len(plan.points), open_points(out, "suite", description, describe),
+        lambda evaluation: evaluation.finish([(point,) for point in plan.points], KEYS),
+        lambda records: _write(out, plan, records, _format_own_command(arguments, plan, words)),
+        noun="trials",
+    )  # fmt: skip
+
+
+def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
+    """Return the plan of a suite; ParameterError, SceneError in one line where it cannot be run."""
+    quick, words = arguments.quick, arguments.trajectories
+    asked = QUICK if quick else GROUPS
+    if words is not None:
+        asked = tuple(word.strip() for word in words.split(",") if word.strip())
+    groups = read_groups(asked)
+    repeats = arguments.repeats or (2 if quick else 5)
+    first = 1 if arguments.first_seed is None else arguments.first_seed
+    seeds = tuple(range(first, first + repeats))
+    trials = list_trials(groups, _count_drags(arguments))
+    path, settings = find(arguments.scene or SCENE), settings_of(arguments)
+    noise = Setting("sensors.force_noise", arguments.noise or "2 mN", "--noise")
+    scenes = {
+        (method, seed): load(
+            path,
+            [*settings, Setting(METHOD, method, "--methods"), noise,
+             Setting("sensors.seed", str(seed), "--first-seed")],
+        )
+        for method in methods
+        for seed in seeds
+    }  # fmt: skip
+    sensors = next(iter(scenes.values())).sensors
+    if repeats > 1 and not (sensors and sensors.noisy):
+        raise ParameterError("--repeats", "", "must be 1 without noise", str(repeats))
+    points: list[Point] = []
+    for (method, seed), scene in scenes.items():
+        for trial in trials:
+            placed, measure = place_trial(scene, trial)
+            points.append(Point(len(points), (method, trial.name, str(seed)), placed, measure=measure))
+    strength = sensors.force_noise if sensors else 0.0
+    title, identity = find_name(path), identify(points, methods)
+    return Plan(tuple(methods), groups, seeds, tuple(points), strength, title, identity)
+
+
+def _count_drags(arguments: argparse.Namespace) -> int:
+    """Return the number of random drags."""
+    return arguments.drags or (2 if arguments.quick else 20)
+
+
+def identify(points: Sequence[Point], methods: Sequence[str]) -> str:
+    """Return a number that identifies scenes, and the code of methods of one's own."""
+    rows = [find_method(name) for name in methods]
+    codes = [row.source.digest for row in rows if isinstance(row, OwnRow)]
+    scenes = hash_points(points)
+    return hashlib.sha256(" ".join([scenes, *codes]).encode()).hexdigest() if codes else scenes
+
+
+def _write(out: Path, plan: Plan, records: dict[int, Record], command: str) -> list[str]:
+    """Write tables, plots and page of finished trials; return the lines to print."""
+    table: Table = {
+        (point.words[0], point.words[1], int(point.words[2])): records[point.index]["figures"]
+        for point in plan.points
+        if "figures" in records[point.index]
+    }
+    errors = {point.words: records[point.index].get("error", "") for point in plan.points}
+    failed = [f"{' '.join(words)}: {why}" for words, why in errors.items() if why]
+    if not table:
+        raise DigiclayError(f"Every trial failed; the first one: {next(iter(errors.values()))}")
+    league = find_league(table, plan.methods)
+    source = Provenance(
+        plan.title, __version__, plan.identity, plan.methods, plan.seeds, plan.noise,
+        describe_machine("scipy"), datetime.now(UTC).date().isoformat(), command,
+    )  # fmt: skip
+    save(draw_rfd(table, plan.methods), out / RFD_PICTURE)
+    save(draw_measures(league, plan.methods), out / MEASURES_PICTURE)
+    files = {
+        "results.csv": format_results(source, plan.points, records),
+        "trajectories.csv": format_trajectories(source, table, plan.methods),
+        "league.csv": format_league(source, league),
+        "index.html": format_page(source, league, table, failed, (RFD_PICTURE, MEASURES_PICTURE)),
+    }
+    for name, text in files.items():
+        write_whole(out / name, text.encode())
+    lines = list(print_league(league))
+    if failed:
+        lines.append(f"{len(failed)} of {len(plan.points)} trials failed; the first one: {failed[0]}")
+    return [*lines, f"written to {out}: start with {out / 'index.html'}"]
+
+
+def _format_own_command(arguments: argparse.Namespace, plan: Plan, methods: Sequence[str]) -> str:
+    """Return the command that repeats a suite, with what was left to defaults."""
+    words = ["compare", arguments.scene or SCENE, "--suite", "--methods", ",".join(methods)]
+    words += ["--trajectories", ",".join(plan.groups), "--repeats", str(len(plan.seeds))]
+    words += ["--first-seed", str(plan.seeds[0]), "--noise", f"{plan.noise:g} N"]
+    if any(point.words[1].startswith("random") for point in plan.points):
+        words += ["--drags", str(_count_drags(arguments))]
+    for setting in settings_of(arguments):
+        if setting.key != METHOD:
+            words += ["--set", f"{setting.key}={setting.value}"]
+    return format_command(words)

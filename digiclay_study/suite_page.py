@@ -1,0 +1,215 @@
+"""Page and tables of a benchmark of methods, with all that a citation needs."""
+
+from __future__ import annotations
+
+import csv
+import importlib.metadata
+import io
+import os
+import platform
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from digiclay import __version__
+from digiclay.commands.gallery import make_links, make_table, wrap
+from digiclay.commands.progress import table as aligned
+from digiclay.core.studies.axes import Point, Record
+
+from .league import KIND, MEASURES, Interval, Row, Table, find_interval
+from .method_trials import LIMITS, LOW, OUTCOMES
+
+
+def describe_machine(*packages: str) -> str:
+    """Return one line: versions, those of more packages too, and the kind of machine."""
+    versions = [f"digiclay {__version__}", f"Python {platform.python_version()}", f"numpy {np.__version__}"]
+    versions += [f"{name} {importlib.metadata.version(name)}" for name in packages]
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return ", ".join(versions) + f"; {platform.system()}, {platform.machine()}, {_processor()}, {cores} cores"
+
+
+def _processor() -> str:
+    """Return the processor's name where the system tells it."""
+    told = Path("/proc/cpuinfo")
+    lines = told.read_text(encoding="utf-8").splitlines() if told.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown processor"
+
+
+#: Columns of the table in a terminal.
+PRINTED = (
+    "rfd", "lag_mean", "ridge_unevenness", "relief_rms", "max_total_force", "losses", *LIMITS, "cost_ratio",
+)  # fmt: skip
+#: Heading of the last column of the league.
+WORSE = "RFD greater on"
+#: Measures of the table of trajectories on the page.
+SHOWN = ("rfd", "lag_mean", "ridge_unevenness", "relief_rms", "max_total_force", "losses")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Origin of the results of a suite.
+
+    Attributes
+    ----------
+    identity : str
+        Hash of all scenes, with all parameters.
+    noise : float
+        N.
+    """
+
+    scene: str
+    version: str
+    identity: str
+    methods: tuple[str, ...]
+    seeds: tuple[int, ...]
+    noise: float
+    machine: str
+    date: str
+    command: str
+
+    def cite(self) -> str:
+        """Return the line by which a paper cites the results."""
+        ends = f"{self.seeds[0]} to {self.seeds[-1]}" if len(self.seeds) > 1 else f"{self.seeds[0]}"
+        return (
+            f"digiclay {self.version}, benchmark of control methods {', '.join(self.methods)} "
+            f"({self.scene}, scenes {self.identity[:16]}, noise {self.noise * 1e3:g} mN, seeds {ends}), "
+            f"{self.date}."
+        )
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Return names and values of the page and of the comments of the tables."""
+        return [
+            ("cite", self.cite()),
+            ("command", self.command),
+            ("scenes (SHA-256)", self.identity),
+            ("seeds", " ".join(map(str, self.seeds))),
+            ("force noise (N)", f"{self.noise:g}"),
+            ("machine", self.machine),
+            ("date", self.date),
+            ("intervals", KIND),
+        ]
+
+
+def format_results(source: Provenance, points: Sequence[Point], records: Mapping[int, Record]) -> str:
+    """Return all trials as CSV in SI units. `records`: by the index of their point."""
+    units = [name if metric.unit == "1" else f"{name} ({metric.unit})" for name, metric in OUTCOMES.items()]
+    rows = []
+    for point in points:
+        record = records[point.index]
+        figures = record.get("figures", {})
+        rows.append([*point.words, *map(figures.get, OUTCOMES), record.get("error", "")])
+    return _format_csv(source, ["method", "trajectory", "seed", *units, "error"], rows)
+
+
+def format_trajectories(source: Provenance, table: Table, methods: Sequence[str]) -> str:
+    """Return means and intervals of every trajectory as CSV in SI units."""
+    head = ["trajectory", "method", "measure", "unit", "mean", "half width", "seeds"]
+    rows = []
+    for name in _list_trajectories(table):
+        for method in methods:
+            for measure, metric in OUTCOMES.items():
+                found = _find_interval(table, method, name, measure)
+                if found is not None:
+                    rows.append([name, method, measure, metric.unit, found.mean, found.half, found.count])
+    return _format_csv(source, head, rows)
+
+
+def format_league(source: Provenance, league: Sequence[Row]) -> str:
+    """Return the league as CSV in SI units."""
+    head = ["rank", "method"]
+    for name, metric in MEASURES.items():
+        head += [f"{name} ({metric.unit})", f"{name}, half width ({metric.unit})"]
+    head += ["trajectories with a greater RFD than the first method", "trajectories"]
+    rows = []
+    for rank, row in enumerate(league, 1):
+        cells: list[Any] = [rank, row.method]
+        for name in MEASURES:
+            found = row.measures[name]
+            cells += [None, None] if found is None else [found.mean, found.half]
+        rows.append([*cells, row.worse, row.trajectories])
+    return _format_csv(source, head, rows)
+
+
+def print_league(league: Sequence[Row]) -> Iterator[str]:
+    """Give the lines of the league for a terminal."""
+    names = [name for name in MEASURES if name in PRINTED]
+    titles = [f"{MEASURES[name].label} {MEASURES[name].shown}".strip() for name in names]
+    yield from aligned(("method", *titles, WORSE), [_list_cells(row, names) for row in league])
+
+
+def format_page(
+    source: Provenance, league: Sequence[Row], table: Table, failed: Sequence[str], pictures: Sequence[str]
+) -> str:
+    """Return the page. `failed`: a line a failed trial; `pictures`: files beside it."""
+    titles = {name: metric.title for name, metric in MEASURES.items()}
+    first = escape(source.methods[0])
+    lines = [
+        f"<p>{len(table)} trials of {len(source.methods)} methods, {len(source.seeds)} seeds.</p>",
+        "<h2>League</h2>",
+        *make_table(
+            ["method", *titles.values(), WORSE], [_list_cells(row, list(MEASURES)) for row in league]
+        ),
+        f"<p>Means over the trajectories, the random drags together as one; ± {escape(KIND)}. Largest "
+        f"force: of all trajectories. Losses: sum. Cost: processor time, median; ratio to {first}. Last "
+        f"column: trajectories with a greater mean RFD than {first}. JND: just noticeable differences of the "
+        "set point.</p>",
+        *(f'<p><img alt="{name}" src="{name}"></p>' for name in pictures),
+    ]
+    for name in SHOWN:
+        body, factor = [], MEASURES[name].factor
+        for trajectory in _list_trajectories(table):
+            found = [_find_interval(table, method, trajectory, name) for method in source.methods]
+            if any(found):
+                body.append([trajectory, *(_format(interval, factor) for interval in found)])
+        lines.append(f"<h2>{escape(titles[name])} by trajectory</h2>")
+        lines += make_table(["trajectory", *source.methods], body)
+    if failed:
+        lines += ["<h2>Failed trials</h2>", *(f"<p>{escape(line)}</p>" for line in failed)]
+    files = ("league.csv", "trajectories.csv", "results.csv")
+    lines += ["<h2>Origin</h2>", *make_table(["", ""], source.facts())]
+    lines.append(f"<p>{make_links([(name, name) for name in files])}</p>")
+    return wrap(f"Benchmark of control methods: {source.scene}", lines)
+
+
+def _list_cells(row: Row, names: Sequence[str]) -> list[str]:
+    """Return a row of the league; a largest speed that was not found is below the slowest tried."""
+    cells = [row.method]
+    for name in names:
+        factor = MEASURES[name].factor
+        below = row.measures[name] is None and name in row.searched
+        cells.append(f"below {LOW * factor:g}" if below else _format(row.measures[name], factor))
+    return [*cells, "–" if row.worse is None else f"{row.worse} of {row.trajectories}"]
+
+
+def _format(found: Interval | None, factor: float) -> str:
+    """Write a mean and its interval in the unit shown."""
+    if found is None:
+        return "–"
+    half = "" if found.half is None else f" ± {found.half * factor:.2g}"
+    return f"{found.mean * factor:.3g}{half}"
+
+
+def _list_trajectories(table: Table) -> list[str]:
+    return list(dict.fromkeys(name for _, name, _ in table))
+
+
+def _find_interval(table: Table, method: str, trajectory: str, measure: str) -> Interval | None:
+    """Return a measure of a method on a trajectory over the seeds."""
+    trials = (found for (own, name, _), found in table.items() if (own, name) == (method, trajectory))
+    return find_interval([found.get(measure) for found in trials])
+
+
+def _format_csv(source: Provenance, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Return rows as CSV below comments with their origin."""
+    lines = io.StringIO()
+    for name, value in source.facts():
+        lines.write(f"# {name}: {textwrap.shorten(value, 2000)}\n")
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(rows)
+    return lines.getvalue()
