@@ -235,7 +235,6 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
 from digiclay.core.surface.formed import make_formed
-from digiclay.core.surface.formed import Lattice
 from digiclay.core.surface.pins_solid import make_parts
 
 def attempt(make):
@@ -251,7 +250,7 @@ done = run(scene)
 formed = make_formed(done.history, -1)
 print(done.figures["max_total_force"] > 0.0, scene.fingers[0].contact.share)
 print(attempt(lambda: len(run(viscous).history["time"])))
-print(attempt(lambda: Lattice.of(formed).neighbor.shape[1]))
+print(attempt(lambda: formed.neighbors.shape[1]))
 print(attempt(lambda: np.bincount(make_parts(formed).pin).max()))
 print(attempt(lambda: scene.layout.find_neighbors(corners=False)[60].tolist()))
 """

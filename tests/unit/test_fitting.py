@@ -116,7 +116,7 @@ def test_what_leaves_the_stroke_is_clipped_and_counted() -> None:
     assert cells.too_high == 13 * np.count_nonzero(wanted > STROKE + 1e-9) > 0
     assert cells.heights.min() == 0.0
     assert cells.heights.max() == STROKE
-    assert cells.told() == (
+    assert cells.describe() == (
         "ramp.png: heights from 0.0 to 100.0 mm, covers all cells, "
         f"{cells.too_low + cells.too_high} cells clipped ({cells.too_low} at the floor, "
         f"{cells.too_high} at the stroke's end)"
@@ -128,7 +128,7 @@ def test_overhangs_are_told() -> None:
     ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
     cells = laid(mesh(ring))
     assert cells.overhanging > 0
-    assert cells.told() == (
+    assert cells.describe() == (
         f"solid.stl: heights from 40.0 to 55.0 mm, covers {cells.covered} of 325 cells, no cell clipped, "
         f"overhangs under the top at {cells.overhanging} cells"
     )
@@ -183,7 +183,7 @@ def test_heights_in_a_scene_are_displayed_as_they_are() -> None:
     cells = fit_given(Shape(file="Suzanne", heights=pack(heights)), BED, Actuator())
     assert np.abs(cells.heights - np.clip(heights, 0.0, STROKE)).max() <= 4e-9
     assert cells.too_low == np.count_nonzero(heights < -1e-9) > 0
-    assert cells.told().startswith("Suzanne: heights from 0.0 to 100.0 mm")
+    assert cells.describe().startswith("Suzanne: heights from 0.0 to 100.0 mm")
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,6 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import run
 from digiclay.core.shapes.request import Shape
 from digiclay.core.shapes.source_file import fit_shape, list_shapes
-from PIL import Image
 
 SMALL = ["--set", "layout.rows=13", "--set", "layout.columns=13"]
 BED = make_grid(Layout(13, 13))
@@ -161,17 +160,6 @@ def test_what_cannot_be_formed_is_told_in_a_line(
     assert said in told
     assert told.count("\n") == 1
     assert not out.exists()
-
-
-@pytest.mark.parametrize("size", [(1, 1), (1, 40)])
-def test_a_picture_of_a_pixel_or_a_line_is_told(
-    size: tuple[int, int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "ein Punkt ä.png"
-    Image.new("L", size, 200).save(path)
-    assert main(["form", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == WRONG
-    said = f"must hold at least 2 x 2 heights (got ein Punkt ä.png: {size[1]} x {size[0]})"
-    assert said in capsys.readouterr().err
 
 
 def test_an_older_run_is_not_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -276,6 +276,6 @@ def test_a_scan_with_holes_has_no_pits_and_says_so(tmp_path: Path) -> None:
         for name in ("scan.stl", "whole.stl")
     )
     assert np.abs(laid.heights - whole.heights).max() < 0.1e-3
-    assert f"{laid.filled} cells under holes filled from around" in laid.told()
+    assert f"{laid.filled} cells under holes filled from around" in laid.describe()
     assert laid.filled > 5
-    assert "holes" not in whole.told()
+    assert "holes" not in whole.describe()

@@ -229,14 +229,6 @@ def test_the_parts_cover_the_bed_without_a_gap():
         assert area[outer].sum() == pytest.approx(each.sum(), rel=1e-9)
 
 
-def test_the_base_is_3_mm_under_the_lowest_pin_unless_told_otherwise():
-    bed = formed([40, 45, 50, 55], 2, 2)
-    assert make_pins_solid(bed)[0][:, 2].min() == pytest.approx(0.037, abs=1e-15)
-    assert make_pins_solid(bed, base_thickness=0.01)[0][:, 2].min() == pytest.approx(0.03, abs=1e-15)
-    with pytest.raises(ParameterError, match=r"^Surface\.base must be below the lowest pin top at 40 mm"):
-        make_pins_solid(bed, base=0.04)
-
-
 def test_differences_no_file_can_hold_make_no_wall():
     heights = 40.0 + np.array([0.0, 1e-6, 2e-5, 0.0, 5.0, 5.0])
     vertices, faces, _ = make_pins_solid(formed(heights, 2, 3))

@@ -89,7 +89,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
         method = f"{scene.method}: " if section == "control" else ""
         yield _filled(place, "left out" if part is None else method + _parameters(part))
     if scene.shape:
-        yield _filled("shape", fit_shape(scene.shape, system.grid, scene.actuator).told())
+        yield _filled("shape", fit_shape(scene.shape, system.grid, scene.actuator).describe())
     simulation = scene.simulation
     yield _filled("stepper", f"{system.stepper.name}, order {system.stepper.order}")
     yield "\nThe bed"

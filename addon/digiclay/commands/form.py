@@ -81,7 +81,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     with allow_interrupt():  # a mesh of millions of triangles takes a while
         scene, laid = _laid(scene_of(arguments)[0])
         if not arguments.quiet:
-            print(laid.told())
+            print(laid.describe())
         if arguments.finger != "scene":
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:

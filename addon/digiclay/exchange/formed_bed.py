@@ -46,8 +46,8 @@ def read_formed(bed: Any) -> Formed:
 
 def has_reference(bed: Any) -> bool:
     """Return whether a bed's owner has kept a surface to measure from."""
-    found = bed.data.attributes.get(FORMER)
-    return found is not None and found.domain == "POINT" and found.data_type == "FLOAT"
+    stored = bed.data.attributes.get(FORMER)
+    return stored is not None and stored.domain == "POINT" and stored.data_type == "FLOAT"
 
 
 def set_reference(bed: Any) -> None:
@@ -60,9 +60,9 @@ def set_reference(bed: Any) -> None:
 
 def clear_reference(bed: Any) -> None:
     """Measure features from the bed at rest again."""
-    found = bed.data.attributes.get(FORMER)
-    if found is not None:
-        bed.data.attributes.remove(found)
+    stored = bed.data.attributes.get(FORMER)
+    if stored is not None:
+        bed.data.attributes.remove(stored)
 
 
 def model(bed: Any, **fields: Any) -> Model:

@@ -95,11 +95,11 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     pose = _lift_finger(bed, scene, state.row(0))
     # All that can fail is done: from here on the bed changes.
     properties.write_scene(bed, scene)
-    began, said = sculpting.begin_session(
+    began, problem = sculpting.begin_session(
         bed.session_uid, bed.name, scene, pose, snapshot.dump(system, state), bed_state.read_tick(bed)
     )
-    if said:
-        raise DigiclayError(f"{bed.name}: {said}")
+    if problem:
+        raise DigiclayError(f"{bed.name}: {problem}")
     bed_state.write(bed, began)
     view.show_state(bed, system, began.state)
     tip = view.fingertip_of(bed)

@@ -113,7 +113,7 @@ class AddSample(AddSceneAction, bpy.types.Operator):
         bed.name = title(name)
         context.view_layer.update()
         laid, _ = shape_show.show_file(bed, replace(Shape(), file=name))
-        self.report({"INFO"}, laid.told())
+        self.report({"INFO"}, laid.describe())
         self.place(context, bed)
 
 

@@ -69,7 +69,7 @@ class Shaped(Action):
         context.view_layer.update()
         laid, off = self.display(context, bed)
         lost = laid.too_low + laid.too_high + laid.overhanging
-        words = localize("{}; displayed to within {:.2g} µm", laid.told(), off * 1e6)
+        words = localize("{}; displayed to within {:.2g} µm", laid.describe(), off * 1e6)
         running.set_message(words, bed.session_uid)
         self.report({"WARNING" if lost else "INFO"}, words)
 

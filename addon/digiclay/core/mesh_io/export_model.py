@@ -15,14 +15,14 @@ from ..surface.pins_solid import make_pins_solid
 from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
 from ..surface.skins import SKINS, SurfaceGrid, fit_skin
 
-#: Kinds of mesh, by name, with what is said of them in the help.
+#: Kinds of mesh, by name, with their lines in the help.
 KINDS: dict[str, str] = {
     "solid": "the skin with a base and walls, watertight",
     "surface": "the skin alone, open",
     "pins": "the stepped bed as one printable body, watertight",
     "features": "each boss as a body, each crease as the body that fills it",
 }
-#: Points a pitch of a skin that is not straight between the pins, unless told otherwise.
+#: Points a pitch of a skin that is not straight between the pins, by default.
 CURVED = 4
 #: More points than this no program takes in; it is also a few GB of memory.
 MOST_POINTS = 50_000_000

@@ -250,7 +250,7 @@ def _mesh(part: IO[bytes], body: Body, factor: float) -> None:
     part.write(b"</triangles>\n")
 
 
-#: File formats, by name, with what is said of them in the help.
+#: File formats, by name, with their lines in the help.
 FORMATS: dict[str, str] = {
     "stl": "STL, binary",
     "stl_ascii": "STL as text",

@@ -78,8 +78,8 @@ class Fitted:
     too_high: int
     filled: int = 0
 
-    def told(self) -> str:
-        """Return all that in one line."""
+    def describe(self) -> str:
+        """Return the fit in one line."""
         count = self.heights.size
         low, high = float(self.heights.min()) * 1e3, float(self.heights.max()) * 1e3
         covers = "all cells" if self.covered == count else f"{self.covered} of {_cells(count)}"

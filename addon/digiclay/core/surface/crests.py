@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.arrays import Floats, Indices
 from .crest_network import SADDLE, Chain, find_chains, find_stretch, measure_run, place_along, reaches_out
-from .formed import Lattice
+from .formed import Formed
 from .skeleton import find_skeleton, measure_half_width
 
 #: Steps a pitch with which a distance is looked for.
@@ -27,7 +27,7 @@ LEVEL = 0.1
 AROUND = 16
 #: Times a line is drawn through the middle of its sections.
 ROUNDS = 3
-#: Times the end of a line is looked for from where it was found last.
+#: Times the end of a line is looked for from its last place.
 ROUNDS_AT_END = 8
 #: A section this many times as wide as most is one through a junction, and says nothing of its middle.
 WIDE = 1.5
@@ -48,26 +48,23 @@ TO_AND_FRO = (0.5, -0.53)
 class Field:
     """Heights of one feature between the pins, and the largest distance of its flanks."""
 
-    lattice: Lattice
+    bed: Formed
     off: Floats
-    height: Floats
     most: float
 
     def at(self, position: Floats) -> Floats:
         """Return how far the feature is off at places, m; 0 beyond the bed."""
-        return np.nan_to_num(self.lattice.at(self.off, position))
+        return np.nan_to_num(self.bed.at(self.off, position))
 
     def falls(self, position: Floats, direction: Floats, level: Floats) -> Floats:
         """Return distances (k,), m, along unit vectors to where the feature falls to levels; inf: nowhere."""
-        step = self.lattice.pitch / STEPS
+        step = self.bed.spacing / STEPS
         steps = np.arange(1, int(np.ceil(self.most / step)) + 1) * step
         distance, rows = np.full(len(position), np.inf), max(1, CHUNK // len(steps))
         for start in range(0, len(position), rows):
             part = slice(start, start + rows)
             here = position[part, None] + steps[:, None] * direction[part, None]
-            above = np.column_stack(
-                [self.lattice.at(self.off, position[part]), self.lattice.at(self.off, here)]
-            )
+            above = np.column_stack([self.bed.at(self.off, position[part]), self.bed.at(self.off, here)])
             above -= level[part, None]
             fallen = above < 0.0  # not where the bed has ended: NaN
             first = np.argmax(fallen, axis=1)
@@ -90,7 +87,7 @@ class Field:
 
     def line(self, chain: Chain) -> Floats | None:
         """Return the line along the top that a chain of pins stands for, or none where it has no length."""
-        pitch = self.lattice.pitch
+        pitch = self.bed.spacing
         line = space_evenly(chain.points, pitch)
         if line is None:
             return None
@@ -110,7 +107,7 @@ class Field:
 
     def _sharpened(self, line: Floats, half: float, closed: bool) -> Floats:
         """Return a line with its corners where its straight legs meet, if the feature is as high there."""
-        step = self.lattice.pitch / 2.0
+        step = self.bed.spacing / 2.0
         fine = space_evenly(line, step)
         width = max(2, round(CORNER * half / step))
         if fine is None or len(fine) < 4 * width:
@@ -146,7 +143,7 @@ class Field:
 
     def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
         """Return a line led on straight from its last leg to one of others, or from its end to the next."""
-        step = self.lattice.pitch / 4.0
+        step = self.bed.spacing / 4.0
         there = [even for other in others if (even := space_evenly(other, step)) is not None]
         fine = space_evenly(line, step)
         if not there or fine is None:
@@ -165,7 +162,7 @@ class Field:
                 path = middle + np.linspace(0.0, 1.0, 9)[:, None] * (every[at] - middle)
                 if self.at(path).min() >= HIGH * float(np.median(self.at(leg))):
                     fine, corner = fine[:-near], every[at]
-        whole = space_evenly(np.concatenate([fine, corner]), self.lattice.pitch)
+        whole = space_evenly(np.concatenate([fine, corner]), self.bed.spacing)
         return line if whole is None else whole
 
     def _meeting(self, one: Floats, two: Floats, half: float) -> Floats | None:
@@ -206,7 +203,7 @@ class Field:
         # Across a junction the line continues as it does beside it.
         valid = np.flatnonzero(seen)
         shift = np.interp(np.arange(len(line)), valid, 0.5 * (left[valid] - right[valid]))
-        shift = np.clip(shift, -self.lattice.pitch, self.lattice.pitch)
+        shift = np.clip(shift, -self.bed.spacing, self.bed.spacing)
         for end in (0, 1):
             if chain.joined[end] and not chain.closed:
                 shift[-end] = 0.0
@@ -222,11 +219,11 @@ class Field:
 
     def _find_line_ends(self, line: Floats, half: float) -> Floats:
         """Return a line that ends, with its last point, where its spine ends; it may be longer or shorter."""
-        pitch = self.lattice.pitch
+        pitch = self.bed.spacing
         run = measure_run(line)
         # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight on there.
         around = line[-1] + (half + pitch) * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-        at_edge = bool(np.isnan(self.lattice.at(self.off, around)).any())
+        at_edge = bool(np.isnan(self.bed.at(self.off, around)).any())
         aside_at_end = half if at_edge else min(half, pitch)
         kept = run <= run[-1] - (aside_at_end if run[-1] > 4.0 * half else 0.0)
         line, run = line[kept], run[kept]
@@ -238,7 +235,7 @@ class Field:
         fine = space_evenly(path, pitch / 4.0)
         if fine is None:  # a line of a pitch that comes back to where it began
             return line[:1]
-        off, along = self.lattice.at(self.off, fine), measure_run(fine)
+        off, along = self.bed.at(self.off, fine), measure_run(fine)
         beyond = np.flatnonzero(np.isnan(off))
         last = int(beyond[0]) if len(beyond) else len(off)
         end = float(run[-1])
@@ -364,20 +361,18 @@ class Ridge(NamedTuple):
     half: float
 
 
-def find_ridges(
-    lattice: Lattice, pins: Indices, off: Floats, height: Floats, least: float
-) -> tuple[Ridge, ...]:
+def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[Ridge, ...]:
     """Return the ridges and mounds of a feature that are parted by saddles, with their crests."""
     own = np.zeros(len(off))
     own[pins] = off[pins]
-    beside = lattice.neighbor[pins]
+    beside = bed.neighbors[pins]
     place = np.minimum(np.searchsorted(pins, beside), len(pins) - 1)
     among, on_bed = np.where(pins[place] == beside, place, -1), beside >= 0
     line = find_skeleton(among, on_bed, off[pins])
-    position = lattice.formed.position[pins]
-    field = Field(lattice, own, height, 2.0 * (measure_half_width(among, on_bed) + 2.0) * lattice.pitch)
+    position = bed.position[pins]
+    field = Field(bed, own, 2.0 * (measure_half_width(among, on_bed) + 2.0) * bed.spacing)
     half = field.half_widths(position[line])
-    chains = find_chains(among, line, position, half, lattice.pitch, field.at) if len(line) > 1 else []
+    chains = find_chains(among, line, position, half, bed.spacing, field.at) if len(line) > 1 else []
     if not chains:  # a single pin, or a ring of three
         return (Ridge((), position[line], float(half.max())),)
     usual = float(np.median(half))
@@ -385,7 +380,7 @@ def find_ridges(
         piece
         for chain in chains
         for piece in _parted(chain, field, usual, least)
-        if piece is chain or not any(piece.joined) or reaches_out(piece.points, usual, lattice.pitch)
+        if piece is chain or not any(piece.joined) or reaches_out(piece.points, usual, bed.spacing)
     ]
     lines = [field.line(piece) for piece in pieces]
     _meet(pieces, lines, field)
@@ -452,7 +447,7 @@ def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:
     if line is None:
         return None
     half = field.half_width(line, chain.closed)
-    top = np.nan_to_num(field.lattice.at(field.height, line), nan=float(field.height.mean()))
+    top = np.nan_to_num(field.bed.at(field.bed.height, line), nan=float(field.bed.height.mean()))
     whole = smooth(np.column_stack([line, top, field.at(line)]), 2, chain.closed)
     if chain.closed:
         whole[-1] = whole[0]

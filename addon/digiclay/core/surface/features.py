@@ -10,9 +10,9 @@ import numpy as np
 
 from ..base.arrays import Faces, Floats, Indices
 from ..base.quantity import Parameters, quantity
+from ..model.layout import list_steps
 from .crest_network import find_stretch, measure_run
 from .crests import Crest, Ridge, find_ridges
-from .formed import Lattice
 from .regions import Region, cut, divide, label_components
 from .skins import SurfaceGrid
 
@@ -227,18 +227,15 @@ def find(grid: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
     """Return the features of a skin: bosses, then creases, the largest of each first."""
     # Points belong together that the skin's triangles join: two bosses that only touch at the threshold are
     # two. What a saddle parts, and a mound that stands on a ridge, is a feature by itself.
-    finding = finding or Finding()
-    lattice = Lattice.of(grid.formed)
-    features = []
+    finding, features = finding or Finding(), []
+    list_steps(grid.formed.shift / grid.formed.pitch)  # refuses rows that have no neighbors
     for kind, sign in (("boss", 1.0), ("crease", -1.0)):
-        some = sorted(_of_kind(grid, finding, lattice, kind, sign), key=lambda feature: -feature.volume)
+        some = sorted(_of_kind(grid, finding, kind, sign), key=lambda feature: -feature.volume)
         features += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
     return features
 
 
-def _of_kind(
-    grid: SurfaceGrid, finding: Finding, lattice: Lattice, kind: str, sign: float
-) -> Iterator[Feature]:
+def _of_kind(grid: SurfaceGrid, finding: Finding, kind: str, sign: float) -> Iterator[Feature]:
     """Give the features of one kind, not yet numbered."""
     off = sign * grid.raised
     inside = off > finding.threshold
@@ -255,7 +252,7 @@ def _of_kind(
             continue
         region = cut(grid.position, grid.former, off, faces[block], finding.threshold)
         least = DEEP * finding.threshold
-        whole = find_ridges(lattice, mine, at_pins, grid.formed.height, least)
+        whole = find_ridges(grid.formed, mine, at_pins, least)
         every = [part for ridge in whole for part in find_parts(ridge, least)]
         for part, own, piece, apart in _shared_out(grid, every, mine, region, finding.smallest):
             lines = tuple(crest.points for crest in part.crests)

@@ -1,9 +1,10 @@
-"""Formed surface: the pins now and before, the lattice between them, and the bodies made of it."""
+"""Formed surface: the pins now and before, what is between them, and the bodies made of it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,37 @@ class Formed:
         """How far each pin is above where it was before, m."""
         return self.height - self.former
 
+    @property
+    def spacing(self) -> float:
+        """Mean of the distances in a row and of rows, m."""
+        return 0.5 * (self.pitch + self.row_spacing)
+
+    @cached_property
+    def neighbors(self) -> Indices:
+        """Neighbors of the pins, (n, 8) in an aligned bed, else (n, 6), counter-clockwise; -1 off the bed."""
+        return find_neighbors(self.rows, self.columns, self.shift / self.pitch, corners=True)
+
+    def at(self, values: Floats, place: Floats) -> Floats:
+        """Return values (n,) at places (..., 2), m: linear along rows, then across; NaN off the bed."""
+        first = self.position[:: self.columns]
+        along = self.position[1, 0] - self.position[0, 0]
+        row = (place[..., 1] - first[0, 1]) / (first[1, 1] - first[0, 1])
+        low = np.clip(np.floor(row), 0, self.rows - 2).astype(np.int64)
+        up = row - low
+        columns = [(place[..., 0] - first[low + step, 0]) / along for step in (0, 1)]
+        parts = []
+        for step, column in enumerate(columns):
+            left = np.clip(np.floor(column), 0, self.columns - 2).astype(np.int64)
+            over = np.clip(column - left, 0.0, 1.0)
+            pin = (low + step) * self.columns + left
+            parts.append(values[pin] * (1.0 - over) + values[pin + 1] * over)
+        across = columns[0] * (1.0 - up) + columns[1] * up
+        slack = 1e-6
+        on_bed = (row >= -slack) & (row <= self.rows - 1 + slack)
+        on_bed &= (across >= -slack) & (across <= self.columns - 1 + slack)
+        share = np.clip(up, 0.0, 1.0)
+        return np.where(on_bed, parts[0] * (1.0 - share) + parts[1] * share, np.nan)
+
 
 def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
     """Return a row of a history as a formed surface; `former`: a row (int), or one height, m (float)."""
@@ -104,53 +136,6 @@ def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | flo
         raise ParameterError("Export", "former", "must be a finite height", f"{former} m")
     arrays = (history[name][row] for name in ("force", "mode"))
     return Formed.of(history["position"], history["height"][row], before, *arrays)
-
-
-@dataclass(frozen=True, eq=False)
-class Lattice:
-    """Pins and their neighbors.
-
-    Attributes
-    ----------
-    neighbor : ndarray of int (n, 8 or 6)
-        Counter-clockwise; -1 beyond the edge of the bed.
-    """
-
-    formed: Formed
-    neighbor: Indices
-
-    @classmethod
-    def of(cls, formed: Formed) -> Lattice:
-        """Return the neighbors of all pins of a bed: 8 in an aligned one, else 6."""
-        shift = formed.shift / formed.pitch
-        return cls(formed, find_neighbors(formed.rows, formed.columns, shift, corners=True))
-
-    @property
-    def pitch(self) -> float:
-        """Distance of neighbors, the mean of that along a row and that of the rows, m."""
-        return 0.5 * (self.formed.pitch + self.formed.row_spacing)
-
-    def at(self, values: Floats, position: Floats) -> Floats:
-        """Return values (n,) at places (..., 2), m: linear along rows, then across; NaN off the bed."""
-        bed = self.formed
-        first = bed.position[:: bed.columns]
-        along = bed.position[1, 0] - bed.position[0, 0]
-        row = (position[..., 1] - first[0, 1]) / (first[1, 1] - first[0, 1])
-        low = np.clip(np.floor(row), 0, bed.rows - 2).astype(np.int64)
-        up = row - low
-        columns = [(position[..., 0] - first[low + step, 0]) / along for step in (0, 1)]
-        parts = []
-        for step, column in enumerate(columns):
-            left = np.clip(np.floor(column), 0, bed.columns - 2).astype(np.int64)
-            over = np.clip(column - left, 0.0, 1.0)
-            pin = (low + step) * bed.columns + left
-            parts.append(values[pin] * (1.0 - over) + values[pin + 1] * over)
-        across = columns[0] * (1.0 - up) + columns[1] * up
-        slack = 1e-6
-        on_bed = (row >= -slack) & (row <= bed.rows - 1 + slack)
-        on_bed &= (across >= -slack) & (across <= bed.columns - 1 + slack)
-        share = np.clip(up, 0.0, 1.0)
-        return np.where(on_bed, parts[0] * (1.0 - share) + parts[1] * share, np.nan)
 
 
 #: Code of the mode at a vertex that belongs to no pin, such as one of the base.

@@ -59,8 +59,8 @@ def make_parts(formed: Formed) -> Parts:
     size = len(corner)
     sides = start * size + end
     order = np.argsort(sides)
-    found = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
-    twin = order[found]
+    place = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
+    twin = order[place]
     return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, -1))
 
 

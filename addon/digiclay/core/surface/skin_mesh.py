@@ -28,7 +28,7 @@ from ..base.errors import ParameterError
 BASE_THICKNESS = 3e-3
 
 #: Two diagonals are as long as each other when their squares agree to this fraction:
-#: far above rounding, far below the smallest difference of a known arrangement (staggered, 4/5).
+#: far above rounding, far below the smallest difference of an arrangement (staggered, 4/5).
 SAME_LENGTH = 1e-6
 #: Pins whose triangles are worked out at once, so that a large bed takes little more memory than its result.
 BAND = 1 << 16

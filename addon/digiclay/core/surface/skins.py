@@ -108,7 +108,7 @@ class _Stiffness:
         return total
 
 
-#: Skins by name, with what is said of them in the help.
+#: Skins by name, with their lines in the help.
 SKINS: dict[str, str] = {
     "bilinear": "straight between the pins",
     "smooth": "monotone cubic splines through the pin tops",
