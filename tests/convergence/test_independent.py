@@ -13,7 +13,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 from digiclay.core.engine.system import System
 from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
@@ -170,30 +169,16 @@ def unpack(flat: Floats, count: int, near: int) -> tuple[Floats, Floats, Floats]
     return flat[:count], flat[count : 2 * count], flat[2 * count :].reshape(3, near)
 
 
-@pytest.fixture(scope="module")
-def session() -> tuple[Record, Floats, Floats]:
-    """The session by the core, and its heights and forces by SciPy."""
+def test_heights_and_forces_agree_with_scipy_over_the_whole_session() -> None:
     scene = sample("ridge_mound_valley")
     system, trajectory = assemble(scene), scene.section("trajectory").trajectory()
     run = record(system, trajectory, round(trajectory.duration / system.period))
-    return (run, *integrate(numbers(), spline(trajectory), system, run))
-
-
-def test_the_session_forms_ridge_mound_and_valley(session: tuple[Record, Floats, Floats]) -> None:
-    # Guards the two tests below against a session in which nothing happens.
-    run, _, _ = session
+    # Guards against a session in which nothing happens.
     assert run.height[-1].max() > 60e-3
     assert run.height[-1].min() < 35e-3
     assert (run.force > 0.0).any(axis=0).sum() > 50
-
-
-def test_heights_agree_with_scipy_over_the_whole_session(session: tuple[Record, Floats, Floats]) -> None:
-    # 5 µm: what the project promises at the default step; a pin's own play is larger.
-    run, heights, _ = session
+    heights, forces = integrate(numbers(), spline(trajectory), system, run)
+    # What the project promises at the default step: 5 µm, for a pin's own play is larger, and 1 mN, 1/400
+    # of the force that is asked for.
     assert np.abs(heights - run.height).max() < 5e-6
-
-
-def test_forces_agree_with_scipy_over_the_whole_session(session: tuple[Record, Floats, Floats]) -> None:
-    # 1 mN: what the project promises at the default step, 1/400 of the force held.
-    run, _, forces = session
     assert np.abs(forces - run.force).max() < 1e-3

@@ -49,17 +49,10 @@ class Everywhere:
 
 @settings(max_examples=15)
 @given(points)
-@example(  # the finger is felt by one cell, and travels along a row: cells lie exactly abeam of it
-    [
-        (-0.2, -1.5, 34.1),
-        (-3.0, -7.9, 49.0),
-        (2.1, 3.0, 45.1),
-        (-3.3, 9.6, 40.6),
-        (-1.3, -5.4, 37.7),
-        (-9.1, 12.0, 54.9),
-        (-10.0, 2.3, 49.7),
-    ]
-)
+@example([  # the finger is felt by one cell, and travels along a row: cells lie exactly abeam of it
+    (-0.2, -1.5, 34.1), (-3.0, -7.9, 49.0), (2.1, 3.0, 45.1), (-3.3, 9.6, 40.6), (-1.3, -5.4, 37.7),
+    (-9.1, 12.0, 54.9), (-10.0, 2.3, 49.7),
+])  # fmt: skip
 def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(
     spots: list[tuple[float, float, float]],
 ) -> None:
