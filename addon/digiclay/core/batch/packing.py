@@ -82,23 +82,23 @@ class RunByRun:
 
     def locate(self, memory: list[Any], touched: Measurement) -> tuple[list[Any], list[Any]]:
         """Let each take in its cells."""
-        found = [
-            controller.locate(known, _take_run(touched, run))
-            for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
+        located = [
+            controller.locate(own, _take_run(touched, run))
+            for run, (controller, own) in enumerate(zip(self.controllers, memory, strict=True))
         ]
-        return [known for known, _ in found], [disc for _, disc in found]
+        return [own for own, _ in located], [disc for _, disc in located]
 
     def command(self, memory: list[Any], seen: Measurement) -> tuple[list[Any], Commands]:
         """Let each give its orders."""
         given = [
-            controller.command(known, _take_run(seen, run))
-            for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
+            controller.command(own, _take_run(seen, run))
+            for run, (controller, own) in enumerate(zip(self.controllers, memory, strict=True))
         ]
         targets, modes, commands = seen.target.copy(), seen.mode.copy(), np.zeros(seen.target.shape)
         for run, (_, orders) in enumerate(given):
             own = slice(orders.target.size)
             targets[own, run], modes[own, run], commands[own, run] = orders
-        return [known for known, _ in given], Commands(targets, modes, commands)
+        return [own for own, _ in given], Commands(targets, modes, commands)
 
 
 def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any:
@@ -251,25 +251,27 @@ def find_diverged(state: State) -> NDArray[np.bool_]:
 
 def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceError:
     """Return the error of a run, by its index, with a number that is not finite after a control period."""
-    held = state.active
-    error = find_divergence(batch.systems[run], held.cells[:, run], held.block[..., run], state.period - 1)
+    former = state.active
+    error = find_divergence(
+        batch.systems[run], former.cells[:, run], former.block[..., run], state.period - 1
+    )
     assert error is not None
     return error
 
 
 def select_runs(state: State, runs: Sequence[int]) -> State:
     """Return the state of some of the runs. `runs`: their indices on the last axis."""
-    chosen, held = np.array(runs, np.intp), state.active
+    chosen, former = np.array(runs, np.intp), state.active
     # The discs are not worth keeping: the set is made anew.
     active = replace(
-        held,
-        cells=held.cells[:, chosen],
-        block=held.block[..., chosen],
-        mode=held.mode[:, chosen],
-        quadratic_basis=held.quadratic_basis[..., chosen],
-        peak=held.peak[chosen],
+        former,
+        cells=former.cells[:, chosen],
+        block=former.block[..., chosen],
+        mode=former.mode[:, chosen],
+        quadratic_basis=former.quadratic_basis[..., chosen],
+        peak=former.peak[chosen],
         until=0,
-        own=tuple(held.own[run] for run in runs) if held.own else (),
+        own=tuple(former.own[run] for run in runs) if former.own else (),
     )
     several = (state.rows, state.modes, state.aged)
     rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
@@ -296,22 +298,22 @@ class Findings:
 
     def find(self, most: int, key: Any, make: Callable[..., Any], *given: Any) -> Any:
         """Return what was made for an equal key, or make it; the first goes when there are `most`."""
-        known = self._known[most]
-        if key not in known:
-            if len(known) >= most:
-                del known[next(iter(known))]
-            known[key] = make(*given)
-        return known[key]
+        kept = self._known[most]
+        if key not in kept:
+            if len(kept) >= most:
+                del kept[next(iter(kept))]
+            kept[key] = make(*given)
+        return kept[key]
 
 
-def describe_structure(scene: Scene, known: Findings | None = None) -> Any:
+def describe_structure(scene: Scene, findings: Findings | None = None) -> Any:
     """Return what scenes must have in common to stand in one batch.
 
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
-    The other steppers know no runs, so for them all cells must be alike. `known`: of scenes before.
+    The other steppers know no runs, so for them all cells must be alike. `findings`: of scenes before.
     Raises ParameterError when the scene's parts do not go together.
     """
-    known = known or Findings()
+    findings = findings or Findings()
     physics = tuple(scene.section(name) for name in PHYSICS)
     fingertips = tuple(finger.fingertip for finger in scene.fingers)
     sensors = scene.sensors and replace(scene.sensors, seed=0)
@@ -321,7 +323,7 @@ def describe_structure(scene: Scene, known: Findings | None = None) -> Any:
         scene.layout,
         scene.method if scene.control else None,
         scene.shape is None,
-        *(known.find(KINDS, part, classify, part) for part in parts),
+        *(findings.find(KINDS, part, classify, part) for part in parts),
         rounds,
         sensors and sensors.noisy,
         scene.recorder,
@@ -330,12 +332,12 @@ def describe_structure(scene: Scene, known: Findings | None = None) -> Any:
     if scene.simulation.stepper not in CLOSED_FORM:
         return (*common, physics, replace(scene.simulation, duration=0.0))
     steps = scene.simulation.control_period, scene.simulation.steps, scene.simulation.stepper
-    motion: Motion = known.find(MOTIONS, (physics, fingertips, steps), make_motion, scene)
-    bed: Grid = known.find(BEDS, scene.layout, make_grid, scene.layout)
+    motion: Motion = findings.find(MOTIONS, (physics, fingertips, steps), make_motion, scene)
+    bed: Grid = findings.find(BEDS, scene.layout, make_grid, scene.layout)
     nodes = tuple(
         (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in _plans(motion)
     )
-    kind = known.find(KINDS, physics, classify, physics)
+    kind = findings.find(KINDS, physics, classify, physics)
     return (*common, kind, count_rows(scene, bed, motion), nodes, motion.instants.size)
 
 

@@ -206,20 +206,20 @@ class Sums:
         if now.play.runs is not self._present:
             self._present = now.play.runs
             self._columns = [self._runs.index(run) for run in self._present]
-        held, period = now.play.state.active, now.play.state.period
+        active, period = now.play.state.active, now.play.state.period
         if (period - 1) % self._every == 0:
-            self._following[(period - 1) // self._every, self._columns] = _count_following(held)
+            self._following[(period - 1) // self._every, self._columns] = _count_following(active)
         if period % self._every == 0:
-            self._sums[period // self._every, :, self._columns] = self._sum(held).T
+            self._sums[period // self._every, :, self._columns] = self._sum(active).T
 
     def finish(self, now: Instant, index: int) -> Result:
         """Return the result of a run at its end, without a history."""
         play, run, period = now.play, now.play.runs[index], now.play.state.period
-        scene, column, held = self._scenes[run], self._runs.index(run), play.state.active
+        scene, column, active = self._scenes[run], self._runs.index(run), play.state.active
         count = 1 - (-period // self._every)
         rows, following = self._sums[:count, :, column], self._following[:count, column].copy()
         if count > 1:
-            rows[-1], following[-1] = self._sum(held)[:, index], _count_following(held)[index]
+            rows[-1], following[-1] = self._sum(active)[:, index], _count_following(active)[index]
         # In one piece each: they are gone through many times.
         total, x, y, height, strongest = np.ascontiguousarray(rows.T)
         first, last = self._first[:, column], play.state.row(0)[:, index]
@@ -230,21 +230,21 @@ class Sums:
             moments = np.minimum(np.arange(count) * self._every, period) * time
             self._ways[same] = make_path(grid, play.ways[run], moments)
         way = self._ways[same]
-        found = compute_metrics_from_sums(
+        metrics = compute_metrics_from_sums(
             sums, way.time, way.fingertip, grid.positions, scene.set_point, way.cells
         )
-        return report(scene, now.ended(index), found)
+        return report(scene, now.ended(index), metrics)
 
-    def _sum(self, held: ActiveSet) -> Floats:
+    def _sum(self, active: ActiveSet) -> Floats:
         """Return the numbers of a row of `CellSums`, total to strongest, shape (5, b)."""
-        near = slice(held.near)
-        x, y = (along[near] for along in held.quadratic_basis[1:3])
-        return sum_row(held.block[self._force, near], x, y, held.block[0, near])
+        near = slice(active.near)
+        x, y = (along[near] for along in active.quadratic_basis[1:3])
+        return sum_row(active.block[self._force, near], x, y, active.block[0, near])
 
 
-def _count_following(held: ActiveSet) -> NDArray[np.intp]:
+def _count_following(active: ActiveSet) -> NDArray[np.intp]:
     """Return how many cells of each run follow the force, shape (b,)."""
-    count: NDArray[np.intp] = np.count_nonzero(held.mode == FORCE_FOLLOW, axis=0)
+    count: NDArray[np.intp] = np.count_nonzero(active.mode == FORCE_FOLLOW, axis=0)
     return count
 
 
@@ -278,8 +278,8 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
     play = replace(play, state=repeat_period(play.batch, play.state, play.finger, leader.state))
     own, other, force = play.state.active, leader.state.active, play.batch.rows.force
     near = slice(own.near)
-    found = compare(own.block[0], own.block[force, near], other.block[0], other.block[force, near])
-    return Monitor(play, np.maximum(largest, found))
+    differences = compare(own.block[0], own.block[force, near], other.block[0], other.block[force, near])
+    return Monitor(play, np.maximum(largest, differences))
 
 
 def _run(

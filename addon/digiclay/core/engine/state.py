@@ -211,9 +211,9 @@ class State(NamedTuple):
 
     def copy(self) -> State:
         """Return a state that shares no array with this one that a step would change."""
-        held = replace(self.active, block=self.active.block.copy(), mode=self.active.mode.copy())
+        active = replace(self.active, block=self.active.block.copy(), mode=self.active.mode.copy())
         return self._replace(
-            rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), active=held
+            rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), active=active
         )
 
 

@@ -76,8 +76,8 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
     for name in names[1:]:
         for field in fields(_load(section, name)):
             if field.name not in own:
-                known = field.metadata["quantity"]
-                declared.setdefault(field.name, (field.type, _declare(field.default, known)))
+                quantities = field.metadata["quantity"]
+                declared.setdefault(field.name, (field.type, _declare(field.default, quantities)))
 
     def check(self: Any) -> None:
         first.check(self)
@@ -98,9 +98,9 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
     return make_dataclass(first.__name__, parts, bases=(first,), frozen=True, namespace=namespace)
 
 
-def _declare(default: Any, known: Any) -> Any:
+def _declare(default: Any, quantities: Any) -> Any:
     """Declare a field with the quantity of another one."""
-    given = {field.name: getattr(known, field.name) for field in fields(known)}
+    given = {field.name: getattr(quantities, field.name) for field in fields(quantities)}
     return quantity(default, given.pop("doc"), **given)
 
 

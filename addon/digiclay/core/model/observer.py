@@ -78,19 +78,19 @@ class ValveObserver(Sensors):
         """Return the heights as the inner sensors read them."""
         return self.inner.measure(np.empty((0, *truth.cells.shape)), truth)[1]
 
-    def _estimate(self, opening: Floats, before: Floats, after: Floats, held: Floats) -> Floats:
+    def _estimate(self, opening: Floats, before: Floats, after: Floats, last: Floats) -> Floats:
         """Return the forces, N, from openings (nodes, m[, b]) and the heights before and after, m."""
         actuator = self.cell.actuator
-        told = self._average(opening**2) > SHUT**2
-        told &= (after > 0.0) & (after < actuator.stroke)
+        moving = self._average(opening**2) > SHUT**2
+        moving &= (after > 0.0) & (after < actuator.stroke)
         flow = actuator.area * (after - before) / self.period
-        pressure, force = self.cell.supply.pressure(opening), held
+        pressure, force = self.cell.supply.pressure(opening), last
         for _ in range(ROUNDS):
             conductance = self.cell.flow.conductance(opening, pressure - force / actuator.area)
-            open_for = np.where(told, self._average(conductance), 1.0)
-            found = actuator.area * (self._average(conductance * pressure) - flow) / open_for
+            open_for = np.where(moving, self._average(conductance), 1.0)
+            estimate = actuator.area * (self._average(conductance * pressure) - flow) / open_for
             least = actuator.area**2 * self.doubt / self.period / open_for
-            force = np.where(told, np.where(found > least, found, 0.0), held)
+            force = np.where(moving, np.where(estimate > least, estimate, 0.0), last)
         return force
 
     def _average(self, values: Floats) -> Floats:

@@ -138,27 +138,27 @@ def find_indentations(fingertip: Fingertip, history: Mapping[str, Floats]) -> Fl
     felt, height = history["force"] > 0.0, history["height"]
     # No pin stands deeper than it is above the lowest point: few rows are left to look at.
     most = np.max(height, axis=1, where=felt, initial=-np.inf) - history["fingertip"][:, 2]
-    deepest_first, found = np.argsort(-most, kind="stable"), np.zeros(len(most))
+    deepest_first, deepest = np.argsort(-most, kind="stable"), np.zeros(len(most))
     cells = np.flatnonzero(felt.any(axis=0))  # the only ones that are worked out: of a large bed they are few
     x, y = np.asarray(history["position"], dtype=np.float64)[cells].T
     basis = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     for start in range(0, len(most), ROWS):
         rows = deepest_first[start : start + ROWS]
-        if most[rows[0]] <= min(found.max(), MOST_INDENTATION):
+        if most[rows[0]] <= min(deepest.max(), MOST_INDENTATION):
             break
         under = compute_underside(
             *compute_forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), basis
         )
         part = np.ix_(rows, cells)
-        found[rows] = np.max(height[part] - under, axis=1, where=felt[part], initial=0.0)
-    return found
+        deepest[rows] = np.max(height[part] - under, axis=1, where=felt[part], initial=0.0)
+    return deepest
 
 
 def describe_excess(force: float | None, indentation: float | None) -> str:
     """Return the message on a total force, N, and indentation, m, beyond the law; None: not known; or ""."""
-    said = []
+    excess = []
     if force is not None and force > MOST_FORCE:
-        said.append(f"{force:.3g} N (fingers were measured up to {MOST_FORCE:g} N)")
+        excess.append(f"{force:.3g} N (fingers were measured up to {MOST_FORCE:g} N)")
     if indentation is not None and indentation > MOST_INDENTATION:
-        said.append(f"{indentation * 1e3:.3g} mm deep (up to {MOST_INDENTATION * 1e3:g} mm)")
-    return f"the contact law does not hold: {', '.join(said)}" if said else ""
+        excess.append(f"{indentation * 1e3:.3g} mm deep (up to {MOST_INDENTATION * 1e3:g} mm)")
+    return f"the contact law does not hold: {', '.join(excess)}" if excess else ""
