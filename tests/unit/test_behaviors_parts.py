@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
+from digiclay.core.control.displays import SHAPES, evaluate_shape
 from digiclay.core.control.drive import Drive
 from digiclay.core.control.exchange import make_exchange
 from digiclay.core.control.methods import METHODS
-from digiclay.core.control.named_shapes import SHAPES, evaluate_shape
 from digiclay.core.model.layout import Grid, Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve

@@ -94,18 +94,18 @@ def test_the_products_of_plain_arrays_in_a_period_are_all_counted() -> None:
     assert len(calls) == 300
 
 
-def test_a_period_of_method_i_makes_at_most_115_numpy_calls() -> None:
+def test_a_period_of_method_i_makes_at_most_114_numpy_calls() -> None:
     # A count, not seconds: the same wherever it is taken, and a call more for the cells is one more.
     scene = sample("ridge_mound_valley")
     calls, _ = period_calls(assemble(scene), scene.trajectories(), 2000)
-    assert statistics.median(calls) <= 115
+    assert statistics.median(calls) <= 114
 
 
 def test_a_period_of_method_iii_makes_fewer_than_twice_the_numpy_calls_of_method_i() -> None:
     scene = sample("ridge_mound_valley", "control.method=hybrid")
     calls, _ = period_calls(assemble(scene), scene.trajectories(), 400)
-    # While the force is held every second period makes 174 calls, the others 262.
-    assert statistics.mean(calls[300:]) < 2 * 115
+    # While the force is near its set point every second period solves for less: 222.7 calls on average.
+    assert statistics.mean(calls[300:]) < 224
 
 
 def test_a_table_is_aligned() -> None:

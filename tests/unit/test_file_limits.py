@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
-from digiclay.core.control.named_shapes import read_values
+from digiclay.core.control.displays import read_values
 from digiclay.core.engine.simulation import begin
 from digiclay.core.files.tables import LARGEST
 from digiclay.core.model.layout import Layout, make_grid

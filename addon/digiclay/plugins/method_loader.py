@@ -1,4 +1,7 @@
-"""Control methods of one's own: code found, loaded, checked, entered in the table, copied beside runs."""
+"""Control methods of one's own: code found, loaded, checked, entered in the table, copied beside runs.
+
+Blender offers all methods of a folder of files (`load_folder`); one mistake hides no other method.
+"""
 
 from __future__ import annotations
 
@@ -41,18 +44,12 @@ class MethodSource(NamedTuple):
 
     Attributes
     ----------
-    label : str
-        For messages: ``mine.py:Mine``, or the name of an installed method.
-    file : str
-        As tracebacks have it.
-    attribute : str
-        Name of the class.
-    text : str
-        The code; empty for that of an installed package, which is imported.
-    package : str
-        Name and version of the installed package; empty for a file.
-    module : str
-        To import; empty for a file.
+    label, file : str
+        For messages, ``mine.py:Mine`` or the name of an installed method; as tracebacks have it.
+    attribute, text : str
+        Name of the class; the code, empty for that of an installed package, which is imported.
+    package, module : str
+        Name and version of the installed package, and what to import; empty for a file.
     digest : str
         SHA-256 of the code: methods of one digest are the same.
     """
@@ -72,16 +69,9 @@ def is_file_word(word: str) -> bool:
 
 
 def read_source(word: str) -> MethodSource | None:
-    """Return the code that a word of the command line names; None where no package offers such a method.
-
-    `word`: ``path/to/mine.py:Mine``, or the name of an installed method. Raises MethodError: in one line:
-    file and rule.
-    """
-    return _read_file_word(word) if is_file_word(word) else find_installed(word)
-
-
-def _read_file_word(word: str) -> MethodSource:
-    """Read a file named with its class."""
+    """Return the code of ``path/to/mine.py:Mine``, or of an installed method; None where there is none."""
+    if not is_file_word(word):
+        return find_installed(word)
     name, colon, attribute = word.rpartition(":")
     if not colon or name == "" or not re.fullmatch(r"[^\W\d]\w*", attribute):
         example = f"{Path(word).name.partition(':')[0] or 'mine.py'}:Mine"
@@ -90,7 +80,7 @@ def _read_file_word(word: str) -> MethodSource:
 
 
 def read_file(path: Path, attribute: str) -> MethodSource:
-    """Return the code of a file. `attribute`: class in it. Raises MethodError."""
+    """Return the code of a file with a class, or raise MethodError."""
     try:
         data = path.read_bytes()
     except (OSError, ValueError) as error:
@@ -109,17 +99,14 @@ def read_file(path: Path, attribute: str) -> MethodSource:
 
 
 def find_installed(name: str) -> MethodSource | None:
-    """Return the code of an installed method, without importing it; None where no package offers it.
-
-    `name`: of the entry point. Raises MethodError when several packages offer it.
-    """
-    found: dict[str, EntryPoint] = {point.value: point for point in entry_points(group=GROUP, name=name)}
-    if not found:
+    """Return the code of an entry point, without importing it; None without one, MethodError of several."""
+    points: dict[str, EntryPoint] = {point.value: point for point in entry_points(group=GROUP, name=name)}
+    if not points:
         return None
-    if len(found) > 1:
-        owners = ", ".join(sorted(found))
+    if len(points) > 1:
+        owners = ", ".join(sorted(points))
         raise MethodError(f"The method {name} must be offered by one installed package (got {owners}).")
-    (point,) = found.values()
+    (point,) = points.values()
     owner = f"{point.dist.name} {point.dist.version}" if point.dist else point.module
     try:
         spec = importlib.util.find_spec(point.module)
@@ -143,11 +130,8 @@ KINDS = (bool, int, float, str, tuple)
 
 def list_classes(module: ModuleType) -> list[type]:
     """Return the control methods that a module defines itself."""
-    return [
-        one
-        for one in vars(module).values()
-        if isinstance(one, type) and issubclass(one, ControlParameters) and one.__module__ == module.__name__
-    ]
+    kinds = [kind for kind in vars(module).values() if isinstance(kind, type)]
+    return [k for k in kinds if issubclass(k, ControlParameters) and k.__module__ == module.__name__]
 
 
 def check_class(label: str, kind: Any) -> None:
@@ -189,15 +173,15 @@ def _owner(kind: type, name: str) -> type | None:
 
 def _check_field(field: dataclasses.Field[Any], refuse: Refuse) -> None:
     """Refuse a field that is no declared parameter."""
-    known = field.metadata.get("quantity")
-    if not isinstance(known, Quantity):
+    declared = field.metadata.get("quantity")
+    if not isinstance(declared, Quantity):
         refuse(f"the field {field.name} must be declared with quantity(default, meaning, unit=...)")
     if field.name in TAKEN or field.name.startswith("_"):
         refuse(f"a field must not begin with an underscore, nor be called {', '.join(TAKEN)}", field.name)
     if not isinstance(field.default, KINDS):
         kinds = ", ".join(kind.__name__ for kind in KINDS)
         refuse(f"the default of {field.name} must be a {kinds}", type(field.default).__name__)
-    if not known.doc.strip():
+    if not declared.doc.strip():
         refuse(f"the meaning of {field.name} must be given")
 
 
@@ -223,15 +207,7 @@ PACKAGE = __package__.rpartition(".")[0]
 
 @dataclass(frozen=True, kw_only=True)
 class OwnRow(Method):
-    """Method of one's own in the table of methods.
-
-    Attributes
-    ----------
-    name : str
-        In scene files.
-    kind : type
-        Class of its parameters, which builds the controller.
-    """
+    """Method of one's own: its name in scene files, and the class of its parameters, which builds it."""
 
     name: str
     kind: type[ControlParameters]
@@ -255,11 +231,11 @@ def load_method(word: str) -> str:
     if source is None:
         return word
     name = word if source.module else name_method(source.attribute)
-    known = list_added().get(name)
-    if isinstance(known, OwnRow):
-        if known.source.digest == source.digest and known.source.attribute == source.attribute:
+    row = list_added().get(name)
+    if isinstance(row, OwnRow):
+        if row.source.digest == source.digest and row.source.attribute == source.attribute:
             return name
-        other = known.source.file
+        other = row.source.file
         raise MethodError(f"{source.label}: the method's name {name} must be its own (also that of {other}).")
     add_source(name, source)
     return name
@@ -304,16 +280,16 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
 
 def restore_parameters(name: str, source: MethodSource, values: dict[str, Any]) -> ControlParameters:
     """Return parameters that another process has pickled, with their class: its code comes along."""
-    known = list_added().get(name)
-    if not isinstance(known, OwnRow) or known.source[1:] != source[1:]:
+    row = list_added().get(name)
+    if not isinstance(row, OwnRow) or row.source[1:] != source[1:]:
         if source.module:
             here = read_source(name)
             if here is None or here.digest != source.digest:
                 got = f"of {here.package}, with other code" if here else "not installed"
                 rule = f"must be that of {source.package} here too"
                 raise MethodError(f"The method {name} {rule} (it is {got}).")
-        known = add_source(name, source)
-    return known.kind(**values)
+        row = add_source(name, source)
+    return row.kind(**values)
 
 
 def _import(source: MethodSource) -> ModuleType:
@@ -361,8 +337,8 @@ def run_code(source: MethodSource) -> ModuleType:
         if isinstance(error, KeyboardInterrupt):
             raise
         rule = f"the code {describe_failure(error, source.file)}."
-        said = str(error) if isinstance(error, ParameterError) else rule
-        raise MethodError(f"{source.label.partition(':')[0]}: {said}") from error
+        reason = str(error) if isinstance(error, ParameterError) else rule
+        raise MethodError(f"{source.label.partition(':')[0]}: {reason}") from error
     return module
 
 
@@ -409,10 +385,7 @@ def write_code(scene: Scene, folder: Path) -> None:
 
 
 def find_word(scene: Scene) -> str:
-    """Return what --method takes for a scene's method of one's own in a folder with its code.
-
-    The name of an installed one; empty for a built-in one.
-    """
+    """Return what --method takes for a scene's method beside its code; empty for a built-in one."""
     source = find_code(scene)
     if source is None:
         return ""
@@ -420,8 +393,47 @@ def find_word(scene: Scene) -> str:
 
 
 def resolve_word(word: str, folder: Path) -> str:
-    """Return a word of --method from the working folder, where it names a file of another folder.
-
-    `folder`: where the file may be.
-    """
+    """Return a word of --method from the working folder, where it names a file of another folder."""
     return str(folder / word) if (folder / word.rpartition(":")[0]).is_file() else word
+
+
+class FolderMethods(NamedTuple):
+    """Names of a folder's methods that are loaded now, and why others are not, in one line each."""
+
+    names: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
+
+
+def load_folder(folder: Path) -> FolderMethods:
+    """Run the files of a folder, in the order of their names, and add their control methods."""
+    if not folder.is_dir():
+        return FolderMethods(refused=(f"{folder} must be a folder.",))
+    names: list[str] = []
+    refused: list[str] = []
+    for path in sorted(folder.glob("*.py")):
+        try:
+            names += _load_file(path, refused)
+        except MethodError as error:
+            refused.append(str(error))
+    return FolderMethods(tuple(names), tuple(refused))
+
+
+def _load_file(path: Path, refused: list[str]) -> list[str]:
+    """Add the methods of a file, and return their names; `refused` grows by those that are none."""
+    source = read_file(path, "")
+    classes = list_classes(run_code(source))
+    if not classes:
+        refused.append(f"{path.name}: the file must have a class derived from OwnMethod.")
+    names: list[str] = []
+    for kind in classes:
+        name = name_method(kind.__name__)
+        label = f"{path.name}:{kind.__name__}"
+        try:
+            if name in list_added():
+                raise MethodError(f"{label}: the method's name {name} must be its own in this folder.")
+            add_class(name, source._replace(label=label, attribute=kind.__name__), kind)
+        except MethodError as error:
+            refused.append(str(error))
+        else:
+            names.append(name)
+    return names

@@ -14,7 +14,7 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import EXTENTS, Parameters, Quantity
-from ..core.control.named_shapes import SHAPES
+from ..core.control.displays import SHAPES
 from .shown_units import to_shown, to_si, unit_of
 
 #: What Blender's whole numbers hold at most.

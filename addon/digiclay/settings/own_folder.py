@@ -8,7 +8,7 @@ from ..compat import bpy
 from ..core.base.errors import one_line
 from ..core.control.methods import remove_method
 from ..core.scene.schema import import_parameters
-from ..plugins.method_folder import FolderMethods, load_folder
+from ..plugins.method_loader import FolderMethods, load_folder
 from ..ui_text import localize
 from .declared import group, title
 from .groups import CONTROL, name_pointer

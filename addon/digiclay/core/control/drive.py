@@ -19,7 +19,7 @@ from ..model.actuator import Actuator
 from ..model.control_interface import Measurement
 from ..model.physics import Cell
 from .methods import ControlParameters
-from .servo import BatchControl, Tracking, declare_again, lock_overloaded
+from .servo import BatchControl, Tracking, declare_again, lock_overloaded, mark_formed
 
 #: Openings at which the speed is tabulated; in between it is interpolated.
 OPENINGS = np.linspace(0.0, 1.0, 129)
@@ -62,10 +62,8 @@ class Drive:
 
     Attributes
     ----------
-    settling_time : float
-        s.
-    dead_band : float
-        m.
+    settling_time, dead_band : float
+        Time constant of the approach to a height, s, and error that is none, m.
     up, down : ndarray (129,) or (129, b)
         Speed of a pin without load at `OPENINGS`, towards either reservoir, growing, m/s.
     lift : float
@@ -97,8 +95,7 @@ class Drive:
 
     def mark_formed(self, target: Floats, rest: float) -> Modes:
         """Return HOLD for cells commanded farther from rest than the dead band, m, REST for the others."""
-        modes: Modes = (np.abs(target - rest) > self.dead_band).view(np.int8)
-        return modes
+        return mark_formed(target, rest, self.dead_band)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Flags, Floats
+from ..base.arrays import Flags, Floats, Modes, any_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
-from .blister import Blister
+from .blister import Blister, BlisterCells, BlisterRule
 from .servo import sum_weighted
 
 #: Least weight of a cell in the ground under the fingertip, N: an untouched blister has a ground, too.
@@ -114,3 +114,30 @@ class OwnGround:
 
 #: Grounds by the value of `VirtualMaster.ground`.
 GROUNDS: dict[str, EdgeGround | OwnGround] = {"edge": EdgeGround(), "cell": OwnGround()}
+
+
+def raise_blister(
+    rule: BlisterRule,
+    ground: EdgeGround | OwnGround,
+    cells: BlisterCells,
+    seen: Measurement,
+    heights: tuple[Any, Any, int | Floats, bool | Flags],
+    mode: Modes,
+) -> Floats:
+    """Return the commanded heights, (m[, b]), m, with a blister in them; modes are set in place.
+
+    `heights` (b,): of the surface around and of the top, m; mode of touched cells; whether frozen cells stay,
+    which a blister that outgrows them else takes along.
+    """
+    edge, top, touched_mode, stays = heights
+    level = ground.find(seen, edge)
+    profile, uneven = ground.find_profile(rule.blister, cells.distance, cells.inside, level, top, seen)
+    frozen = rule.find_frozen(cells, seen, uneven)
+    if any_true(frozen):
+        # What is frozen is never called back.
+        kept = ground.find_kept(seen.target, profile, level, top, uneven)
+        kept |= stays
+        kept &= frozen
+        np.putmask(profile, kept, seen.target)
+    rule.set_modes(mode, cells, seen.force, touched_mode, frozen)
+    return np.where(cells.inside, profile, seen.target)

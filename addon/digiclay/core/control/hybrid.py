@@ -33,7 +33,7 @@ from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import Follower, LeadProfile, LedBlister, Region
 from .methods import ControlParameters
 from .pulp_estimate import PulpEstimate, Reach, find_top, lead_heights
-from .servo import declare_again
+from .servo import declare_again, mark_formed
 from .travel import Heading, update_heading
 from .virtual_master import HEAVIEST, LossRule, Master, Phase, VirtualMaster, VirtualMasterControl
 from .virtual_master import build as build_master
@@ -104,18 +104,14 @@ class OwnRows(NamedTuple):
 
     Attributes
     ----------
-    pulp : slice
-        Relaxation of the pulp over it, and its `tension`, N.
-    coming, later : int
-        Predicted undersides a period and two from now, m.
-    residual : int
-        What the last fit left of the measured underside; 0 where none was felt, m.
+    pulp, tension : slice, int
+        Relaxation of the pulp over it with its tension, N, and that tension.
+    coming, later, residual : int
+        Predicted undersides a period and two from now, m; what the last fit left of the measured one, or 0.
     lead : int
         How far its commanded height is from the one it will be left at, m.
-    stamp : int
-        Period in which its pulp was last observed; 0: never.
-    speeds : slice
-        Asked for, the newest first, m/s.
+    stamp, speeds : int, slice
+        Period in which its pulp was last observed, 0: never; commanded speeds, the newest first, m/s.
     """
 
     pulp: slice
@@ -337,10 +333,7 @@ class HybridControl:
         coasting = Coasting(self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds))
         left = seen.target - lead
         rest, band, lowest, highest = self._limits[left.shape]
-        off = left - rest
-        np.abs(off, off)
-        mode: NDArray[np.int8] = (off > band).view(np.int8)
-        target = left
+        mode, target = mark_formed(left, rest, band), left
         if memory.phase is Phase.IDLE:
             memory = memory._replace(led_radius=0.0)
         else:

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Modes, any_true, count_true
+from ..base.arrays import Floats, Modes, count_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
 from .blister import Blister, BlisterCells, BlisterRule
 from .finger_estimate import STATES, Estimate
-from .ground import EdgeGround
+from .ground import EdgeGround, raise_blister
 from .travel import Heading
 from .virtual_master import Master, Phase
 
@@ -67,30 +67,19 @@ class Follower(NamedTuple):
 
     Attributes
     ----------
-    phase : Phase
-        IDLE or SHAPING.
-    period : int
-        Control periods so far.
-    estimate : Estimate
-        The fingertip.
+    phase, period : Phase, int
+        IDLE or SHAPING; control periods so far.
     top, edge : float
         Heights of the blister's top and of the surface around it, m.
-    heading : Heading
-        Direction of travel.
     trim : float
         Slow correction of the set point, N.
-    felt : float
-        Top when the fingertip was last felt, m.
-    alone : int
-        Control periods since then.
-    losses : int
-        How often the fingertip was lost.
+    felt, alone, losses : float, int, int
+        Top when the fingertip was last felt, m; control periods since then; how often it was lost.
     led_x, led_y, led_radius : float
         Disc within which pins may stand where they will not be left, m; a radius of 0: none does.
-    due : tuple of float
-        Total forces predicted for this and the next periods, N; below 0: none is.
-    doubt : float
-        Mean square by which those of the last periods were off, N².
+    due, doubt : tuple of float, float
+        Total forces predicted for this and the next periods, N, below 0: none is; mean square by which those
+        of the last periods were off, N².
     master : Master
         Memory of Method I while it takes over; IDLE: it does not.
     """
@@ -126,18 +115,12 @@ class Region(NamedTuple):
 
     Attributes
     ----------
-    edge : float
-        Height of the surface ahead, m.
-    raised : bool
-        Whether the blister's top is above it.
-    aim : (float, float, float)
-        Lowest point of the fingertip then, m.
-    speed : float
-        Of the fingertip in the plane, m/s.
-    cells : BlisterCells
-        About the aim.
-    drop : ndarray (m,)
-        How far they may stand from the top; see `LeadProfile.find_drop`, m.
+    edge, raised : float, bool
+        Height of the surface ahead, m, and whether the blister's top is above it.
+    aim, speed : (float, float, float), float
+        Lowest point of the fingertip then, m, and its speed in the plane, m/s.
+    cells, drop : BlisterCells, ndarray (m,)
+        About the aim, and how far they may stand from the top, m; see `LeadProfile.find_drop`.
     """
 
     edge: float
@@ -184,13 +167,5 @@ class LedBlister:
         self, memory: Follower, seen: Measurement, left: Floats, cells: BlisterCells, mode: Modes
     ) -> Floats:
         """Return the heights at which pins are left by the fingertip, m; modes, (m,), are set in place."""
-        top, edge = memory.top, memory.edge
-        heights = self.blister.interpolate(cells.distance, edge, top)
-        frozen = self.rule.find_frozen(cells, seen)
-        if any_true(frozen):
-            # What is frozen is never called back; a blister that outgrows it takes it along.
-            kept = GROUND.find_kept(left, heights, edge, top)
-            kept &= frozen
-            np.putmask(heights, kept, left)
-        self.rule.set_modes(mode, cells, seen.force, FORCE_FOLLOW, frozen)
-        return np.where(cells.inside, heights, left)
+        heights = memory.edge, memory.top, FORCE_FOLLOW, False
+        return raise_blister(self.rule, GROUND, cells, seen._replace(target=left), heights, mode)

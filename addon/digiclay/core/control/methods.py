@@ -54,16 +54,12 @@ class Method:
     digest: str = ""
 
     def import_parameters(self) -> type[ControlParameters]:
-        """Import the class of its parameters, now that a scene needs it."""
+        """Import the class of its parameters."""
         kind: type[ControlParameters] = getattr(self._import(), self.parameters)
         return kind
 
     def build(self, parameters: Any, device: Any) -> Any:
-        """Return its controller for a device.
-
-        `parameters` ControlParameters; `device` DeviceInfo. Raises ParameterError when the parameters do not
-        go together with the device.
-        """
+        """Return its controller for a `DeviceInfo`, or raise a ParameterError that says what does not fit."""
         return self._import().build(parameters, device)
 
     def describe(self) -> str:
@@ -87,8 +83,8 @@ METHODS: dict[str, Method] = {
     "plastic": Method("control.behaviors", "Plastic"),
     "viscous": Method("control.behaviors", "Viscous", recovers=True, by_set=True),
     "push_pull": Method("control.push_pull", "PushPull", by_set=True),
-    "force_display": Method("control.force_display", "ForceDisplay", recovers=True),
-    "shape_display": Method("control.shape_display", "ShapeDisplay"),
+    "force_display": Method("control.displays", "ForceDisplay", recovers=True),
+    "shape_display": Method("control.displays", "ShapeDisplay"),
     "hybrid": Method("control.hybrid", "Hybrid", {}),
 }
 
@@ -99,17 +95,14 @@ HINT = "A method of your own must be loaded: by --method path/to/mine.py:Mine, i
 
 
 def add_method(name: str, method: Method) -> None:
-    """Make a method known to this process, or exchange it for another one.
-
-    `name`: as scene files have it. Raises ParameterError when a built-in method has this name.
-    """
+    """Add a method to this process or exchange it; ParameterError when a built-in one has its name."""
     if name in METHODS:
         raise ParameterError("control", "method", "must not have the name of a built-in method", repr(name))
     _ADDED[name] = method
 
 
 def remove_method(name: str) -> None:
-    """Make an added method unknown again."""
+    """Remove an added method."""
     _ADDED.pop(name, None)
 
 
@@ -124,17 +117,12 @@ def list_methods() -> dict[str, Method]:
 
 
 def find_method(name: Any, field: str = "control.method") -> Method:
-    """Return a method by its name.
-
-    `name`: as a scene file has it; `field`: what messages call it. Raises ParameterError when there is none,
-    with the remedy.
-    """
-    found = METHODS.get(name) or _ADDED.get(name) if isinstance(name, str) else None
-    if found is not None:
-        return found
-    known = list_methods()
+    """Return a method by its name, or raise a ParameterError about the field, with the remedy."""
+    methods = list_methods()
+    if isinstance(name, str) and name in methods:
+        return methods[name]
     owner, _, last = field.rpartition(".")
-    close = find_nearest_name(name, list(known), alike=0.7) if isinstance(name, str) else ""
+    close = find_nearest_name(name, list(methods), alike=0.7) if isinstance(name, str) else ""
     hint = f"Did you mean {close}?" if close else HINT
-    rule = f"must be one of {', '.join(known)}"
+    rule = f"must be one of {', '.join(methods)}"
     raise ParameterError(owner or last, last if owner else "", rule, show_value(name), hint)

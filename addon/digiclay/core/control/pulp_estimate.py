@@ -24,17 +24,9 @@ EXPECTED, LEAST = 0.2, 10e-3
 class Span(NamedTuple):
     """Change over a time, for a tension that goes linearly from T_0 to T_1.
 
-    ``z_1 = decay z_0 + early T_0 + late T_1``; of T_1 the share ``Σ ĉ_i late_i`` is lost to relaxation.
-
-    Attributes
-    ----------
-    kept : ndarray (k + 1, k + 1)
-        Of filters and tension before: the part of the filters after that T_1 has no share in, and the tension
-        lost of it, over the share of T_1 that is not lost.
-    late : ndarray (k + 1, 1)
-        What T_1 adds to the filters, and to the tension.
-    held : float
-        Share of T_1 that is not lost.
+    ``z_1 = decay z_0 + early T_0 + late T_1``; of T_1 the share ``Σ ĉ_i late_i`` is lost to relaxation,
+    `held` is not. `late` (k + 1, 1): what T_1 adds to filters and tension. `kept` (k + 1, k + 1), of filters
+    and tension before: the filters after without T_1's share, and the tension lost of it, over `held`.
     """
 
     kept: Floats
@@ -153,10 +145,8 @@ class Reach(NamedTuple):
 
     Attributes
     ----------
-    edge : float
-        Height of the surface around, m.
-    raised : bool
-        Whether the blister's top is above it.
+    edge, raised : float, bool
+        Height of the surface around, m, and whether the blister's top is above it.
     part : ndarray (m,)
         Profile of the blister, 1 at its top.
     drop : ndarray (m,)

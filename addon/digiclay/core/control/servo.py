@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Cells, Constants, Flags, Floats, any_true
+from ..base.arrays import Cells, Constants, Flags, Floats, Modes, any_true
 from ..base.quantity import quantity
 from .methods import ControlParameters
 
@@ -59,6 +59,15 @@ def declare_again(owner: type[ControlParameters], name: str, default: float | No
     """Declare a parameter as another class does, with a default of its own or the same one."""
     field = next(field for field in dataclasses.fields(owner) if field.name == name)
     return dataclasses.field(default=field.default if default is None else default, metadata=field.metadata)
+
+
+def mark_formed(target: Floats, rest: float | Floats, band: float | Floats) -> Modes:
+    """Return HOLD for cells commanded farther from rest than a dead band, m, REST for the others."""
+    off = target - rest
+    np.abs(off, off)
+    # True and False are the codes of these modes.
+    modes: Modes = (off > band).view(np.int8)
+    return modes
 
 
 def lock_overloaded(command: Floats, force: Floats, limit: float | Floats) -> Floats:

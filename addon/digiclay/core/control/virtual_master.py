@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Constants, Floats, Modes, any_true, count_true
+from ..base.arrays import Constants, Floats, Modes, count_true
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
@@ -30,8 +30,8 @@ from ..model.layout import RELATIVE_TOLERANCE, Disc
 from ..model.physics import GAUSS, Cell
 from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor, suppress_noise
-from .ground import GROUNDS, EdgeGround, OwnGround
-from .servo import BatchControl, Tracking, lock_overloaded, sum_weighted
+from .ground import GROUNDS, EdgeGround, OwnGround, raise_blister
+from .servo import BatchControl, Tracking, lock_overloaded, mark_formed, sum_weighted
 from .travel import Heading, measure_excess, update_heading
 
 #: Share of the total force that the cell in the middle of the fingertip carries while shaping, at least: 0.23
@@ -57,15 +57,7 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class LossRule:
-    """Rule by which a fingertip that is no longer felt is given up.
-
-    Attributes
-    ----------
-    period : float
-        Control period, s.
-    time : float
-        Time without force until a loss, s.
-    """
+    """Rule by which a fingertip that is not felt for a time, s, of control periods, s, is given up."""
 
     period: float
     time: float
@@ -89,20 +81,13 @@ class Master(NamedTuple):
 
     Attributes
     ----------
-    x, y, height : float
-        Where the master is, m.
-    opening : float
-        Of its own valve.
-    reference : float
-        Surface height at first touch, from which the virtual spring is pressed down, m.
-    edge : float
-        Height of the surface around the blister, m.
-    heading : Heading
-        Direction of travel.
-    felt : float
-        Its height when the fingertip was last felt, m.
-    alone : int
-        Control periods since the fingertip was last felt.
+    x, y, height, opening : float
+        Where the master is, m, and the opening of its own valve.
+    reference, edge : float
+        Surface height at first touch, from which the virtual spring is pressed down, and that around the
+        blister, m.
+    felt, alone : float, int
+        Its height when the fingertip was last felt, m, and control periods since then.
     losses : int
         How often the fingertip was lost while shaping.
     """
@@ -145,20 +130,13 @@ class MasterCell:
     Attributes
     ----------
     openings : tuple of (float, float)
-        The opening at the Gauss points of a control period, then at its end, as
-        ``a K + b K_com``.
-    flow : Flow
-        The law of valve and conduit.
-    laminar : bool
-        No unloaded valve is turbulent.
-    up, down : float
-        Pressures of the reservoirs over the area of a pin, Pa/m².
-    area : float
-        Of a pin, m².
-    stroke : float
-        Upper end stop, m.
-    period : float
-        Control period, s.
+        At the Gauss points of a control period, then at its end, as ``a K + b K_com``.
+    flow, laminar : Flow, bool
+        The law of valve and conduit; whether no unloaded valve is turbulent.
+    up, down, area : float
+        Pressures of the reservoirs over the area of a pin, Pa/m²; that area, m².
+    stroke, period : float
+        Upper end stop, m; control period, s.
     """
 
     openings: tuple[tuple[float, float], ...]
@@ -248,16 +226,10 @@ class VirtualMasterControl(BatchControl):
 
     Attributes
     ----------
-    actuator : Actuator
-        The cells' cylinders.
     model : MasterCell
         The master's own cylinder and valve.
-    period : float
-        Control period, s.
-    lift : float
-        Force the high reservoir can lift, N.
-    floor : float
-        Force from which on the reading of a cell is no noise, N.
+    lift, floor : float
+        Force the high reservoir can lift, and from which on the reading of a cell is no noise, N.
     ground : EdgeGround or OwnGround
         Surface from which the blister rises.
     """
@@ -361,10 +333,9 @@ class VirtualMasterControl(BatchControl):
         return master.with_edge(min(max(level / count, 0.0), self.actuator.stroke)) if count else master
 
     def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
-        """Return what the blister is made of.
+        """Return heights around a master and of itself, m, mode of felt cells, and whether frozen ones rise.
 
-        Returns heights of the surface around a master and of itself, m; mode of felt cells; whether it has
-        risen farther in search of the fingertip than what is frozen goes along.
+        These do not once it has risen too far in search of the fingertip.
         """
         kind = FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING
         beyond = master.alone > 0 and master.height - master.felt > CARRIED * self.blister.radius
@@ -404,11 +375,7 @@ class VirtualMasterControl(BatchControl):
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
         target = seen.target
-        rest, band = self._limits[target.shape]
-        off = target - rest
-        np.abs(off, off)
-        # Outside the blister formed cells hold, the others rest: True and False are the codes of these modes.
-        mode: Modes = (off > band).view(np.int8)
+        mode = mark_formed(target, *self._limits[target.shape])
         if self.is_active(memory):
             memory, target = self._create_blister(memory, seen, mode)
         command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
@@ -420,22 +387,7 @@ class VirtualMasterControl(BatchControl):
         facing = self._rule.find_edge(cells)
         level = sum_weighted(seen.height, facing).tolist()
         memory = self.set_edge(memory, level, count_true(facing))
-        edge, top, kind, beyond = self.get_heights(memory)
-        ground = self.ground.find(seen, edge)
-        profile, uneven = self.ground.find_profile(
-            self.blister, cells.distance, cells.inside, ground, top, seen
-        )
-        frozen = self._rule.find_frozen(cells, seen, uneven)
-        if any_true(frozen):
-            # What is frozen is never called back; a blister that outgrows it takes it along.
-            kept = self.ground.find_kept(seen.target, profile, ground, top, uneven)
-            kept |= beyond
-            kept &= frozen
-            np.putmask(profile, kept, seen.target)
-        target = seen.target.copy()
-        np.putmask(target, cells.inside, profile)
-        self._rule.set_modes(mode, cells, seen.force, kind, frozen)
-        return memory, target
+        return memory, raise_blister(self._rule, self.ground, cells, seen, self.get_heights(memory), mode)
 
     @cached_property
     def _noisy(self) -> bool:

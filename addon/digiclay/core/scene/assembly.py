@@ -193,7 +193,7 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
     if scene.control:
         controller = find_method(scene.method).build(scene.control, device)
     if scene.shape and not (controller and controller.name == "shape_display"):
-        from ..control.shape_display import make_handover
+        from ..control.displays import make_handover
 
         recovers = find_method(scene.method).recovers
         controller = make_handover(scene.shape, device, controller, recovers=recovers)

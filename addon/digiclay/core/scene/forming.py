@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
-from ..control.shape_display import Handover, ShapeDisplayControl
+from ..control.displays import Handover, ShapeDisplayControl
 from ..engine.system import System
 from ..model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from ..model.layout import Grid

@@ -1,9 +1,14 @@
-"""Shape display: given heights for all cells, three methods of refresh, handover to a control method."""
+"""Displays: a commanded field of forces under the fingertip; heights for all cells, refreshed in three ways.
+
+After a display of heights a control method takes over (`Handover`).
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,13 +17,164 @@ from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
+from ..files.formats import map_array
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.layout import Disc, Grid
 from ..shapes.request import Shape
-from .device_info import DeviceInfo
-from .drive import Drive, DriveParameters, make_drive
-from .named_shapes import FILE, check_shape, evaluate_shape, read_values
+from .device_info import DeviceInfo, check_floor
+from .drive import (
+    CellwiseControl,
+    Drive,
+    DriveParameters,
+    TouchParameters,
+    check_damping,
+    make_drive,
+    raise_felt_force,
+)  # fmt: skip
+from .servo import take_cells
+
+#: How the name of a file of values ends.
+FILE = ".npy"
+
+
+#: Values from -1 to 1 over the square bed -1 to 1, in x and y.
+SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
+    "dome": lambda x, y: np.maximum(1.0 - x * x - y * y, 0.0),
+    "saddle": lambda x, y: x * x - y * y,
+    "wave": lambda x, y: np.sin(2.0 * math.pi * x),
+    "ripple": lambda x, y: np.cos(3.0 * math.pi * np.hypot(x, y)),
+    "crater": lambda x, y: _crater(np.hypot(x, y)),
+    "pyramid": lambda x, y: 1.0 - np.maximum(np.abs(x), np.abs(y)),
+    "ramp": lambda x, y: x,
+    "flat": lambda x, y: 0.0 * x,
+}
+
+
+def _crater(r: Floats) -> Floats:
+    """Return a ring wall, 1 high at radius 0.6, around a hollow of depth 0.6."""
+    ring: Floats = np.exp(-(((r - 0.6) / 0.18) ** 2)) - 0.6 * np.exp(-((r / 0.3) ** 2))
+    return ring
+
+
+def check_shape(owner: str, field: str, shape: str) -> None:
+    """Refuse what is neither a shape's name nor a file's; `owner`, `field`: what the message calls it."""
+    if shape not in SHAPES and not shape.endswith(FILE):
+        rule = f"must be one of {', '.join(SHAPES)}, or a file {FILE}"
+        raise ParameterError(owner, field, rule, repr(shape))
+
+
+def evaluate_shape(shape: str, grid: Grid) -> Floats:
+    """Return the values of a named shape for all cells of a bed, (n,), whose extent is the shape's square."""
+    # A bed of a single row or column has no extent.
+    middle_x, middle_y = (values / (float(np.abs(values).max()) or 1.0) for values in (grid.x, grid.y))
+    return SHAPES[shape](middle_x, middle_y)
+
+
+def read_values(field: str, path: str, grid: Grid, low: float, high: float, unit: str) -> Floats:
+    """Return the values for all cells, (n,), from `low` to `high`, of a file of numpy's, (rows, columns).
+
+    Raises ParameterError about the key `field` of the section ``control`` when it cannot be read, or does not
+    fit the bed, whose first row lies at the lowest y. `path`: relative to where the command runs.
+    """
+    plan = grid.layout
+    try:
+        read = map_array(Path(path))
+        shape = read.shape
+        # Only what fits the bed is read.
+        values = np.asarray(read if shape == (plan.rows, plan.columns) else 0.0, dtype=np.float64)
+    except OSError as error:
+        rule, why = "must be a file that can be read", error.strerror or "not an array"
+        raise ParameterError("control", field, rule, f"{path}: {why}") from None
+    except (ValueError, TypeError):
+        rule = "must be a file that holds one array of numbers"
+        raise ParameterError("control", field, rule, path) from None
+    if values.shape != (plan.rows, plan.columns):
+        rule = f"must hold an array of the bed's {plan.rows} x {plan.columns} cells"
+        shown = " x ".join(map(str, shape)) or "a single number"
+        raise ParameterError("control", field, rule, f"{path}: {shown}")
+    wrong = values[~((values >= low) & (values <= high))]
+    if wrong.size:
+        rule = f"must hold values from {low:g} to {high:g} {unit}"
+        raise ParameterError("control", field, rule, f"{path}: {wrong[0]:g} {unit}")
+    return values.ravel()
+
+
+@dataclass(frozen=True)
+class ForceDisplay(TouchParameters):
+    """Field of forces, and the motion of the cells."""
+
+    field: str = quantity("wave", "shape of the field: its name, or a file .npy of forces, N")
+    force: float = quantity(0.05, "mean force of a cell", unit="N", symbol="F_m", above=0.0)
+    contrast: float = quantity(
+        0.5, "variation of a named field, as a share of the mean", symbol="κ", at_least=0.0, at_most=1.0
+    )
+    damping: float = quantity(
+        5.0, "force deviation over speed of its correction", unit="N s/m", symbol="c", above=0.0
+    )
+    rise: float = quantity(
+        5e-3, "largest height above rest of a following pin", unit="m", symbol="h_rise", at_least=0.0
+    )
+    release_time: float = quantity(
+        50e-3, "time without force until a cell is released", unit="s", symbol="t_r", at_least=0.0
+    )
+
+    def check(self) -> None:
+        """The field has a name, or is a file."""
+        check_shape("ForceDisplay", "field", self.field)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceDisplayControl(CellwiseControl):
+    """Controller of the force display for a bed.
+
+    A cell that feels the fingertip: ``c dH/dt = F_com - F``, up to `rise` above rest. Let go: back to rest.
+    A cell remembers for how many periods it has felt nothing. `field`: F_com of all cells, (n[, b]), N.
+    """
+
+    parameters: ForceDisplay
+    period: float
+    field: Floats
+
+    name = "force_display"
+    rows = 1
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Control the force of touched cells and the height of the others; see `Controller`."""
+        gains, rest = self.parameters, self.actuator.rest_height
+        asked = take_cells(self.field, seen.cells)
+        pressed = seen.force >= gains.felt_force
+        alone = np.where(pressed, 0.0, seen.own[0] + 1.0)
+        kept = (seen.mode == Mode.FORCE_FOLLOW) & (alone * self.period <= gains.release_time)
+        felt = pressed | kept
+        seen.own[0] = np.where(felt, alone, 0.0)
+        limit = np.minimum(rest + gains.rise, self.actuator.stroke)
+        pressing = np.minimum(
+            (asked - seen.force) / gains.damping, (limit - seen.height) / self.drive.settling_time
+        )
+        speed = np.where(felt, pressing, self.drive.approach(rest - seen.height))
+        mode = np.where(felt, np.int8(Mode.FORCE_FOLLOW), np.int8(Mode.REST))
+        target = np.full(seen.height.shape, rest)
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+
+
+def make_force_display(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
+    """Put force display together; ParameterError when pins cannot press or feel the field."""
+    check_damping(parameters.damping, device.cell, device.period)
+    check_floor(parameters.force, "force", parameters.force, device.force_floor)
+    parameters = raise_felt_force(device.force_floor, parameters)
+    if parameters.field.endswith(FILE):
+        field = read_values("field", parameters.field, device.grid, parameters.felt_force, device.lift, "N")
+    else:
+        field = parameters.force * (1.0 + parameters.contrast * evaluate_shape(parameters.field, device.grid))
+        if field.max() >= device.lift:
+            rule = f"must keep the field below what a pin can press, {device.lift:.3g} N"
+            raise ParameterError("control", "force", rule, f"{field.max():.3g} N at its largest")
+        if field.min() < parameters.felt_force:
+            rule = f"must keep the field at or above control.felt_force, {parameters.felt_force:g} N"
+            raise ParameterError("control", "contrast", rule, f"{field.min():.3g} N at its smallest")
+    drive = make_drive(parameters, device.cell, device.period)
+    return ForceDisplayControl(parameters, device.cell.actuator, drive, device.period, field)
 
 
 class Move(NamedTuple):
@@ -139,7 +295,7 @@ class ShapeDisplayControl:
         return memory, target
 
 
-def build(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
+def make_shape_display(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
     """Put shape display together, of a scene's shape first; ParameterError when it leaves the stroke."""
     actuator, grid = device.cell.actuator, device.grid
     if device.heights is not None:
@@ -152,16 +308,19 @@ def build(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
         if low < 0.0 or high > actuator.stroke:
             rule = f"must keep the shape between 0 and the stroke, {actuator.stroke:g} m"
             raise ParameterError("control", "amplitude", rule, f"heights from {low:.6g} m to {high:.6g} m")
-    return ShapeDisplayControl(
-        parameters,
-        grid,
-        actuator,
-        make_drive(parameters, device.cell, device.period),
-        heights,
-        parameters.moves(grid.layout.rows),
-        math.ceil(parameters.patience / device.period),
-        (0.0, 0.0, float(np.hypot(grid.x, grid.y).max())),
-    )
+    drive, moves = make_drive(parameters, device.cell, device.period), parameters.moves(grid.layout.rows)
+    patience = math.ceil(parameters.patience / device.period)
+    whole = 0.0, 0.0, float(np.hypot(grid.x, grid.y).max())
+    return ShapeDisplayControl(parameters, grid, actuator, drive, heights, moves, patience, whole)
+
+
+def build(
+    parameters: ForceDisplay | ShapeDisplay, device: DeviceInfo
+) -> ForceDisplayControl | ShapeDisplayControl:
+    """Put the display with these parameters together for a device."""
+    if isinstance(parameters, ForceDisplay):
+        return make_force_display(parameters, device)
+    return make_shape_display(parameters, device)
 
 
 class Handed(NamedTuple):
@@ -247,4 +406,4 @@ def make_handover(shape: Shape, device: DeviceInfo, method: Controller | None, *
         refresh=shape.refresh, surfaces=shape.surfaces, patience=shape.patience, settling_time=settling
     )
     raised = device.heights - device.cell.actuator.rest_height if recovers else None
-    return Handover(build(parameters, device), method, raised)
+    return Handover(make_shape_display(parameters, device), method, raised)
