@@ -46,6 +46,14 @@ def ordering(orders: str) -> str:
     return bad(f"def command(self, memory, cells, device):\n    return memory, {orders}")
 
 
+def keeping(first: str, later: str) -> str:
+    """Return the code of a method with a memory at first and later."""
+    return bad(
+        f"def begin(self, device):\n    return {first}\n"
+        f"def command(self, memory, cells, device):\n    return {later}, Orders()"
+    )
+
+
 def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_method(here)
     for word in ("soft_pad", "pad.py:SoftPad"):
@@ -161,29 +169,13 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(
             bad("def locate(self, memory, c, device):\n    return memory, (0, 0)\ncommand = lambda *_: None"),
             "locate must return the disc of the shape (3,)",
         ),
+        (keeping("0.0", "cells.force"), "must keep the kinds of its memory, here float (got ndarray)."),
+        (keeping("0.0", "float('nan')"), "command must return a memory without NaN."),
+        (keeping("(0.0, 1)", "(float('nan'), 1)"), "command must return a memory without NaN."),
+        (keeping("(0.0, 1)", "(0.0, 1.5)"), "must keep the kinds of its memory, here int (got float)."),
+        (keeping("True", "1"), "command must keep the kinds of its memory, here bool (got int)."),
         (
-            bad("def begin(self, device):\n    return 0.0\ndef command(self, memory, cells, device):\n"
-                "    return cells.force, Orders()"),
-            "command must keep the kinds of its memory, here float (got ndarray).",
-        ),
-        (
-            bad("def begin(self, device):\n    return 0.0\ndef command(self, memory, cells, device):\n"
-                "    return float('nan'), Orders()"),
-            "command must return a memory without NaN.",
-        ),
-        (
-            bad("def begin(self, device):\n    return (0.0, 1)\ndef command(self, memory, cells, device):\n"
-                "    return (float('nan'), 1), Orders()"),
-            "command must return a memory without NaN.",
-        ),
-        (
-            bad("def begin(self, device):\n    return (0.0, 1)\ndef command(self, memory, cells, device):\n"
-                "    return (0.0, 1.5), Orders()"),
-            "command must keep the kinds of its memory, here int (got float).",
-        ),
-        (
-            bad("def begin(self, device):\n    return np.zeros(3)\ndef command(self, memory, c, device):\n"
-                "    return np.zeros((3, 3)), Orders()"),
+            keeping("np.zeros(3)", "np.zeros((3, 3))"),
             "command must keep the memory's array of 1 dimensions and float64 (got 2 and float64).",
         ),
         (
@@ -210,13 +202,26 @@ SLOW = bad(
 )
 
 
+def run_quickly(*more: str) -> int:
+    """Return what the command says to bad.py with a control period of 0.2 ms."""
+    period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
+    return main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet", *more])
+
+
 def test_a_method_that_is_too_slow_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_method(here, SLOW, "bad.py")
-    period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
-    assert main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet"]) == 2
+    assert run_quickly() == 2
     said = capsys.readouterr().err
     assert "bad.py:Bad: command must take at most 20 control periods of processor time a call (got 2" in said
     assert [path.name for path in here.iterdir()] == ["bad.py"]
+
+
+def test_one_slow_call_is_no_slow_method(here: Path) -> None:
+    once = SLOW.replace("while", "while memory == 0 and").replace("return memory", "return 1")
+    write_method(
+        here, once.replace("def command", "begin = lambda self, device: 0\n    def command"), "bad.py"
+    )
+    assert run_quickly("--set", "simulation.duration=0.008", "--no-errors", "--out", "r") == 0
 
 
 @pytest.mark.parametrize(
@@ -225,6 +230,8 @@ def test_a_method_that_is_too_slow_is_refused(here: Path, capsys: pytest.Capture
         ("seen.target, seen.mode, seen.height * 0 + 1.5", "must return commands from -1 to 1 (got 1.5)."),
         ("seen.target, seen.mode, seen.height * 0 - 1.5", "must return commands from -1 to 1 (got 1.5)."),
         ("seen.target, seen.mode + 9, seen.height * 0", "must return mode as codes of Mode, from 0 to 7"),
+        ("seen.target, None, seen.height * 0", "must return mode of the shape ("),
+        ("None, seen.mode, seen.height * 0", "must return target of the shape ("),
         ("seen.height.sort() or 3", "sort array is read-only"),
         ("seen.target, seen.height", "must return three results, target, mode and command (got 2 results)"),
         (
@@ -252,16 +259,6 @@ def test_the_pace_is_the_mean_over_twenty_calls() -> None:
     for _ in range(2):
         assert [pace.add(0.5) for _ in range(19)] == [None] * 19
         assert pace.add(10.5) == 1.0
-
-
-def test_one_slow_call_is_no_slow_method(here: Path) -> None:
-    text = SLOW.replace("while", "while memory == 0 and").replace("return memory", "return 1")
-    write_method(
-        here, text.replace("def command", "begin = lambda self, device: 0\n    def command"), "bad.py"
-    )
-    period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
-    duration = ["--set", "simulation.duration=0.008", "--quiet", "--no-errors", "--out", "r"]
-    assert main(["run", "tap", "--method", "bad.py:Bad", *period, *duration]) == 0
 
 
 def test_two_methods_of_one_name_are_refused(here: Path) -> None:

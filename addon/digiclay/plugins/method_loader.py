@@ -40,27 +40,19 @@ LARGEST = 1_000_000
 
 
 class MethodSource(NamedTuple):
-    """Origin of a method's code, and the code: all that another process needs to have it too.
-
-    Attributes
-    ----------
-    label, file : str
-        For messages, ``mine.py:Mine`` or the name of an installed method; as tracebacks have it.
-    attribute, text : str
-        Name of the class; the code, empty for that of an installed package, which is imported.
-    package, module : str
-        Name and version of the installed package, and what to import; empty for a file.
-    digest : str
-        SHA-256 of the code: methods of one digest are the same.
-    """
+    """Origin of a method's code, and the code: all that another process needs to have it too."""
 
     label: str
     file: str
+    """For messages, ``mine.py:Mine`` or the name of an installed method; as tracebacks have it."""
     attribute: str
     text: str
+    """Name of the class; the code, empty for that of an installed package, which is imported."""
     package: str
     module: str
+    """Name and version of the installed package, and what to import; empty for a file."""
     digest: str
+    """SHA-256 of the code: methods of one digest are the same."""
 
 
 def is_file_word(word: str) -> bool:

@@ -148,11 +148,6 @@ class ViscousControl:
     ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbors exchange,
     then every cell relaxes under its force, exactly. The exchange keeps Σ u, so that the volume of a
     dent decays with τ_r whatever D is.
-
-    Attributes
-    ----------
-    margin : float
-        How far beyond the displaced cells cells take part, m.
     """
 
     parameters: Viscous
@@ -161,6 +156,7 @@ class ViscousControl:
     exchange: Exchange
     period: float
     margin: float
+    """How far beyond the displaced cells cells take part, m."""
 
     name = "viscous"
     rows = 0

@@ -86,20 +86,14 @@ class BlisterCells(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BlisterRule:
-    """Rule that divides the cells of a blister into those inside, on the edge, touched and frozen.
-
-    Attributes
-    ----------
-    behind : float or ndarray (b,)
-        Cosine below which a cell lies behind the fingertip.
-    release, felt : float or ndarray (b,)
-        Forces that release a frozen cell, and above which a cell is touched, N.
-    """
+    """Rule that divides the cells of a blister into those inside, on the edge, touched and frozen."""
 
     blister: Blister
     behind: Any
+    """(b,): Cosine below which a cell lies behind the fingertip."""
     release: Any
     felt: Any
+    """(b,): Forces that release a frozen cell, and above which a cell is touched, N."""
 
     def divide(self, pose: tuple[Any, Any, Any, Any], basis: Floats) -> BlisterCells:
         """Return the cells about the middle of a blister: x, y, m, and its direction, a unit vector, (b,)."""

@@ -139,24 +139,18 @@ class CellStates(Tracking):
 
 @dataclass(frozen=True)
 class CellStatesControl:
-    """Controller of Method II for a bed.
-
-    Attributes
-    ----------
-    blister : Blister
-        Its radii count from the nearest cell under the fingertip.
-    lift, floor : float
-        Force the high reservoir can lift, and from which on the reading of a cell is no noise, N.
-    period : float
-        Control period, s.
-    """
+    """Controller of Method II for a bed."""
 
     parameters: CellStates
     blister: Blister
+    """Its radii count from the nearest cell under the fingertip."""
     actuator: Actuator
     lift: float
+    """Force the high reservoir can lift, N."""
     period: float
+    """Control period, s."""
     floor: float = 0.0
+    """Force from which on the reading of a cell is no noise, N."""
 
     name = "cell_states"
     #: A cell remembers how many periods it has been critical.

@@ -22,30 +22,21 @@ from .blister import Blister
 
 @dataclass(frozen=True, eq=False)
 class DeviceInfo:
-    """The device, as its maker would describe it to a controller.
-
-    Attributes
-    ----------
-    cell : Cell
-        The cells' physics.
-    period, dead_time : float
-        Control period, and dead time of the valves' commands, s.
-    blister : Blister or None
-        For the methods that form one.
-    heights : ndarray (n,) or None
-        The shape from outside that is to be displayed, m.
-    force_floor, height_floor : float
-        Force from which on the reading of a cell is no noise, N; how far that of a height may be off, m.
-    """
+    """The device, as its maker would describe it to a controller."""
 
     grid: Grid
     cell: Cell
+    """The cells' physics."""
     period: float
+    """Control period, s."""
     blister: Blister | None = None
     heights: Floats | None = None
+    """For the methods that form one; (n,): the shape from outside that is to be displayed, m."""
     force_floor: float = 0.0
     height_floor: float = 0.0
+    """Force from which on the reading of a cell is no noise, N; how far that of a height may be off, m."""
     dead_time: float = 0.0
+    """Of the valves' commands, s."""
 
     @property
     def lift(self) -> float:

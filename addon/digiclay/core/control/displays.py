@@ -237,15 +237,6 @@ class ShapeDisplayControl:
 
     A move is over when its cells are within the dead band of their heights, or the patience is over.
     While there are moves all cells take part; afterwards those that stand at their heights are let go.
-
-    Attributes
-    ----------
-    heights : ndarray (n,)
-        Of the shape, m.
-    patience : int
-        Control periods.
-    whole : Disc
-        That holds the bed, m.
     """
 
     parameters: ShapeDisplay
@@ -253,9 +244,12 @@ class ShapeDisplayControl:
     actuator: Actuator
     drive: Drive
     heights: Floats
+    """(n,): Of the shape, m."""
     moves: tuple[Move, ...]
     patience: int
+    """Control periods."""
     whole: Disc
+    """That holds the bed, m."""
 
     name = "shape_display"
     rows = 0
@@ -337,18 +331,13 @@ class Handed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Handover:
-    """Display, then control method; without a method the shape stays.
-
-    Attributes
-    ----------
-    raised : ndarray (n,) or None
-        Heights of the shape above the bed at rest, m, for a method whose cells go back to rest: it
-        sees the bed without them, so that the shape is what its cells go back to.
-    """
+    """Display, then control method; without a method the shape stays."""
 
     display: ShapeDisplayControl
     method: Controller | None
     raised: Floats | None
+    """(n,): Heights of the shape above the bed at rest, m, for a method whose cells go back to rest: it sees
+    the bed without them, so that the shape is what its cells go back to."""
 
     @property
     def name(self) -> str:

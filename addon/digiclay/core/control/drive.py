@@ -58,23 +58,17 @@ def raise_felt_force(floor: float, parameters: Touch) -> Touch:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Conversion of pin speeds to valve commands.
-
-    Attributes
-    ----------
-    settling_time, dead_band : float
-        Time constant of the approach to a height, s, and error that is none, m.
-    up, down : ndarray (129,) or (129, b)
-        Speed of a pin without load at `OPENINGS`, towards either reservoir, growing, m/s.
-    lift : float
-        Force the high reservoir can lift, N.
-    """
+    """Conversion of pin speeds to valve commands."""
 
     settling_time: float
     dead_band: float
+    """Time constant of the approach to a height, s, and error that is none, m."""
     up: Floats
     down: Floats
+    """(129,) or (129, b): Speed of a pin without load at `OPENINGS`, towards either reservoir, growing,
+    m/s."""
     lift: float
+    """Force the high reservoir can lift, N."""
 
     def command(self, speed: Floats, force: Floats) -> Floats:
         """Return valve commands for speeds, m/s, under forces, N; an overloaded pin is locked."""

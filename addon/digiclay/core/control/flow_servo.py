@@ -26,35 +26,24 @@ STILL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class FlowServo:
-    """Servo of a device.
-
-    Attributes
-    ----------
-    ratios, openings : ndarray (257,)
-        Openings from -1 to 1, and the speed of a pin without load at them, as a share of the largest.
-    fall, rise : float
-        Largest speeds without load, m/s, both positive.
-    pull, lift : float
-        Forces of the reservoirs on a pin, N, both positive.
-    ahead : float
-        Time until the heights aimed at, s.
-    left : tuple of float (q,)
-        How long earlier commands still act, s, the newest first.
-    exact : bool
-        Whether the flow is proportional to the pressure drop, so that a load scales all speeds alike.
-    """
+    """Servo of a device."""
 
     cell: Cell
     ratios: Floats
     openings: Floats
+    """(257,): Openings from -1 to 1, and the speed of a pin without load at them, as a share of the
+    largest."""
     fall: float
     rise: float
     pull: float
     lift: float
+    """Largest speeds without load, m/s, and forces of the reservoirs on a pin, N, all positive."""
     ahead: float
     left: tuple[float, ...]
+    """Time until the heights aimed at, s; (q,): how long earlier commands still act, s, the newest first."""
     dead_band: float
     exact: bool
+    """Whether the flow is proportional to the pressure drop, so that a load scales all speeds alike."""
 
     @property
     def rows(self) -> int:

@@ -100,28 +100,20 @@ OWN_ROWS = 6
 
 
 class OwnRows(NamedTuple):
-    """Numbers of a cell's state rows.
-
-    Attributes
-    ----------
-    pulp, tension : slice, int
-        Relaxation of the pulp over it with its tension, N, and that tension.
-    coming, later, residual : int
-        Predicted undersides a period and two from now, m; what the last fit left of the measured one, or 0.
-    lead : int
-        How far its commanded height is from the one it will be left at, m.
-    stamp, speeds : int, slice
-        Period in which its pulp was last observed, 0: never; commanded speeds, the newest first, m/s.
-    """
+    """Numbers of a cell's state rows."""
 
     pulp: slice
     tension: int
+    """Relaxation of the pulp over it with its tension, N, and that tension."""
     coming: int
     later: int
     residual: int
+    """Predicted undersides a period and two from now, m; what the last fit left of the measured one, or 0."""
     lead: int
+    """How far its commanded height is from the one it will be left at, m."""
     stamp: int
     speeds: slice
+    """Period in which its pulp was last observed, 0: never; commanded speeds, the newest first, m/s."""
 
 
 def number_rows(filters: int) -> OwnRows:
@@ -153,17 +145,7 @@ class Coasting(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HybridControl:
-    """Controller of Method III for a bed.
-
-    Attributes
-    ----------
-    felt, noise : float
-        Force above which a cell is touched, and standard deviation of forces, N.
-    contact_radius : float
-        Within which the fingertip may touch, m.
-    substitute : VirtualMasterControl
-        Method I, for a fingertip that the model does not predict.
-    """
+    """Controller of Method III for a bed."""
 
     parameters: Hybrid
     blister: Blister
@@ -174,8 +156,11 @@ class HybridControl:
     servo: FlowServo
     felt: float
     noise: float
+    """Force above which a cell is touched, and standard deviation of forces, N."""
     contact_radius: float
+    """Within which the fingertip may touch, m."""
     substitute: VirtualMasterControl
+    """Method I, for a fingertip that the model does not predict."""
 
     name = "hybrid"
 

@@ -26,22 +26,15 @@ STEEP = 1e9
 
 @dataclass(frozen=True)
 class LeadProfile:
-    """Slopes of the heights around the fingertip.
-
-    Attributes
-    ----------
-    level : float
-        Radius within which pins are level with the top, m.
-    rise, fall : float
-        Speeds of free pins that are counted on, m/s.
-    skirt : float
-        Speed of the drags expected from rest, m/s; 0: no skirt.
-    """
+    """Slopes of the heights around the fingertip."""
 
     level: float
+    """Radius within which pins are level with the top, m."""
     rise: float
     fall: float
+    """Speeds of free pins that are counted on, m/s."""
     skirt: float
+    """Speed of the drags expected from rest, m/s; 0: no skirt."""
 
     def find_reach(self, height: float, speed: float) -> float:
         """Return the radius within which pins may be led, m, for a height over the surface and a speed."""
@@ -63,43 +56,32 @@ class LeadProfile:
 
 
 class Follower(NamedTuple):
-    """Memory of the controller.
-
-    Attributes
-    ----------
-    phase, period : Phase, int
-        IDLE or SHAPING; control periods so far.
-    top, edge : float
-        Heights of the blister's top and of the surface around it, m.
-    trim : float
-        Slow correction of the set point, N.
-    felt, alone, losses : float, int, int
-        Top when the fingertip was last felt, m; control periods since then; how often it was lost.
-    led_x, led_y, led_radius : float
-        Disc within which pins may stand where they will not be left, m; a radius of 0: none does.
-    due, doubt : tuple of float, float
-        Total forces predicted for this and the next periods, N, below 0: none is; mean square by which those
-        of the last periods were off, N².
-    master : Master
-        Memory of Method I while it takes over; IDLE: it does not.
-    """
+    """Memory of the controller."""
 
     phase: Phase = Phase.IDLE
     period: int = 0
+    """IDLE or SHAPING; control periods so far."""
     estimate: Estimate = Estimate(np.zeros(STATES), np.zeros((STATES, STATES)))
     top: float = 0.0
     edge: float = 0.0
+    """Heights of the blister's top and of the surface around it, m."""
     heading: Heading = Heading()
     trim: float = 0.0
+    """Slow correction of the set point, N."""
     felt: float = 0.0
     alone: int = 0
     losses: int = 0
+    """Top when the fingertip was last felt, m; control periods since then; how often it was lost."""
     led_x: float = 0.0
     led_y: float = 0.0
     led_radius: float = 0.0
+    """Disc within which pins may stand where they will not be left, m; a radius of 0: none does."""
     due: tuple[float, ...] = ()
     doubt: float = 0.0
+    """Total forces predicted for this and the next periods, N, below 0: none is; mean square by which those
+    of the last periods were off, N²."""
     master: Master = Master()
+    """Memory of Method I while it takes over; IDLE: it does not."""
 
 
 #: Surface from which the blister rises.
@@ -111,24 +93,17 @@ MARGIN = 2e-3
 
 
 class Region(NamedTuple):
-    """Cells about the predicted place of the fingertip.
-
-    Attributes
-    ----------
-    edge, raised : float, bool
-        Height of the surface ahead, m, and whether the blister's top is above it.
-    aim, speed : (float, float, float), float
-        Lowest point of the fingertip then, m, and its speed in the plane, m/s.
-    cells, drop : BlisterCells, ndarray (m,)
-        About the aim, and how far they may stand from the top, m; see `LeadProfile.find_drop`.
-    """
+    """Cells about the predicted place of the fingertip."""
 
     edge: float
     raised: bool
+    """Height of the surface ahead, m, and whether the blister's top is above it."""
     aim: tuple[float, float, float]
     speed: float
+    """Lowest point of the fingertip then, m, and its speed in the plane, m/s."""
     cells: BlisterCells
     drop: Floats
+    """About the aim, and how far they may stand from the top, (m,), m; see `LeadProfile.find_drop`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,30 +28,20 @@ class ControlParameters(Parameters):
 
 @dataclass(frozen=True)
 class Method:
-    """Module of a control method, and its requirements.
-
-    Attributes
-    ----------
-    module : str
-        Within the core; holds a function ``build(parameters, device)``.
-    parameters : str
-        Class of its parameters there.
-    blister : mapping or None
-        Its defaults for the blister where they differ; None: it forms no blister.
-    recovers : bool
-        Whether its cells go back to the height they had at rest.
-    by_set : bool
-        Whether its orders for a cell depend on which other cells are active; see `System.by_set`.
-    digest : str
-        Identifies the code of a method that is no part of this package; empty: it is.
-    """
+    """Module of a control method, and its requirements."""
 
     module: str
+    """Within the core; holds a function ``build(parameters, device)``."""
     parameters: str
+    """Class of its parameters there."""
     blister: Mapping[str, float] | None = field(default=None)
+    """Its defaults for the blister where they differ; None: it forms no blister."""
     recovers: bool = False
+    """Whether its cells go back to the height they had at rest."""
     by_set: bool = False
+    """Whether its orders for a cell depend on which other cells are active; see `System.by_set`."""
     digest: str = ""
+    """Identifies the code of a method that is no part of this package; empty: it is."""
 
     def import_parameters(self) -> type[ControlParameters]:
         """Import the class of its parameters."""

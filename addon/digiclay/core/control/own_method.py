@@ -35,53 +35,36 @@ class Cells(NamedTuple):
     """Cells as an own method sees them, m of them; which ones changes from period to period.
 
     All arrays are read-only.
-
-    Attributes
-    ----------
-    x, y : ndarray (m,)
-        Where they are, m.
-    height, force : ndarray (m,)
-        As measured, m and N.
-    target : ndarray (m,)
-        Height they were last commanded to, m.
-    mode : ndarray (m,) of int8
-        Their modes, see `Mode`.
-    rows : ndarray (rows, m)
-        What the method remembers of each cell, all 0 at first; see `OwnMethod.rows`.
-    number : ndarray (m,) of int
-        Their numbers in the bed.
     """
 
     x: Floats
     y: Floats
+    """(m,): Where they are, m."""
     height: Floats
     force: Floats
+    """(m,): As measured, m and N."""
     target: Floats
+    """(m,): Height they were last commanded to, m."""
     mode: Modes
+    """(m,): Their modes, see `Mode`."""
     rows: Floats
+    """(rows, m): What the method remembers of each cell, all 0 at first; see `OwnMethod.rows`."""
     number: Numbers
+    """(m,): Their numbers in the bed."""
 
 
 class Orders(NamedTuple):
-    """Orders of an own method; a field that is None gets its default.
-
-    Attributes
-    ----------
-    height : ndarray (m,) or None
-        Commanded heights, m, limited to the stroke; by default those before.
-    opening : ndarray (m,) or None
-        Valve openings from -1 (down) to 1 (up), limited to these; by default those that take the pins to
-        their commanded heights, with the time constant `settling_time`.
-    mode : ndarray (m,) of int or None
-        By default FORCE_FOLLOW where there is force, else HOLD at a formed height, else REST.
-    rows : ndarray (rows, m) or None
-        What is remembered of each cell; by default what was.
-    """
+    """Orders of an own method; a field that is None gets its default."""
 
     height: Any = None
+    """(m,): Commanded heights, m, limited to the stroke; by default those before."""
     opening: Any = None
+    """(m,): Valve openings from -1 (down) to 1 (up), limited to these; by default those that take the pins to
+    their commanded heights, with the time constant `settling_time`."""
     mode: Any = None
+    """(m,): By default FORCE_FOLLOW where there is force, else HOLD at a formed height, else REST."""
     rows: Any = None
+    """(rows, m): What is remembered of each cell; by default what was."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +96,7 @@ class OwnMethod(DriveParameters):
     def locate(self, memory: Any, touched: Cells, device: DeviceInfo) -> tuple[Any, Disc | None]:
         """Return memory and the disc x, y, radius of the cells to command, m; None: those that move.
 
-        `memory`: from `begin`, or `command` a period before; `touched`: those the finger may touch.
+        `memory`: from `begin`, or `command` a period before; `touched`: those the fingertip may touch.
         """
         force = suppress_noise(touched.force, device.force_floor)
         total = float(force.sum())
@@ -237,13 +220,7 @@ MOST_ROWS = 1000
 
 @dataclass(eq=False)
 class Pace:
-    """Processor time of the newest calls: the one thing of a session that is not its state.
-
-    Attributes
-    ----------
-    spent : float
-        Of `count` calls, s.
-    """
+    """Processor time of the `count` newest calls, s: the one thing of a session that is not its state."""
 
     spent: float = 0.0
     count: int = 0
@@ -260,28 +237,16 @@ class Pace:
 
 @dataclass(frozen=True, eq=False)
 class Guarded:
-    """Controller that hands on to another one, and checks what that gives.
-
-    Attributes
-    ----------
-    name : str
-        Of the method in scene files.
-    origin : str
-        File and class, for messages.
-    file : str
-        As tracebacks have it.
-    period : float
-        Control period, s.
-    rows : int
-        State rows a cell needs.
-    """
+    """Controller that hands on to another one, and checks what that gives."""
 
     inner: Controller
     name: str
     origin: str
     file: str
+    """Of the method in scene files; file and class, for messages; file as tracebacks have it."""
     period: float
     rows: int
+    """Control period, s; state rows a cell needs."""
     pace: Pace = field(default_factory=Pace)
 
     def begin(self) -> Any:

@@ -36,22 +36,15 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PulpEstimate:
-    """Inverse of contact law and relaxation over a cell.
-
-    Attributes
-    ----------
-    touch : Touch
-        Contact law and relaxation as known to the controller.
-    period, ahead : float
-        Control period, and time over which forces are predicted, s.
-    floor : float
-        Force below which a reading is no contact, N.
-    """
+    """Inverse of contact law and relaxation over a cell."""
 
     touch: Touch
+    """Contact law and relaxation as known to the controller."""
     period: float
     ahead: float
+    """Control period, and time over which forces are predicted, s."""
     floor: float
+    """Force below which a reading is no contact, N."""
 
     @property
     def filters(self) -> int:
@@ -141,25 +134,17 @@ SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])
 
 
 class Reach(NamedTuple):
-    """Heights that the cells near the fingertip can have at the time aimed at.
-
-    Attributes
-    ----------
-    edge, raised : float, bool
-        Height of the surface around, m, and whether the blister's top is above it.
-    part : ndarray (m,)
-        Profile of the blister, 1 at its top.
-    drop : ndarray (m,)
-        How far they may stand below the top, above it in a valley, m; infinite: not led.
-    ends : ndarray (2, m)
-        Lowest and highest they can be, m.
-    """
+    """Heights that the cells near the fingertip can have at the time aimed at."""
 
     edge: float
     raised: bool
+    """Height of the surface around, m, and whether the blister's top is above it."""
     part: Floats
+    """(m,): Profile of the blister, 1 at its top."""
     drop: Floats
+    """(m,): How far they may stand below the top, above it in a valley, m; infinite: not led."""
     ends: Floats
+    """(2, m): Lowest and highest they can be, m."""
 
     def form_heights(self, top: Floats | float) -> Floats:
         """Return heights, m, for tops (t, 1), m: the blister's, or nearer to the top where cells are led."""

@@ -87,14 +87,10 @@ class BatchControl:
     """Controller whose formulas hold for the cells of one run and for those of a batch.
 
     The memory of a batch is a list, one memory a run.
-
-    Attributes
-    ----------
-    runs : tuple of BatchControl
-        In a batch the controllers of its runs, with plain numbers; empty in a single run.
     """
 
     runs: tuple[Any, ...] = field(default=(), kw_only=True)
+    """In a batch the controllers of its runs, with plain numbers; empty in a single run."""
 
     @property
     def batch_class(self) -> type[BatchControl]:

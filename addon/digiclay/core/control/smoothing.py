@@ -47,24 +47,18 @@ class SmoothingControl:
 
     Its memory is the method's, and its cells remember nothing of their own: one that is smoothed, or has not
     arrived yet, is in the mode BLISTER. After any period the method alone can continue the session.
-
-    Attributes
-    ----------
-    exchange : Exchange
-        Of the commanded heights, in one period.
-    disc, reach : Disc
-        Cells to be smoothed, and these with their neighbors, m.
-    strength : float
-        From 0 to 1.
     """
 
     method: Controller
     drive: Drive
     exchange: Exchange
+    """Of the commanded heights, in one period."""
     actuator: Actuator
     disc: Disc
     reach: Disc
+    """Cells to be smoothed, and these with their neighbors, m."""
     strength: float
+    """From 0 to 1."""
 
     @property
     def name(self) -> str:

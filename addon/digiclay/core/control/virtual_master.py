@@ -77,32 +77,24 @@ class LossRule:
 
 
 class Master(NamedTuple):
-    """Memory of the controller.
-
-    Attributes
-    ----------
-    x, y, height, opening : float
-        Where the master is, m, and the opening of its own valve.
-    reference, edge : float
-        Surface height at first touch, from which the virtual spring is pressed down, and that around the
-        blister, m.
-    felt, alone : float, int
-        Its height when the fingertip was last felt, m, and control periods since then.
-    losses : int
-        How often the fingertip was lost while shaping.
-    """
+    """Memory of the controller."""
 
     phase: Phase = Phase.IDLE
     x: float = 0.0
     y: float = 0.0
     height: float = 0.0
     opening: float = 0.0
+    """Where the master is, m, and the opening of its own valve."""
     reference: float = 0.0
     edge: float = 0.0
+    """Surface height at first touch, from which the virtual spring is pressed down, and that around the
+    blister, m."""
     heading: Heading = Heading()
     felt: float = 0.0
     alone: int = 0
+    """Its height when the fingertip was last felt, m, and control periods since then."""
     losses: int = 0
+    """How often the fingertip was lost while shaping."""
 
     # What changes every period is written out: `_replace` takes nearly twice as long.
 
@@ -125,28 +117,20 @@ class Master(NamedTuple):
 
 @dataclass(frozen=True)
 class MasterCell:
-    """One unloaded cell in plain numbers: exact valve opening, averaged flow.
-
-    Attributes
-    ----------
-    openings : tuple of (float, float)
-        At the Gauss points of a control period, then at its end, as ``a K + b K_com``.
-    flow, laminar : Flow, bool
-        The law of valve and conduit; whether no unloaded valve is turbulent.
-    up, down, area : float
-        Pressures of the reservoirs over the area of a pin, Pa/m²; that area, m².
-    stroke, period : float
-        Upper end stop, m; control period, s.
-    """
+    """One unloaded cell in plain numbers: exact valve opening, averaged flow."""
 
     openings: tuple[tuple[float, float], ...]
+    """At the Gauss points of a control period, then at its end, as ``a K + b K_com``."""
     flow: Flow
     laminar: bool
+    """The law of valve and conduit; whether no unloaded valve is turbulent."""
     up: float
     down: float
     area: float
+    """Pressures of the reservoirs over the area of a pin, Pa/m²; that area, m²."""
     stroke: float
     period: float
+    """Upper end stop, m; control period, s."""
 
     def advance(self, height: float, opening: float, command: float) -> tuple[float, float]:
         """Return height, m, and opening after one period of a constant command."""
@@ -222,26 +206,19 @@ class VirtualMaster(Tracking):
 
 @dataclass(frozen=True, eq=False)
 class VirtualMasterControl(BatchControl):
-    """Controller of Method I for a bed.
-
-    Attributes
-    ----------
-    model : MasterCell
-        The master's own cylinder and valve.
-    lift, floor : float
-        Force the high reservoir can lift, and from which on the reading of a cell is no noise, N.
-    ground : EdgeGround or OwnGround
-        Surface from which the blister rises.
-    """
+    """Controller of Method I for a bed."""
 
     parameters: VirtualMaster
     blister: Blister
     actuator: Actuator
     model: MasterCell
+    """The master's own cylinder and valve."""
     period: float
     lift: float
     floor: float = 0.0
+    """Force the high reservoir can lift, and from which on the reading of a cell is no noise, N."""
     ground: EdgeGround | OwnGround = GROUNDS["edge"]
+    """Surface from which the blister rises."""
 
     name = "virtual_master"
 
