@@ -22,11 +22,8 @@ def errors(final: Floats, rows: NDArray[np.bool_] = ALL, tip: Floats = TIP, away
     return measure_ridge_errors(PLACE, final, tip, rows, away) * 1e3
 
 
-def test_a_ridge_at_the_path_has_no_error() -> None:
+def test_a_ridge_has_its_height_over_the_path() -> None:
     np.testing.assert_array_equal(errors(np.full(21, 50e-3)), 0.0)
-
-
-def test_a_ridge_over_the_path_has_its_height_over_it() -> None:
     np.testing.assert_allclose(errors(np.full(21, 51.5e-3)), 1.5, rtol=1e-12)
 
 
@@ -47,9 +44,10 @@ def test_pins_the_finger_did_not_go_on_from_do_not_count() -> None:
     assert len(measure_ridge_errors(PLACE, final, TIP, ALL)) in (16, 17)
 
 
-def test_a_press_without_travel_leaves_no_ridge() -> None:
+def test_neither_a_press_without_travel_nor_no_rows_leave_a_ridge() -> None:
     still = np.tile(TIP[100], (50, 1))
     assert measure_ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
+    assert errors(np.full(21, 50e-3), rows=~ALL).size == 0
 
 
 def test_going_on_after_the_finger_was_lost_does_not_count() -> None:
@@ -59,10 +57,6 @@ def test_going_on_after_the_finger_was_lost_does_not_count() -> None:
     counted = measure_ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
     # Of pins 0 to 10, passed before, 11 mm of way must follow before the middle: up to pin 6, at -12 mm.
     assert [int(pin) for pin in np.rint(counted) if pin < 10] == list(range(7))
-
-
-def test_no_rows_leave_nothing() -> None:
-    assert errors(np.full(21, 50e-3), rows=~ALL).size == 0
 
 
 def test_many_rows_are_looked_at_in_parts_alike() -> None:
@@ -82,32 +76,17 @@ HISTORY = {
 SUMS = sum_cells(HISTORY)
 
 
-def test_the_sums_have_the_moments_of_the_forces_about_both_axes() -> None:
-    # 0.3 N at 1 mm and 0.1 N at 4 mm; 0.3 N at 2 mm and 0.1 N at 6 mm.
-    assert [SUMS.x[1], SUMS.y[1]] == pytest.approx([0.7e-3, 1.2e-3], rel=1e-12)  # rounding
-
-
-def test_the_sums_have_the_sum_of_force_times_height() -> None:
-    assert SUMS.height == pytest.approx([0.0, 0.3 * 51e-3 + 0.1 * 53e-3], rel=1e-12)  # rounding
-
-
-def test_the_sums_have_the_strongest_force_of_each_row() -> None:
+def test_the_sums_are_those_of_the_cells() -> None:
+    # 0.3 N at 1 mm and 0.1 N at 4 mm; 0.3 N at 2 mm and 0.1 N at 6 mm; rounding.
+    assert [SUMS.x[1], SUMS.y[1]] == pytest.approx([0.7e-3, 1.2e-3], rel=1e-12)
+    assert SUMS.height == pytest.approx([0.0, 0.3 * 51e-3 + 0.1 * 53e-3], rel=1e-12)
     np.testing.assert_array_equal(SUMS.strongest, [0.0, 0.3])
-
-
-def test_the_sums_count_the_cells_that_follow_the_force() -> None:
     np.testing.assert_array_equal(SUMS.following, [0, 1])
-
-
-def test_the_sums_have_the_first_and_the_last_heights() -> None:
     np.testing.assert_array_equal([SUMS.first, SUMS.last], [[50e-3, 52e-3], [51e-3, 53e-3]])
 
 
 def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
     # 0.3 N at 51 mm and 0.1 N at 53 mm: 51.5 mm, over a finger at 50 mm.
     assert measure_surface_under(SUMS, TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)
-
-
-def test_rows_without_contact_have_no_surface_under_the_finger() -> None:
     nothing = {**HISTORY, "force": np.zeros((2, 2)), "total_force": np.zeros(2)}
     assert measure_surface_under(sum_cells(nothing), TIP[:2]).size == 0

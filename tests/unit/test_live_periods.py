@@ -42,12 +42,16 @@ def looked(times: list[float], most: int = 100, clock: Clock | None = None) -> t
     return counts, clock
 
 
-def test_nothing_is_due_at_the_first_look() -> None:
-    assert looked([1e6])[0] == [0]
-
-
-def test_whole_periods_are_due_and_the_rest_is_kept_for_the_next_look() -> None:
-    assert looked([0.0, 0.012, 0.024, 0.026])[0] == [0, 2, 2, 1]
+@pytest.mark.parametrize(
+    ("times", "counts"),
+    [
+        pytest.param([1e6], [0], id="nothing at the first look"),
+        pytest.param([0.0, 0.012, 0.024, 0.026], [0, 2, 2, 1], id="the rest is kept for the next look"),
+        pytest.param([5.0, 4.0, 4.01], [0, 0, 2], id="a clock that goes back"),
+    ],
+)
+def test_whole_periods_are_due(times: list[float], counts: list[int]) -> None:
+    assert looked(times)[0] == counts
 
 
 def test_as_much_is_simulated_as_time_goes_by() -> None:
@@ -81,10 +85,6 @@ def test_a_machine_too_slow_simulates_for_seven_tenths_of_the_time_and_draws_in_
     count, _ = periods_due(update_cost(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)
     # 101 periods have gone by, and each takes five to simulate: 14 take 70, 15 would take 75.
     assert count == 14
-
-
-def test_a_clock_that_goes_back_does_no_harm() -> None:
-    assert looked([5.0, 4.0, 4.01])[0] == [0, 0, 2]
 
 
 def test_the_time_of_a_pause_does_not_count() -> None:
@@ -177,18 +177,12 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
     assert (trace.time[0], trace.set_point[0]) == (60 * PERIOD, 0.4)
 
 
-def test_a_method_without_a_set_point_has_none_in_the_trace() -> None:
-    trace = recent_trace.extend(
-        recent_trace.start(PERIOD), [recent_trace.sample(SYSTEM, begin(SYSTEM), None, ())]
-    )
-    assert np.isnan(trace.set_point).all()
-
-
 def test_a_set_point_of_each_cell_is_traced_as_their_number_changes() -> None:
     press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
     *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
     held, asked = state.active, SetPoint(0.04, per_cell=True)
     held.mode[:] = Mode.REST
+    assert np.isnan(recent_trace.sample(SYSTEM, state, None, ())[2])
     assert np.isnan(recent_trace.sample(SYSTEM, state, asked, ())[2])
     held.mode[:3] = Mode.FORCE_FOLLOW
     assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding

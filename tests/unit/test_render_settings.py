@@ -15,10 +15,8 @@ def test_a_film_at_full_speed_lasts_as_long_as_its_session_and_ends_with_it() ->
     moments = Film(rate=25).moments(TIME)
     assert len(moments) == 26
     np.testing.assert_allclose(moments, np.arange(26) / 25, rtol=0, atol=1e-12)
-
-
-def test_at_half_the_speed_there_are_twice_as_many_frames() -> None:
     assert len(Film(rate=25, speed=0.5).moments(TIME)) == 51
+    assert Film().rows([0.0]).tolist() == [0]  # a session of a single row
 
 
 def test_each_frame_shows_the_row_nearest_to_its_time() -> None:
@@ -31,10 +29,6 @@ def test_each_frame_shows_the_row_nearest_to_its_time() -> None:
 def test_a_part_of_a_session_can_be_filmed() -> None:
     film = Film(rate=25, start=0.2, stop=0.4)
     assert TIME[film.rows(TIME)][[0, -1]].tolist() == pytest.approx([0.2, 0.4], abs=1e-12)
-
-
-def test_a_session_of_a_single_row_makes_one_frame() -> None:
-    assert Film().rows([0.0]).tolist() == [0]
 
 
 @pytest.mark.parametrize(

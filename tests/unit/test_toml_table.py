@@ -28,28 +28,34 @@ def test_a_scene_is_called_like_its_file(tmp_path: Path) -> None:
     assert scene(tmp_path, "").name == "my"
 
 
-def test_a_mistake_is_told_with_the_file(tmp_path: Path) -> None:
-    said = refused(tmp_path, "[valve]\norifice_diameter = -0.0003")
-    assert said == "my.toml: valve.orifice_diameter must be above 0 m (got -0.0003 m)."
-
-
-def test_a_mistake_in_a_setting_is_told_with_its_option(tmp_path: Path) -> None:
-    said = refused(tmp_path, "", valve__orifice_diameter="-0.0003")
-    assert said == "--set: valve.orifice_diameter must be above 0 m (got -0.0003 m)."
-
-
-def test_a_mistake_in_the_file_is_not_blamed_on_a_setting(tmp_path: Path) -> None:
-    said = refused(tmp_path, "[valve]\nstroke = 0.0", layout__rows="3")
-    assert said == "my.toml: valve.stroke must be above 0 m (got 0 m)."
-
-
-def test_what_file_and_setting_break_together_is_blamed_on_the_setting(tmp_path: Path) -> None:
-    said = refused(tmp_path, "[actuator]\nrest_height = 0.05", actuator__stroke="0.01")
-    assert said == "--set: actuator.rest_height must be at most the stroke, 0.01 m (got 0.05 m)."
-
-
-def test_a_setting_may_mend_a_file(tmp_path: Path) -> None:
-    assert scene(tmp_path, "[valve]\nstroke = 0.0", valve__stroke="3e-5").valve.stroke == 3e-5
+@pytest.mark.parametrize(
+    ("text", "setting", "said"),
+    [
+        (
+            "[valve]\norifice_diameter = -0.0003", {},
+            "my.toml: valve.orifice_diameter must be above 0 m (got -0.0003 m).",
+        ),
+        (
+            "", {"valve__orifice_diameter": "-0.0003"},
+            "--set: valve.orifice_diameter must be above 0 m (got -0.0003 m).",
+        ),
+        # A mistake in the file is not blamed on a setting; what both break together is.
+        (
+            "[valve]\nstroke = 0.0", {"layout__rows": "3"},
+            "my.toml: valve.stroke must be above 0 m (got 0 m).",
+        ),
+        (
+            "[actuator]\nrest_height = 0.05", {"actuator__stroke": "0.01"},
+            "--set: actuator.rest_height must be at most the stroke, 0.01 m (got 0.05 m).",
+        ),
+        # A setting cannot smuggle in a second key.
+        ("", {"layout__rows": "3\nx = 4"}, "--set: layout.rows must be a whole number (got '3\\nx = 4')."),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_with_the_file_or_the_option(
+    tmp_path: Path, text: str, setting: dict[str, str], said: str
+) -> None:
+    assert refused(tmp_path, text, **setting) == said
 
 
 def test_the_option_that_said_it_is_named(tmp_path: Path) -> None:
@@ -60,36 +66,31 @@ def test_the_option_that_said_it_is_named(tmp_path: Path) -> None:
         load(path, settings)
 
 
-def test_a_setting_may_be_a_quantity_without_quotes(tmp_path: Path) -> None:
-    assert scene(tmp_path, "", layout__pitch="4 mm").layout.pitch == 4e-3
-
-
-def test_a_setting_may_be_a_text_without_quotes(tmp_path: Path) -> None:
-    assert scene(tmp_path, "", layout__arrangement="hexagonal").layout.arrangement == "hexagonal"
-
-
-def test_a_setting_may_be_a_list(tmp_path: Path) -> None:
-    relaxation = scene(tmp_path, "", relaxation__times="[1.0]", relaxation__weights="[1, 1]").section(
-        "relaxation"
-    )
-    assert relaxation is not None
-    assert relaxation.times == (1.0,)
+@pytest.mark.parametrize(
+    ("text", "settings", "part", "key", "value"),
+    [
+        pytest.param("[valve]\nstroke = 0.0", {"valve__stroke": "3e-5"}, "valve", "stroke", 3e-5, id="mends"),
+        pytest.param("", {"layout__pitch": "4 mm"}, "layout", "pitch", 4e-3, id="quantity without quotes"),
+        pytest.param(
+            "", {"layout__arrangement": "hexagonal"}, "layout", "arrangement", "hexagonal", id="text"
+        ),
+        pytest.param(
+            "", {"relaxation__times": "[1.0]", "relaxation__weights": "[1, 1]"}, "relaxation", "times",
+            (1.0,), id="list",
+        ),
+        pytest.param(
+            'conduit = "absent"', {"conduit__length": "0.02"}, "conduit", "length", 0.02, id="part put back"
+        ),
+    ],
+)  # fmt: skip
+def test_a_setting_is_a_value_of_the_scene(
+    tmp_path: Path, text: str, settings: dict[str, str], part: str, key: str, value: object
+) -> None:
+    assert getattr(scene(tmp_path, text, **settings).section(part), key) == value
 
 
 def test_a_setting_may_leave_a_part_out(tmp_path: Path) -> None:
     assert scene(tmp_path, "[conduit]\nlength = 0.02", conduit="absent").conduit is None
-
-
-def test_a_setting_of_a_part_left_out_puts_it_back(tmp_path: Path) -> None:
-    conduit = scene(tmp_path, 'conduit = "absent"', conduit__length="0.02").conduit
-    assert conduit is not None
-    assert conduit.length == 0.02
-
-
-def test_a_setting_cannot_smuggle_in_a_second_key(tmp_path: Path) -> None:
-    assert refused(tmp_path, "", layout__rows="3\nx = 4") == (
-        "--set: layout.rows must be a whole number (got '3\\nx = 4')."
-    )
 
 
 @pytest.mark.parametrize(
@@ -113,10 +114,6 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
         load(path)
 
 
-def test_a_sample_is_found_by_its_name() -> None:
-    assert find("ridge_mound_valley") == SAMPLES / "ridge_mound_valley.toml"
-
-
 @pytest.mark.parametrize("name", list_samples())
 def test_every_sample_is_a_scene_called_like_its_file(name: str) -> None:
     assert load(find(name)).name == name
@@ -136,12 +133,7 @@ def test_the_folder_of_a_run_stands_for_its_scene(tmp_path: Path) -> None:
     assert find(str(tmp_path)) == tmp_path / "scene.toml"
 
 
-def test_a_missing_file_is_told_as_one() -> None:
-    with pytest.raises(SceneError, match=r"^nowhere\.toml: there is no such file\.$"):
-        find("nowhere.toml")
-
-
-@pytest.mark.parametrize("word", ["a\0b", 300 * "a", "", 300 * "a" + "/b"])
+@pytest.mark.parametrize("word", ["nowhere.toml", "a\0b", 300 * "a", "", 300 * "a" + "/b"])
 def test_a_word_no_file_can_be_called_is_told_as_any_other(word: str) -> None:
     with pytest.raises(SceneError, match=r"neither a file nor a sample|there is no such file"):
         find(word)

@@ -53,8 +53,6 @@ __all__ = [
 
 #: All cells.
 ALL = slice(None)
-#: No lag is longer, m.
-FARTHEST = 1e9
 
 
 def compute_cell_area(position: ArrayLike) -> float | None:
@@ -85,6 +83,7 @@ def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None
     return compute_metrics_from_sums(sum_cells(history), time, fingertip, position, set_point)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is not finite is no metric
 def compute_metrics_from_sums(
     sums: CellSums,
     time: Floats,
@@ -101,9 +100,8 @@ def compute_metrics_from_sums(
     in a ridge. Returns see `compute_metrics`.
     """
     total, weight, felt, rows = sums.total, compute_weights(time), sums.touching, sums.shaping
-    # A fingertip straight above its blister is a rounding error away from it, not 1e-17 m; forces in a file
-    # may give distances that cannot be rounded.
-    behind = np.round(np.minimum(measure_lag(sums, fingertip), FARTHEST), 12)
+    # A fingertip straight above its blister is a rounding error away from it, not 1e-17 m.
+    behind = np.round(measure_lag(sums, fingertip), 12)
     above = measure_surface_under(sums, fingertip)
     ridge = measure_ridge_errors(position[near], sums.last[near], fingertip, rows)
     each = np.ones(len(ridge))
