@@ -45,49 +45,32 @@ def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, lis
     return {name: (array if array.ndim == 1 else array[:, 0]).tolist() for name, array in arrays.items()}
 
 
-def test_the_first_row_is_the_state_before_the_session() -> None:
-    assert recorded(1, 3)["height"][0] == 0.04
-
-
-def test_a_row_is_the_state_at_its_time() -> None:
-    assert recorded(1, 3)["height"][1:] == [101.0, 102.0, 103.0]
-
-
-def test_the_force_is_the_one_at_the_time_of_the_row() -> None:
-    assert recorded(1, 3)["force"] == [0.0, 201.0, 202.0, 203.0]
-
-
-def test_a_command_stands_in_the_row_its_period_starts_with() -> None:
-    assert recorded(1, 3)["command"][:-1] == [301.0, 302.0, 303.0]
-
-
-def test_nothing_is_commanded_after_the_last_row() -> None:
-    assert recorded(1, 3)["command"][-1] == 0.0
-
-
-def test_a_mode_stands_in_the_row_its_period_starts_with_and_the_last_is_repeated() -> None:
-    assert recorded(1, 3)["mode"] == [1, 2, 3, 3]
-
-
-def test_every_second_period_makes_a_row_and_so_does_the_end() -> None:
-    assert recorded(2, 5)["period"] == [0, 2, 4, 5]
-
-
-def test_a_thinned_row_has_the_command_of_the_period_that_starts_with_it() -> None:
-    assert recorded(2, 5)["command"] == [301.0, 303.0, 305.0, 0.0]
+@pytest.mark.parametrize(
+    ("session", "name", "wanted"),
+    [
+        # The first row is the state before the session, any other one that at its time.
+        ((1, 3), "height", [0.04, 101.0, 102.0, 103.0]),
+        ((1, 3), "force", [0.0, 201.0, 202.0, 203.0]),
+        # A command or a mode is in the row its period starts with; after the last row nothing is commanded.
+        ((1, 3), "command", [301.0, 302.0, 303.0, 0.0]),
+        ((1, 3), "mode", [1, 2, 3, 3]),
+        # Every second period makes a row, and so does the end.
+        ((2, 5), "period", [0, 2, 4, 5]),
+        ((2, 5), "command", [301.0, 303.0, 305.0, 0.0]),
+        # A session cut short ends with the state it had reached, and without a command.
+        ((3, 9, 4), "period", [0, 3, 4]),
+        ((3, 9, 4), "command", [301.0, 304.0, 0.0]),
+    ],
+)
+def test_a_row_is_the_state_at_its_time_and_what_was_commanded_from_then_on(
+    session: tuple[int, ...], name: str, wanted: list[float]
+) -> None:
+    assert recorded(*session)[name] == wanted
 
 
 @pytest.mark.parametrize("every", [1, 2, 3, 4, 5, 6])
 def test_there_are_as_many_rows_as_were_announced(every: int) -> None:
     assert len(recorded(every, 5)["period"]) == Recorder(every).rows(5)
-
-
-def test_a_session_cut_short_ends_with_the_state_it_had_reached() -> None:
-    assert recorded(3, 9, stop=4)["period"] == [0, 3, 4]
-
-
-def test_a_session_cut_short_ends_without_a_command() -> None:
-    assert recorded(3, 9, stop=4)["command"] == [301.0, 304.0, 0.0]
 
 
 def test_a_written_history_is_read_back_bit_for_bit(tmp_path: Path) -> None:
@@ -120,16 +103,13 @@ def test_a_history_fits_to_the_byte() -> None:
     assert [fits(Recorder(1), 1000, 100, free) for free in (needed - 1, needed)] == [False, True]
 
 
-def test_a_history_too_large_is_refused_with_what_to_change() -> None:
+def test_a_history_too_large_is_refused_with_the_least_thinning_that_fits() -> None:
     with pytest.raises(ParameterError) as caught:
         refuse_what_cannot_fit(Recorder(1), ROWS, 1_000_000, 5200, 20_000_000_000)
     assert str(caught.value) == (
         "recorder.every must be at least 7 for the history to fit into 20 GB of free memory "
         "(got 1: 5201 rows of 1000000 cells are 135 GB)."
     )
-
-
-def test_the_recommended_thinning_is_the_least_that_fits() -> None:
     assert [fits(Recorder(every), 1_000_000, 5200, 20_000_000_000) for every in (6, 7)] == [False, True]
 
 

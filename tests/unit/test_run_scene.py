@@ -39,7 +39,6 @@ def result() -> Result:
 
 
 def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result: Result) -> None:
-    assert result.history is not None
     assert {name: array.shape for name, array in result.history.items()} == {
         "time": (41,),
         "height": (41, 12),
@@ -53,32 +52,21 @@ def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result: Result) -> N
     }
 
 
-def test_modes_are_stored_as_small_integers(result: Result) -> None:
-    assert result.history is not None
+def test_a_history_has_the_path_the_press_and_the_largest_force(result: Result) -> None:
     assert result.history["mode"].dtype == np.int8
-
-
-def test_the_finger_stands_in_each_row_where_the_path_is_then(result: Result) -> None:
-    assert result.history is not None
     wanted = scene().section("trajectory").trajectory().poses(result.history["time"])
     assert np.array_equal(result.history["fingertip"], wanted)
-
-
-def test_the_press_is_felt(result: Result) -> None:
-    assert result.metrics["max_total_force"] > 0.01
+    assert result.metrics["max_total_force"] == result.history["total_force"].max() > 0.01
+    assert [name for name in result.metrics["units"] if name not in result.metrics] == []
 
 
 def test_the_same_scene_gives_the_same_history_bit_for_bit(result: Result) -> None:
     again = run(scene()).history
-    assert result.history is not None
-    assert again is not None
     assert [name for name in again if not np.array_equal(again[name], result.history[name])] == []
 
 
 def test_a_thinned_history_has_every_fourth_row(result: Result) -> None:
     thinned = run(scene(recorder={"every": 4})).history
-    assert result.history is not None
-    assert thinned is not None
     assert np.array_equal(thinned["height"], result.history["height"][::4])
 
 
@@ -86,24 +74,10 @@ def test_a_session_without_a_recorder_keeps_no_history() -> None:
     assert run(scene(recorder="absent")).history == {}
 
 
-def test_metrics_are_the_same_numbers_as_in_the_history(result: Result) -> None:
-    assert result.history is not None
-    assert result.metrics["max_total_force"] == result.history["total_force"].max()
-
-
-def test_every_metric_with_a_unit_is_there(result: Result) -> None:
-    assert [name for name in result.metrics["units"] if name not in result.metrics] == []
-
-
-def test_without_control_there_is_no_force_to_deviate_from() -> None:
-    metrics = run(scene(control="absent")).metrics
-    assert (metrics["rfd"], metrics["set_point"]) == (None, None)
-
-
-def test_without_control_no_valve_opens() -> None:
-    history = run(scene(control="absent")).history
-    assert history is not None
-    assert np.ptp(history["height"]) == 0.0
+def test_without_control_no_valve_opens_and_there_is_no_force_to_deviate_from() -> None:
+    done = run(scene(control="absent"))
+    assert (done.metrics["rfd"], done.metrics["set_point"]) == (None, None)
+    assert np.ptp(done.history["height"]) == 0.0
 
 
 def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
@@ -131,20 +105,11 @@ def stopped_after(count: int) -> Result:
     return run(scene(), stopped=lambda: next(asked) == count)
 
 
-def test_a_stopped_session_keeps_what_was_computed(result: Result) -> None:
-    kept = stopped_after(10).history
-    assert result.history is not None
-    assert kept is not None
-    assert np.array_equal(kept["height"], result.history["height"][:11])
-
-
-def test_a_stopped_session_is_marked_incomplete() -> None:
+def test_a_stopped_session_keeps_what_was_computed_and_is_marked_incomplete(result: Result) -> None:
     cut = stopped_after(10)
+    assert np.array_equal(cut.history["height"], result.history["height"][:11])
     assert (cut.incomplete, cut.metrics["incomplete"]) == (True, True)
-
-
-def test_a_session_stopped_with_its_last_period_is_complete() -> None:
-    assert not stopped_after(40).incomplete
+    assert not stopped_after(40).incomplete  # with its last period
 
 
 def test_a_session_that_cannot_fit_in_memory_is_refused() -> None:
@@ -154,18 +119,10 @@ def test_a_session_that_cannot_fit_in_memory_is_refused() -> None:
         run(endless)
 
 
-def test_a_saved_run_has_its_three_files(result: Result, tmp_path: Path) -> None:
+def test_a_saved_run_has_scene_metrics_and_history(result: Result, tmp_path: Path) -> None:
     save(result, tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["history.npz", "metrics.json", "scene.toml"]
-
-
-def test_a_saved_scene_is_the_scene(result: Result, tmp_path: Path) -> None:
-    save(result, tmp_path)
     assert resolve(tomllib.loads((tmp_path / "scene.toml").read_text(encoding="utf-8"))) == result.scene
-
-
-def test_saved_metrics_are_the_metrics(result: Result, tmp_path: Path) -> None:
-    save(result, tmp_path)
     assert json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8")) == result.metrics
 
 
@@ -175,15 +132,11 @@ def fill(folder: Path, word: str) -> None:
     (folder / MARK).write_text(word, encoding="utf-8")
 
 
-def test_a_folder_appears_with_all_that_was_written(tmp_path: Path) -> None:
+def test_a_folder_appears_with_all_that_was_written_and_not_before(tmp_path: Path) -> None:
     with write_folder(tmp_path / "a" / "b", overwrite=False) as staged:
         (staged / "x").touch()
+        assert not (tmp_path / "a" / "b").exists()
     assert [path.name for path in (tmp_path / "a" / "b").iterdir()] == ["x"]
-
-
-def test_a_folder_does_not_appear_before_all_is_written(tmp_path: Path) -> None:
-    with write_folder(tmp_path / "run", overwrite=False):
-        assert not (tmp_path / "run").exists()
 
 
 def test_a_failure_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -204,12 +157,6 @@ def test_an_empty_folder_may_be_written_to(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.rglob("*")] == ["run", "x"]
 
 
-def test_an_older_run_is_refused(tmp_path: Path) -> None:
-    fill(tmp_path / "run", "old")
-    with pytest.raises(OutputError, match=r"is not empty: .* --overwrite"):
-        check_folder(tmp_path / "run", overwrite=False)
-
-
 def test_an_older_run_is_replaced_when_asked(tmp_path: Path) -> None:
     fill(tmp_path / "run", "old")
     with write_folder(tmp_path / "run", overwrite=True) as staged:
@@ -224,22 +171,22 @@ def test_an_older_run_stays_when_the_new_one_fails(tmp_path: Path) -> None:
     assert [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")] == [(MARK, "old")]
 
 
-def test_a_folder_that_is_no_runs_is_never_replaced(tmp_path: Path) -> None:
-    (tmp_path / "thesis.doc").touch()
-    with pytest.raises(OutputError, match="holds other things than a run"):
-        check_folder(tmp_path, overwrite=True)
-
-
-def test_a_file_is_no_folder_to_write_to(tmp_path: Path) -> None:
-    (tmp_path / "run").touch()
-    with pytest.raises(OutputError, match="is a file"):
-        check_folder(tmp_path / "run", overwrite=True)
-
-
-def test_a_file_in_the_way_is_told_before_any_work(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(OutputError, match="cannot be made"):
-        check_folder(tmp_path / "file" / "run", overwrite=False)
+@pytest.mark.parametrize(
+    ("there", "out", "overwrite", "message"),
+    [
+        (f"run/{MARK}", "run", False, r"is not empty: .* --overwrite"),
+        ("thesis.doc", ".", True, "holds other things than a run"),
+        ("run", "run", True, "is a file"),
+        ("file", "file/run", False, "cannot be made"),
+    ],
+)
+def test_a_folder_that_could_not_be_used_is_refused_before_any_work(
+    tmp_path: Path, there: str, out: str, overwrite: bool, message: str
+) -> None:
+    (tmp_path / there).parent.mkdir(exist_ok=True)
+    (tmp_path / there).touch()
+    with pytest.raises(OutputError, match=message):
+        check_folder(tmp_path / out, overwrite=overwrite)
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import pytest
 from digiclay.core.session import live_session, snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
 
 from tests.hand import Hand, started
 
@@ -17,14 +18,19 @@ def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
+def plays(session: Running) -> bool:
+    """Return whether the recording of a session gives its state again bit for bit."""
+    keep = session.recording
+    assert keep is not None
+    *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
+    return snapshot.dump(session.system, again) == session.snapshot
+
+
 def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
     hand = Hand()
     session = sculpting.set_recording(hand.press(started(), -6.0), True)
     session = hand.press(hand.press(session), 6.0)
-    keep = session.recording
-    assert keep is not None
-    *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
-    assert snapshot.dump(session.system, again) == session.snapshot
+    assert plays(session)
 
 
 def test_undo_shortens_a_recording_to_what_led_there() -> None:
@@ -34,10 +40,7 @@ def test_undo_shortens_a_recording_to_what_led_there() -> None:
     kept, moment, at = session.snapshot, session.tick, session.pose
     session = sculpting.restore(hand.press(session, 6.0), kept, at, moment)
     session = hand.press(session, 3.0)
-    keep = session.recording
-    assert keep is not None
-    *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
-    assert snapshot.dump(session.system, again) == session.snapshot
+    assert plays(session)
 
 
 def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
@@ -66,10 +69,7 @@ def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
     hand = Hand()
     session = hand.press(sculpting.set_recording(started(), True), -6.0)
     session = hand.press(sculpting.rewind(hand.press(session)), 6.0)
-    keep = session.recording
-    assert keep is not None
-    *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
-    assert snapshot.dump(session.system, again) == session.snapshot
+    assert plays(session)
 
 
 def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:

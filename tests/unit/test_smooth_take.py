@@ -70,21 +70,18 @@ def test_orders_that_are_none_are_refused_with_what_is_wrong(orders: object, sai
     assert "\n" not in str(caught.value)
 
 
-def test_orders_of_text_in_a_file_are_damage() -> None:
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("smoothing", np.full(ORDERS.shape, "a"), "The take is damaged"),
+        ("version", np.array(4), "its version must be at most 3"),
+    ],
+)
+def test_orders_of_text_and_a_version_yet_to_come_are_refused(name: str, value: object, said: str) -> None:
     parts = dict(np.load(io.BytesIO(to_bytes(smooth_take()))))
-    parts["smoothing"] = np.full(parts["smoothing"].shape, "a")
     written = io.BytesIO()
-    np.savez(written, **parts)
-    with pytest.raises(OutputError, match="The take is damaged"):
-        from_bytes(written.getvalue())
-
-
-def test_a_version_yet_to_come_is_refused() -> None:
-    parts = dict(np.load(io.BytesIO(to_bytes(smooth_take()))))
-    parts["version"] = np.array(4)
-    written = io.BytesIO()
-    np.savez(written, **parts)
-    with pytest.raises(OutputError, match="its version must be at most 3"):
+    np.savez(written, **{**parts, name: value})
+    with pytest.raises(OutputError, match=said):
         from_bytes(written.getvalue())
 
 

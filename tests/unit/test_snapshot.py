@@ -66,18 +66,13 @@ def test_sensors_that_remember_are_kept_as_well() -> None:
     assert same(run(system, taken_up, 50), run(system, half, 50))
 
 
-def test_kept_bytes_do_not_change_when_the_session_goes_on() -> None:
+def test_kept_bytes_and_the_state_taken_up_are_independent() -> None:
     system = system_of()
     state = run(system, begin(system), 70)
     data = snapshot.dump(system, state)
     before = bytes(data)
     run(system, state, 10)
     assert data == before
-
-
-def test_a_state_taken_up_may_be_used_up() -> None:
-    system = system_of()
-    data = snapshot.dump(system, run(system, begin(system), 70))
     first = run(system, snapshot.load(system, data), 20)
     assert same(run(system, snapshot.load(system, data), 20), first)
 
@@ -164,28 +159,23 @@ def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
         snapshot.load(system, header_replaced(data, old, new))
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_numbers_that_are_not_finite_are_refused(value: float) -> None:
-    system = system_of()
-    state = begin(system)
-    state.rows[0, 3] = value
-    with pytest.raises(StateError, match="no state has"):
-        snapshot.load(system, snapshot.dump(system, state))
+def put(state: State, name: str, index: Any, value: float) -> None:
+    """Write a number into an array of a state."""
+    (state.active.cells if name == "cells" else getattr(state, name))[index] = value
 
 
-def test_a_mode_that_does_not_exist_is_refused() -> None:
-    system = system_of()
-    state = begin(system)
-    state.modes[5] = len(Mode)
-    with pytest.raises(StateError, match="no state has"):
-        snapshot.load(system, snapshot.dump(system, state))
-
-
-def test_a_cell_that_is_gathered_twice_is_refused() -> None:
+@pytest.mark.parametrize(
+    ("name", "index", "value"),
+    [
+        *(("rows", (0, 3), value) for value in (np.nan, np.inf, -np.inf)),
+        ("modes", 5, len(Mode)),
+        ("cells", slice(2), 40),  # gathered twice
+    ],
+)
+def test_numbers_no_state_has_are_refused(name: str, index: Any, value: float) -> None:
     system = system_of()
     state = run(system, begin(system), 70)
-    cells = state.active.cells
-    cells[1] = cells[0]
+    put(state, name, index, value)
     with pytest.raises(StateError, match="no state has"):
         snapshot.load(system, snapshot.dump(system, state))
 
@@ -239,14 +229,10 @@ def test_heights_are_carried_over_to_other_parts(tables: dict[str, Any]) -> None
     assert np.array_equal(later.row(0), before)
 
 
-def test_carried_heights_stay_within_the_stroke() -> None:
+def test_carried_heights_stay_within_the_stroke_and_with_their_number_of_cells() -> None:
     _, data = kept()
     low = assemble(resolve({"layout": SIZES, "actuator": {"stroke": "38 mm", "rest_height": "20 mm"}}))
     assert snapshot.transfer_heights(low, data).row(0).max() == 38e-3
-
-
-def test_heights_are_not_carried_over_to_another_number_of_cells() -> None:
-    _, data = kept()
     with pytest.raises(StateError, match="number of cells"):
         snapshot.transfer_heights(assemble(resolve({})), data)
 

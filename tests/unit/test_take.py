@@ -62,15 +62,11 @@ def difference(take: Take, parts: int) -> float:
     return max(float(np.abs(one.row(0) - other.row(0)).max()) for one, other in both)
 
 
-def test_a_replay_ends_in_the_same_state_bit_for_bit() -> None:
-    _, take, _ = taken()
+def test_a_replay_from_rest_or_a_formed_bed_ends_in_the_same_state_bit_for_bit() -> None:
+    _, take, formed = taken()
     assert replayed(take)
-
-
-def test_a_take_begun_on_a_formed_bed_replays_bit_for_bit_too() -> None:
-    _, _, formed = taken()
-    _, take, _ = taken(formed)
-    assert replayed(take)
+    assert replayed(taken(formed)[1])
+    assert [state.period for state in replay(take)] == list(range(1, COUNT + 1))
 
 
 def test_a_replay_on_another_path_does_not_pass_for_the_take() -> None:
@@ -98,10 +94,6 @@ def test_a_finer_step_moves_heights_by_less_than_the_integrations_error() -> Non
     # 1 ms steps leave about 1 µm; a difference of nothing at all would mean that nothing was refined.
     _, take, _ = taken()
     assert 0.0 < difference(take, 4) < 5e-6
-
-
-def test_the_same_step_makes_no_difference() -> None:
-    _, take, _ = taken()
     assert difference(take, 1) == 0.0
 
 
@@ -144,11 +136,6 @@ def test_a_take_begun_on_a_formed_bed_is_no_scene() -> None:
     _, take, _ = taken(formed)
     with pytest.raises(OutputError, match=r"begins on a bed that is formed already.*reset the session"):
         to_scene(take, "late")
-
-
-def test_states_come_one_a_period() -> None:
-    _, take, _ = taken()
-    assert [state.period for state in replay(take)] == list(range(1, COUNT + 1))
 
 
 @pytest.mark.parametrize(
