@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from dataclasses import replace
@@ -10,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import OutputError, ParameterError, SceneError, StateError
+from digiclay.core.base.errors import ParameterError, SceneError, StateError
 from digiclay.core.engine.simulation import begin
 from digiclay.core.files.tables import parse_tables
 from digiclay.core.scene.assembly import assemble
@@ -50,15 +49,12 @@ def refused(words: str) -> str:
     return str(caught.value)
 
 
-def test_a_scene_may_have_two_fingers() -> None:
+def test_a_scene_may_have_two_fingers_and_lasts_as_long_as_the_longest_path() -> None:
+    assert scene(TWO).simulation.duration == 0.7
     thumb, other = scene(TWO).fingers
     assert thumb.fingertip is not None
     assert (thumb.fingertip.length, thumb.relaxation is None, other.relaxation) == (14e-3, False, None)
     assert (thumb.trajectory.interpolation, other.trajectory.interpolation) == ("smooth", "linear")
-
-
-def test_a_session_lasts_as_long_as_the_longest_path() -> None:
-    assert scene(TWO).simulation.duration == 0.7
 
 
 @pytest.mark.parametrize("words", [TWO, "finger = []\nsimulation.duration = 1.0\n"])
@@ -143,14 +139,6 @@ def test_a_take_keeps_the_path_of_every_finger(words: str) -> None:
     back = from_bytes(to_bytes(take))
     assert np.array_equal(back.poses, take.poses)
     assert (back.scene, back.start, back.end) == (take.scene, take.start, take.end)
-
-
-def test_a_take_of_a_later_version_is_refused() -> None:
-    take, written = take_of(scene(ONE)), io.BytesIO()
-    with np.load(io.BytesIO(to_bytes(take))) as kept:
-        np.savez(written, **{**kept, "version": np.array(4)})
-    with pytest.raises(OutputError, match=r"its version must be at most 3 \(got 4\)"):
-        from_bytes(written.getvalue())
 
 
 def test_a_take_from_rest_is_a_scene_with_its_path() -> None:
