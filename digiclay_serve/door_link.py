@@ -26,7 +26,7 @@ class HeldError(DigiclayError):
 
 @dataclass(frozen=True)
 class Lease:
-    """Client that moves the fingertip, and the end of its lease, s; nobody before the first pose."""
+    """Client that moves the fingertip, and the end of its lease, s; none before the first pose."""
 
     holder: object = None
     until: float = 0.0
@@ -83,7 +83,7 @@ class DoorLink:
         changed.set()
 
     async def next_frame(self) -> None:
-        """Wait for a newer frame; whoever is busy misses some."""
+        """Wait for a newer frame; a busy reader misses some."""
         await self._changed.wait()
 
     def read_frame(self) -> Frame | None:

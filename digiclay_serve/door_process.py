@@ -58,13 +58,13 @@ def _read_exactly(count: int) -> bytes:
     while len(read) < count:
         part = os.read(0, count - len(read))
         if not part:
-            sys.exit(0)  # whoever started this has ended
+            sys.exit(0)  # the process that started this one has ended
         read += part
     return read
 
 
 def _tell(value: dict[str, Any]) -> None:
-    """Write a line of JSON for whoever started this."""
+    """Write a line of JSON for the process that started this one."""
     with suppress(BrokenPipeError):
         sys.stdout.write(json.dumps(value) + "\n")
         sys.stdout.flush()

@@ -167,7 +167,7 @@ TAKE = Content("take", ("take_[0-9][0-9][0-9].npz", f"take_[0-9][0-9][0-9]_part_
 
 
 class PartWriter(AbstractContextManager["PartWriter"]):
-    """Thread that writes parts into a folder, which nobody else writes until the block ends.
+    """Thread that writes parts into a folder, which no other process writes until the block ends.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ class _Connection(ServerConnection):
     door: _WebSocketDoor
 
     def connection_made(self, transport: Any) -> None:
-        """Begin, and cut the oldest of too many silent ones: whoever has the token sends it at once."""
+        """Begin, and cut the oldest of too many silent ones: a client with the token sends it at once."""
         super().connection_made(transport)
         silent = self.door.silent
         silent[self] = None

@@ -6,7 +6,7 @@ import ipaddress
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is this machine, reached by nobody else; other names are not looked up."""
+    """Return whether a host is this machine alone; other names are not looked up."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

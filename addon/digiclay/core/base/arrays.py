@@ -32,7 +32,7 @@ class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
     """Numbers such that arrays of a shape can be calculated with them: ``Constants((0.0, 1.0))[shape]``.
 
     Numpy takes two operands of one shape twice as fast as an array and a number, so for the
-    cells of one run, (n,), each becomes an array. These are kept and shared: nobody can write to them.
+    cells of one run, (n,), each becomes an array. These are kept, shared and read-only.
 
     Parameters
     ----------

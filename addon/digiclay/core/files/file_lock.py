@@ -54,7 +54,7 @@ def find_start(pid: int) -> float | None:
         os.kill(pid, 0)
     except ProcessLookupError:
         return None
-    except (OSError, OverflowError):  # it runs, and belongs to somebody else
+    except (OSError, OverflowError):  # it runs, and belongs to another user
         pass
     return _ask_ps(pid)
 
@@ -67,7 +67,7 @@ def _find_start_in_linux(pid: int) -> float | None:
     except OSError:
         return None
     state, *fields = told.rpartition(")")[2].split()  # the command's name may hold blanks and brackets
-    if state in "ZX":  # it has ended, and nobody has asked how
+    if state in "ZX":  # it has ended, and its parent has not asked how
         return None
     return int(booted[1]) + int(fields[18]) / os.sysconf("SC_CLK_TCK") if booted else 0.0
 
@@ -142,7 +142,7 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
     try:
         yield
     finally:
-        if os.name == "nt":  # an open file cannot be removed there; one that somebody waits for stays
+        if os.name == "nt":  # an open file cannot be removed there; one that another process waits for stays
             os.close(taken)
         with suppress(OSError):
             path.unlink()
@@ -164,7 +164,7 @@ def _take(path: Path) -> int | None:
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
         try:
             file = os.open(path, flags, 0o666)
-        except FileNotFoundError:  # whoever made the folder has just taken it away again
+        except FileNotFoundError:  # the process that made the folder has just removed it
             path.parent.mkdir(parents=True, exist_ok=True)
             continue
         try:

@@ -45,9 +45,9 @@ def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head
             raise ValueError(f"{name} must be stored or deflated")
         with archive.open(entry) as file:
             head = _head(file, name)
-            held = entry.file_size - file.tell()
-        if head.size != held:
-            raise ValueError(f"{name} must have {head.size:,} bytes, as its head says (got {held:,})")
+            actual = entry.file_size - file.tell()
+        if head.size != actual:
+            raise ValueError(f"{name} must have {head.size:,} bytes, as its head says (got {actual:,})")
         found[name] = head
     return found
 

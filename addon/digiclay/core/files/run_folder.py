@@ -180,7 +180,7 @@ RUN = Content("run", (MARK,))
 def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
     """Refuse, before any work is done, an output folder that could not be used in the end.
 
-    It may be empty, or with `overwrite` hold a run, or other content; any other is nobody's to delete.
+    It may be empty, or with `overwrite` hold a run, or other content; any other is refused.
     """
     try:
         filled = out.exists() and (not out.is_dir() or any(out.iterdir()))
@@ -215,13 +215,13 @@ def resolve_inside(folder: Path, *parts: str) -> Path:
 
 
 def find_lock(path: Path) -> Path:
-    """Return the lock of whoever makes a file or folder of this name."""
+    """Return the lock file for making a file or folder of this name."""
     target = path.resolve()
     return target.with_name(f".{target.name}.lock")
 
 
 def lock_name(path: Path, patience: float = 0.0) -> AbstractContextManager[None]:
-    """Hold the lock of whoever makes a file or folder of this name.
+    """Hold the lock for making a file or folder of this name.
 
     `patience`: time to wait for another process that is about to end, s.
     """
@@ -271,9 +271,9 @@ class Claim:
 def claim_folder(
     out: Path, *, overwrite: bool, patience: float = 0.0, content: Content = RUN
 ) -> Iterator[Claim]:
-    """Claim a folder before any work is done, or refuse it: nobody else may write it until the block ends.
+    """Claim a folder before any work, or refuse it: no other process may write it until the block ends.
 
-    Waits some seconds for somebody who is about to end; what killed runs of this name have left is removed.
+    Waits some seconds for a process about to end; what killed runs of this name have left is removed.
     """
     check_folder(out, overwrite=overwrite, content=content)
     target = out.resolve()
@@ -284,7 +284,7 @@ def claim_folder(
         except OSError as error:
             raise OutputError(f"{out} cannot be made: {error.strerror or error}.") from None
         remove_abandoned(target.parent, target.name)
-        check_folder(out, overwrite=overwrite, content=content)  # somebody else may just have ended
+        check_folder(out, overwrite=overwrite, content=content)  # another process may just have ended
         yield Claim(out, overwrite)
 
 
@@ -302,12 +302,12 @@ def _remove_if_empty(target: Path) -> Iterator[None]:
 
 @contextmanager
 def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
-    """Claim files in folders that are there already, such as a run's: nobody else writes them meanwhile.
+    """Claim files in folders that are there already, such as a run's: no other process writes them meanwhile.
 
     What killed processes have left unfinished of them is taken away.
 
-    `patience`: seconds to wait for somebody else who looks at the same folder. Raises OutputError when one is
-    claimed already, its folder is being written anew, or it cannot be made.
+    `patience`: seconds to wait for another process that looks at the same folder. Raises OutputError when one
+    is claimed already, its folder is being written anew, or it cannot be made.
     """
     with ExitStack() as until_the_end:
         try:

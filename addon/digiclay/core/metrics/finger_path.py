@@ -13,7 +13,7 @@ from ..base.modes import Mode
 
 Rows = NDArray[np.bool_]
 
-#: How far the finger must have gone on from a cell for it to count as left behind, m.
+#: How far the fingertip must have gone on from a cell for it to count as left behind, m.
 AWAY = 12e-3
 #: Distances from a finger to cells looked at at a time: those of a long session on a large bed would not fit
 #: in memory.
@@ -91,7 +91,7 @@ def sum_row(force: Floats, x: Floats, y: Floats, height: Floats) -> Floats:
 
 
 def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
-    """Return how far the blister is behind the finger, in the rows in contact.
+    """Return how far the blister is behind the fingertip, in the rows in contact.
 
     ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
     point, r_j the cells' positions.
@@ -105,7 +105,7 @@ def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
 
 
 def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
-    """Return how far the surface under the finger stands above its lowest point, in the rows in contact.
+    """Return how far the surface under the fingertip stands above its lowest point, in the rows in contact.
 
     ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
 
@@ -119,15 +119,15 @@ def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
 def measure_ridge_errors(
     position: ArrayLike, final: ArrayLike, fingertip: ArrayLike, rows: Rows, away: float = AWAY
 ) -> Floats:
-    """Return how far the cells the finger has passed over stand above its path at the end.
+    """Return how far the cells the fingertip has passed over stand above its path at the end.
 
     ``e_j = H_j(end) - z(t_j)``, t_j the last row of `rows` in which no cell is nearer to the
-    finger than cell j. A cell counts when the finger went on, in rows of the same unbroken
+    fingertip than cell j. A cell counts when the fingertip went on, in rows of the same unbroken
     stretch, to a place at least `away` from it: where it pressed or left is no ridge.
 
     `position` (n, 2), m; `final` (n,), heights at the end, m; `fingertip` (t, 7), lowest point, m, and
-    quaternion; `rows` bool (t,), rows in which the finger shapes; `away`, m. Returns (cells that count,), m,
-    in the order in which the finger passed them.
+    quaternion; `rows` bool (t,), rows in which the fingertip shapes; `away`, m. Returns (cells that count,),
+    m, in the order in which the fingertip passed them.
     """
     place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
     chosen = np.flatnonzero(rows)

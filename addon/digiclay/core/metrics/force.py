@@ -206,7 +206,7 @@ def compute_rfd(
 
     `time` (t,), s; `total_force` (t,), N; `set_point` (t,) or (), total force asked for, N; rows in which it
     is NaN are left out; `rows` bool (t,), rows to judge; those in contact by default. They include touching
-    down, and leave out the gaps when the finger is lost: read it next to `compute_contact_loss_share`.
+    down, and leave out the gaps when the fingertip is lost: read it next to `compute_contact_loss_share`.
     Returns none when there is no such row.
     """
     force = np.asarray(total_force, dtype=np.float64)
@@ -219,9 +219,9 @@ def compute_rfd(
 def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
     """Return the share of the time from first to last contact without contact.
 
-    A pause the session makes on purpose, with the finger lifted, counts as well.
+    A pause the session makes on purpose, with the fingertip lifted, counts as well.
 
-    `time` (t,), s; `total_force` (t,), N. Returns in [0, 1); None when the finger never touches.
+    `time` (t,), s; `total_force` (t,), N. Returns in [0, 1); None when the fingertip never touches.
     """
     touching = find_contact_rows(total_force)
     if not np.any(touching):

@@ -2,7 +2,7 @@
 
 Averages are over time, by the trapezium rule: a row stands for half of the intervals on
 either side of it, so histories with uneven rows are judged alike. *In contact* are the
-rows with a total force above zero; the finger cannot pull, and a force it no longer
+rows with a total force above zero; the fingertip cannot pull, and a force it no longer
 exerts is exactly zero.
 """
 
@@ -96,8 +96,8 @@ def compute_metrics_from_sums(
 
     `sums`: of t rows of n cells; `time` (t,), s; `fingertip` (t, 7), lowest point, m, and quaternion;
     `position` (n, 2), m; ordered row by row; `set_point`: force asked for; None where none is; `near`: the
-    cells that are the nearest to the finger at some time, where they are known: only they can be left behind
-    in a ridge. Returns see `compute_metrics`.
+    cells that are the nearest to the fingertip at some time, where they are known: only they can be left
+    behind in a ridge. Returns see `compute_metrics`.
     """
     total, weight, felt, rows = sums.total, compute_weights(time), sums.touching, sums.shaping
     # A fingertip straight above its blister is a rounding error away from it, not 1e-17 m.

@@ -133,7 +133,7 @@ def _make_lag(scene: Scene) -> Lag:
 
 
 def _make_touch(scene: Scene) -> Touch | None:
-    """Return the finger, or None."""
+    """Return the fingertip, or None."""
     finger = require_one(scene.fingers)
     if finger.fingertip is None or finger.contact is None:
         return None
@@ -141,7 +141,7 @@ def _make_touch(scene: Scene) -> Touch | None:
 
 
 def _make_pulp(finger: Finger) -> Pulp:
-    """Return how the finger's pulp relaxes."""
+    """Return how the fingertip's pulp relaxes."""
     if finger.relaxation:
         return finger.relaxation
     from ..model.null_parts import Unrelaxed

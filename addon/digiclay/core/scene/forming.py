@@ -16,7 +16,7 @@ from ..model.layout import Grid
 from ..model.trajectory import Path, Waypoint
 from .schema import Scene
 
-#: What the finger does, in s and m above the height at which it first touches.
+#: What the fingertip does, in s and m above the height at which it first touches.
 GESTURES: dict[str, tuple[tuple[float, float], ...]] = {
     "pull": (
         (0.0, 20e-3), (0.6, 2e-3), (1.6, -5e-3), (1.8, -5e-3), (2.2, -4e-3), (4.2, 6e-3), (4.5, 6e-3),

@@ -164,7 +164,7 @@ class HistoryWriter:
 
 
 class RunRecording(Recording):
-    """The recording of one run, which is written into its history as it goes on.
+    """The recording of one run, which is written into its history meanwhile.
 
     Parameters
     ----------

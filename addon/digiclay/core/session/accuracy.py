@@ -25,7 +25,7 @@ from ..model.trajectory import interpolate_poses
 from ..scene.assembly import assemble
 from ..scene.schema import Scene, Simulation
 
-#: Control periods of a session: the state after each, and the finger at both ends of it, (2, f, 7).
+#: Control periods of a session: the state after each, and the fingertip at both ends of it, (2, f, 7).
 Noted = tuple[tuple[State, Floats], ...]
 
 #: The reference's own error is taken to be a quarter of that of the run: halving the step leaves so much of
@@ -79,7 +79,7 @@ class ErrorMonitor:
         Control periods of the session in the tick before.
     waiting : tuple of (State, ndarray)
         Periods of the stretch that the reference has still to do: the session after each, of which only the
-        active cells are as they were then, and the finger at both ends of it.
+        active cells are as they were then, and the fingertip at both ends of it.
     reached : ndarray (2, n) or None
         Heights, m, and forces, N, of the session at the end of the stretch.
     """
@@ -176,7 +176,7 @@ def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
     """Return the monitor with the control period that a session has just done.
 
     `monitor`: given the state before by `begin_stretch`, or by the period before; `after`: the session's, at
-    the end of the period; `path` (2, f, 7), the finger at both ends of the period; see
+    the end of the period; `path` (2, f, 7), the fingertip at both ends of the period; see
     `live_session.simulate_path`.
     """
     monitor = replace(monitor, age=monitor.age + 1)

@@ -22,7 +22,7 @@ from . import snapshot
 #: Over how much of the wall's time the real-time factor is taken, s.
 WINDOW = 1.0
 #: Longest time the periods of one tick may take, as a share of the time between two ticks: the rest
-#: is for drawing, and for whoever works in the window.
+#: is for drawing, and for the person at the window.
 SHARE = 0.7
 #: Shortest time between two ticks that is counted with, s: ticks may come in a burst.
 SHORTEST = 1e-2
@@ -58,7 +58,7 @@ class Clock:
         return sum(done for _, done in self.ticks) / gone if gone > 0.0 else 0.0
 
     def stopped(self) -> Clock:
-        """Return the clock of a session that pauses: the time until it goes on will not count."""
+        """Return the clock of a session that pauses: the time of the pause will not count."""
         return replace(self, seen=None, left=0.0, ticks=())
 
 
@@ -167,7 +167,7 @@ class Recording:
         Poses of the fingers at the end of each period, what was smoothed in it, see `core.control.smoothing`,
         and the moment it was simulated in; row 0: the start.
     count : int
-        How many of the rows are in use. Those behind belong to nobody.
+        How many of the rows are in use.
     saved : int
         How many of those the file has, as a take.
     """

@@ -44,22 +44,22 @@ def count_bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, period
     `rows`: of the state; `busy`: cells that may take part at once, where they are more than those under a
     finger.
     """
-    held = 8 * rows.count + BYTES_BESIDE
+    each_cell = 8 * rows.count + BYTES_BESIDE
     at_work = BYTES_BUSY
     if recorder is not None:
-        held += recorder.rows(periods) * BYTES_A_CELL + BYTES_JUDGED
+        each_cell += recorder.rows(periods) * BYTES_A_CELL + BYTES_JUDGED
         at_work += BYTES_WAITING
-    return cells * held + busy * at_work
+    return cells * each_cell + busy * at_work
 
 
 def measure_available_memory() -> int:
     """Return how many bytes this machine can still give."""
     linux = Path("/proc/meminfo")
-    told = (
+    answer = (
         re.search(r"MemAvailable:\s+(\d+) kB", linux.read_text(encoding="ascii")) if linux.exists() else None
     )
-    if told:
-        return int(told[1]) * 1024
+    if answer:
+        return int(answer[1]) * 1024
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):

@@ -83,8 +83,8 @@ def pick(trace: RecentTrace, pins: Sequence[int], count: int) -> RecentTrace:
 
 def measure_total_force(system: System, state: State) -> float:
     """Return the total force on the bed, N."""
-    held = state.active
-    return float(held.block[system.rows.force, : held.near].sum())
+    active = state.active
+    return float(active.block[system.rows.force, : active.near].sum())
 
 
 def exceeds_law(system: System, state: State, pose: Floats) -> bool:
@@ -109,12 +109,12 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
 
 def sample(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
     """Return what a trace keeps of a state. `pins`: whose heights are kept."""
-    held = state.active
+    active = state.active
     heights = [math.nan] * PICKED
     for column, pin in enumerate(pins):
-        (at,) = np.nonzero(held.cells == pin)
-        heights[column] = float(held.block[0, at[0]] if at.size else state.rows[0, pin])
-    wanted = find_set_point(set_point, np.count_nonzero(held.mode == Mode.FORCE_FOLLOW))
+        (at,) = np.nonzero(active.cells == pin)
+        heights[column] = float(active.block[0, at[0]] if at.size else state.rows[0, pin])
+    wanted = find_set_point(set_point, np.count_nonzero(active.mode == Mode.FORCE_FOLLOW))
     return [state.period * system.period, measure_total_force(system, state), float(wanted), *heights]
 
 

@@ -98,8 +98,8 @@ def _check_number(template: Any, kept: Any) -> None:
         raise ValueError("a number that is too large")
 
 
-#: What kept bytes start with; the number changes when their arrangement does. Of the first one, the finger's
-#: entry stood by itself.
+#: First bytes of a snapshot; the number changes with their arrangement. In the first version the entry of the
+#: fingertip stood by itself.
 START, FIRST = b"digiclay state 2\n", b"digiclay state 1\n"
 #: How far rounding may take a height, m, or an opening beyond its ends.
 SLACK = 1e-6
@@ -121,7 +121,7 @@ class Snapshot:
 
 
 def dump(system: System, state: State) -> bytes:
-    """Return a state as bytes, which do not change when the session goes on."""
+    """Return a state as bytes, which do not change as the session continues."""
     held, rows = state.active, system.rows
     arrays: list[NDArray[Any]] = []
     memory = flatten(state.memory, arrays)

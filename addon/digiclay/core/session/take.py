@@ -50,7 +50,7 @@ class Take:
     Attributes
     ----------
     scene : Scene
-        Its trajectory is not used: the finger follows `poses`.
+        Its trajectory is not used: the fingertip follows `poses`.
     start, end : bytes
         The states before and after, from `snapshot.dump`.
     poses : ndarray (t + 1, f, 7)
