@@ -103,7 +103,7 @@ class PointerStroke(Parameters):
 
 @dataclass(frozen=True)
 class Recorded:
-    """Strokes of a file, and the bed they were drawn on: a name of `settings.beds.BEDS`."""
+    """Strokes of a file, and the bed they were drawn on: a name of `settings.devices.BEDS`."""
 
     name: str
     bed: str
