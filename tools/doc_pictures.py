@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from math import radians
 from pathlib import Path
 
 from digiclay.cli import main as digiclay
@@ -24,6 +25,17 @@ scenes = ["ridge_mound_valley"]
 [film]
 """
 FRAME = 300
+#: Size of each of the four views, pixels; how much of the world one shows, mm.
+SIZE, SHOWN = (576, 395), 116.0
+#: Colors of solids, bosses and creases: told apart with any color vision.
+GRAY, ORANGES, BLUE = (0.55, 0.60, 0.65), ((0.80, 0.36, 0.02), (1.0, 0.70, 0.20)), (0.02, 0.32, 0.75)
+#: What is exported for each view.
+VIEWS = (
+    ["--kind", "solid"],
+    ["--kind", "solid", "--skin", "smooth", "--resolution", "8"],
+    ["--kind", "pins"],
+    ["--kind", "features", "--separate", "--skin", "smooth", "--resolution", "8"],
+)
 
 
 def carry_out(*words: str | Path) -> None:
@@ -67,18 +79,66 @@ def draw_film(folder: Path) -> None:
 def draw_series(folder: Path) -> None:
     """Show the page of the sample series in Chromium; its jobs take minutes."""
     carry_out("batch", "first", "--out", folder / "first", "--quiet")
-    shown = folder / "page.png"
-    size = ",".join(map(str, SERIES))
-    options = (
-        "--headless",
-        "--no-sandbox",
-        "--hide-scrollbars",
-        f"--window-size={size}",
-        f"--screenshot={shown}",
-    )
-    page = (folder / "first" / "index.html").as_uri()
-    subprocess.run(["chromium", *options, page], check=True, capture_output=True, timeout=300)
+    shown, page = folder / "page.png", (folder / "first" / "index.html").as_uri()
+    options = ("--headless", "--no-sandbox", "--hide-scrollbars", "--window-size={},{}".format(*SERIES))
+    command = ["chromium", *options, f"--screenshot={shown}", page]
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
     save_jpeg(shown, "batch.jpg")
+
+
+def set_up_scene() -> None:
+    """Set up an empty scene with a camera that looks down on the bed from the front left."""
+    import bpy
+    from mathutils import Vector
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera, camera.data.type, camera.data.ortho_scale = camera, "ORTHO", SHOWN
+    camera.data.clip_end = 1e4
+    camera.rotation_euler = radians(55.0), 0.0, radians(32.0)
+    bpy.context.view_layer.update()
+    camera.location = Vector((0.0, 0.0, 36.0)) + camera.matrix_world.to_3x3() @ Vector((0.0, 0.0, 500.0))
+    scene.render.engine = "BLENDER_WORKBENCH"
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.film_transparent = True
+    scene.display.shading.color_type = "OBJECT"
+    scene.display.shading.show_cavity = True
+    scene.display.shading.show_specular_highlight = False
+    scene.display.render_aa = "16"
+    scene.view_settings.view_transform = "Standard"
+
+
+def render(meshes: list[Path], out: Path) -> Image.Image:
+    """Draw meshes, mm, and return the picture on white."""
+    import bpy
+
+    set_up_scene()
+    bosses = 0
+    for mesh in sorted(meshes):
+        bpy.ops.wm.stl_import(filepath=str(mesh))
+        color = BLUE if mesh.stem.startswith("crease") else GRAY
+        if mesh.stem.startswith("boss"):
+            color, bosses = ORANGES[bosses % len(ORANGES)], bosses + 1
+        bpy.context.object.color = (*color, 1.0)
+    bpy.context.scene.render.filepath = str(out)
+    bpy.ops.render.render(write_still=True)
+    drawn = Image.open(out).convert("RGBA")
+    white = Image.new("RGBA", drawn.size, "white")
+    return Image.alpha_composite(white, drawn).convert("RGB")
+
+
+def draw_export(folder: Path) -> None:
+    """Draw by Workbench what `digiclay export` writes of the paper's session, four views in one."""
+    whole = Image.new("RGB", (2 * SIZE[0], 2 * SIZE[1]), "white")
+    carry_out("run", "ridge_mound_valley", "--out", folder / "run", "--quiet")
+    for index, options in enumerate(VIEWS):
+        out = folder / str(index)
+        carry_out("export", folder / "run", "--format", "stl", "--out", out, *options)
+        view = render(list(out.glob("*.stl")), folder / f"{index}.png")
+        whole.paste(view, (index % 2 * SIZE[0], index // 2 * SIZE[1]))
+    whole.save(PICTURES / "export.jpg", quality=88)
 
 
 DRAWN: dict[str, Callable[[Path], None]] = {
@@ -86,6 +146,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "session.png": draw_session,
     "film.jpg": draw_film,
     "batch.jpg": draw_series,
+    "export.jpg": draw_export,
 }
 
 

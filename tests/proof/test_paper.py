@@ -6,11 +6,13 @@ import csv
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.cli import main
 
+from digiclay_paper.claims import CLAIMS
 from digiclay_paper.results import DRAGS
 from digiclay_paper.scenes import COMPARED
 
@@ -29,6 +31,12 @@ def text(folder: Path) -> str:
     return (folder / "paper.md").read_text(encoding="utf-8")
 
 
+@pytest.fixture(scope="module")
+def numbers(folder: Path) -> dict[str, Any]:
+    """Return the measured numbers."""
+    return json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+
+
 def claims(text: str) -> list[list[str]]:
     """Return the cells of the rows of claims."""
     table = text.split("## Claims")[1].split("## Figures")[0]
@@ -42,31 +50,26 @@ def test_every_file_the_page_names_is_there_and_nothing_else(folder: Path, text:
     assert sorted(path.name for path in folder.iterdir()) == sorted([*named, "paper.md", "metrics.json"])
 
 
-def test_every_picture_is_a_vector_file_with_lettered_panels(folder: Path) -> None:
+def test_every_figure_is_a_vector_file_with_lettered_panels_and_its_data_beside_it(folder: Path) -> None:
     for path in folder.glob("*.svg"):
         content = path.read_text(encoding="utf-8")
         assert content.startswith("<?xml")
         # Letters are outlines, and what they say is a comment beside each.
         letters = re.findall(r"<!-- \(([a-z])\)", content)
         assert sorted(letters) == [chr(ord("a") + number) for number in range(len(letters))] != []
-
-
-def test_every_figure_has_its_data_beside_it(folder: Path) -> None:
-    for path in folder.glob("*.svg"):
         with path.with_suffix(".csv").open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
         assert len(rows) >= 8  # two curves of two points in each of two panels
         # Two panels have names for one axis.
-        named = set(DRAGS)
-        numbers = [row[name] for row in rows for name in ("x", "y") if row[name] not in named]
+        numbers = [row[name] for row in rows for name in ("x", "y") if row[name] not in DRAGS]
         assert np.isfinite(np.array(numbers, dtype=float)).all()
         assert [row for row in rows if "panel" in row and not row["x_axis"]] == []
 
 
-def test_the_data_of_the_surfaces_are_the_final_heights(folder: Path) -> None:
+def test_the_data_of_the_surfaces_are_the_final_heights(folder: Path, numbers: dict[str, Any]) -> None:
     with (folder / "fig10_surfaces.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["session"]
+    known = numbers["session"]
     assert {row["method"] for row in rows} == set(COMPARED)
     for method in COMPARED:
         heights = [float(row["height (mm)"]) for row in rows if row["method"] == method]
@@ -75,49 +78,43 @@ def test_the_data_of_the_surfaces_are_the_final_heights(folder: Path) -> None:
         assert len(heights) == 625
 
 
-def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_rim(folder: Path) -> None:
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["sections"]
+def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_rim(
+    numbers: dict[str, Any],
+) -> None:
+    known = numbers["sections"]
     assert [name for name, one in known["virtual_master"].items() if not one["meets"]] == []
     mound = known["cell_states"]["along ridge and mound"]
     assert not mound["meets"]
     assert [mound["rim"], mound["rim_by_pins"]] == pytest.approx([4.5e-3, 6.2e-3], abs=0.1e-3)
 
 
-def test_every_claim_says_what_the_paper_says_what_was_measured_and_how_it_came_out(text: str) -> None:
+def test_every_claim_has_numbers_a_verdict_and_a_reason_where_it_does_not_hold(text: str) -> None:
     rows = claims(text)
-    assert len(rows) == 16
+    assert len(rows) == len(CLAIMS)
     assert [row for row in rows if len(row) != 4 or not all(row[:3])] == []
-
-
-def test_every_claim_was_measured_in_numbers(text: str) -> None:
-    assert [row[0] for row in claims(text) if not re.search(r"\d|never lost", row[1])] == []
-
-
-def test_a_claim_that_does_not_hold_says_why(text: str) -> None:
-    assert [row[0] for row in claims(text) if row[2] != "**holds**" and not row[3]] == []
-
-
-def test_no_claim_is_left_with_something_that_is_no_number(text: str) -> None:
+    assert [row[0] for row in rows if not re.search(r"\d|never lost", row[1])] == []
+    assert [row[0] for row in rows if row[2] != "**holds**" and not row[3]] == []
     assert re.findall(r"\b(?:nan|inf|None)\b", text) == []
 
 
-def test_the_numbers_of_the_page_are_those_of_the_metrics(folder: Path, text: str) -> None:
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    one, two = (known["session"][method]["rfd_shaping"] for method in ("virtual_master", "cell_states"))
+def test_the_numbers_of_the_page_are_those_of_the_metrics(text: str, numbers: dict[str, Any]) -> None:
+    one, two = (numbers["session"][method]["rfd_shaping"] for method in ("virtual_master", "cell_states"))
     assert f"{one:.3g} and {two:.3g} N, ratio {two / one:.1f}" in text
 
 
-def test_method_two_deviates_more_than_method_one(folder: Path) -> None:
+def test_method_two_deviates_more_than_method_one(numbers: dict[str, Any]) -> None:
     # The paper's claim; measured five to seven times, so half more is far from chance.
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["session"]
+    known = numbers["session"]
     one, two = known["virtual_master"], known["cell_states"]
     ratios = {name: two[name] / one[name] for name in ("height_deviation", "force_deviation", "rfd_shaping")}
     assert {name: ratio for name, ratio in ratios.items() if not ratio > 1.5} == {}
 
 
-def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_much(folder: Path) -> None:
+def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_much(
+    numbers: dict[str, Any],
+) -> None:
     # RFD, total force, height. Both windows together: the level of Method II differs between them.
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["windows_of_the_paper"]
+    known = numbers["windows_of_the_paper"]
     for window, ratios in (("both", (4.5, 8.5, 5.5)), ("valley alone", (4.3, 1.5, 1.4))):
         one, two = (list(known[method][window].values()) for method in ("virtual_master", "cell_states"))
         assert np.array(two) / one == pytest.approx(ratios, abs=0.1)  # two digits are claimed
@@ -132,8 +129,8 @@ def test_an_older_folder_is_kept_unless_it_may_be_replaced(
     assert (folder / "paper.md").stat().st_mtime_ns == before
 
 
-def test_the_page_sets_method_three_beside_the_others(folder: Path, text: str) -> None:
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["session"]
+def test_the_page_sets_method_three_beside_the_others(text: str, numbers: dict[str, Any]) -> None:
+    known = numbers["session"]
     table = text.split("## Method III")[1].split("## Fig. 3")[0]
     row = next(line for line in table.splitlines() if line.startswith("| RFD in the session (N)"))
     shown = [float(cell) for cell in row.strip("|").split("|")[1:]]

@@ -47,18 +47,43 @@ def png_size(path) -> tuple[int, int]:
     return struct.unpack(">II", content[16:24])
 
 
-def test_the_session_has_heights_and_force_over_time_with_units():
-    figure = plots.session_figure(drag(), SetPoint(0.4))
-    assert axes(figure, "heights").get_ylabel() == "height (mm)"
-    assert axes(figure, "force").get_ylabel() == "force (N)"
-    assert axes(figure, "force").get_xlabel() == "time (s)"
+@pytest.fixture(scope="module")
+def session():
+    """The picture of the session, drawn once."""
+    return plots.session_figure(drag(), SetPoint(0.37))
 
 
-def test_the_session_shows_the_total_force_and_its_set_point():
+@pytest.fixture(scope="module")
+def surface():
+    """The picture of the final surface, drawn once."""
+    return plots.surface_figure(drag())
+
+
+def test_every_axis_has_its_unit_and_every_curve_its_name(session, surface):
+    drawn = [axes(session, label) for label in ("heights", "force")]
+    drawn += [axes(surface, label) for label in ("relief", "map", "scale")]
+    found = {part.get_label(): (part.get_xlabel(), part.get_ylabel()) for part in drawn}
+    plan = ("x (mm)", "y (mm)")
+    assert found == {
+        "heights": ("", "height (mm)"), "force": ("time (s)", "force (N)"), "relief": plan, "map": plan,
+        "scale": ("", "height (mm)"),
+    }  # fmt: skip
+    assert axes(surface, "relief").get_zlabel() == "height (mm)"
+    legends = [axes(session, label).get_legend().get_texts() for label in ("heights", "force")]
+    names = [text.get_text() for texts in legends for text in texts]
+    assert names == [*"ABCDEF", "total force", "set point 0.37 N", "in contact"]
+
+
+def test_the_session_shows_force_set_point_and_the_chosen_cells_over_one_time(session):
     case = drag()
-    total, set_point = axes(plots.session_figure(case, SetPoint(0.37)), "force").get_lines()
+    total, set_point = axes(session, "force").get_lines()
     np.testing.assert_array_equal(total.get_ydata(), case["total_force"])
     assert set(set_point.get_ydata()) == {0.37}
+    lines, cells = axes(session, "heights").get_lines(), plots.session_cells(case)
+    assert len(lines) == len(cells) == 6
+    for line, cell in zip(lines, cells, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), case["height"][:, cell] * 1e3)
+    assert axes(session, "heights").get_xlim() == axes(session, "force").get_xlim() == (0.0, 10.0)
 
 
 def test_a_set_point_of_each_cell_is_drawn_as_their_number_changes():
@@ -80,30 +105,6 @@ def test_a_method_without_a_set_point_has_neither_it_nor_a_deviation_in_the_pict
     assert "largest force" in words
     assert "set point" not in words
     assert "RFD" not in words
-
-
-def test_the_session_shows_the_chosen_cells_in_millimeters():
-    case = drag()
-    lines = axes(plots.session_figure(case, SetPoint(0.4)), "heights").get_lines()
-    cells = plots.session_cells(case)
-    assert len(lines) == len(cells) == 6
-    for line, cell in zip(lines, cells, strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), case["height"][:, cell] * 1e3)
-
-
-def test_both_panels_of_the_session_share_their_time():
-    figure = plots.session_figure(drag(), SetPoint(0.4))
-    assert axes(figure, "heights").get_xlim() == axes(figure, "force").get_xlim() == (0.0, 10.0)
-
-
-def test_every_curve_of_the_session_is_in_a_legend():
-    figure = plots.session_figure(drag(), SetPoint(0.4))
-    names = [
-        text.get_text()
-        for label in ("heights", "force")
-        for text in axes(figure, label).get_legend().get_texts()
-    ]
-    assert names == [*"ABCDEF", "total force", "set point 0.4 N", "in contact"]
 
 
 def test_the_chosen_cells_follow_the_finger_from_first_to_last_contact():
@@ -135,27 +136,17 @@ def test_without_contact_the_cells_that_moved_most_are_shown():
     assert 30 in plots.session_cells(case)
 
 
-def test_the_surface_has_millimeters_on_every_axis_and_a_color_bar():
-    figure = plots.surface_figure(drag())
-    relief, plan = axes(figure, "relief"), axes(figure, "map")
-    assert (relief.get_xlabel(), relief.get_ylabel(), relief.get_zlabel()) == (
-        "x (mm)",
-        "y (mm)",
-        "height (mm)",
-    )
-    assert (plan.get_xlabel(), plan.get_ylabel()) == ("x (mm)", "y (mm)")
-    assert axes(figure, "scale").get_ylabel() == "height (mm)"
-
-
-def test_the_surface_is_to_scale():
-    figure = plots.surface_figure(drag())
-    relief = axes(figure, "relief")
-    extent = np.array(
-        [np.ptp(limits) for limits in (relief.get_xlim(), relief.get_ylim(), relief.get_zlim())]
-    )
-    ratio = relief._box_aspect / extent
+def test_the_surface_is_to_scale_and_shows_the_final_heights_and_the_path(surface):
+    case, relief, plan = drag(), axes(surface, "relief"), axes(surface, "map")
+    extent = [np.ptp(limits) for limits in (relief.get_xlim(), relief.get_ylim(), relief.get_zlim())]
+    ratio = relief._box_aspect / np.array(extent)
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)  # the same mm on all three axes
-    assert axes(figure, "map").get_aspect() == 1.0
+    assert plan.get_aspect() == 1.0
+    final = case["height"][-1] * 1e3
+    assert axes(surface, "scale").get_ylim() == pytest.approx((final.min(), final.max()), rel=1e-12)
+    lifted, pressed = plan.get_lines()
+    assert (lifted.get_label(), pressed.get_label()) == ("lifted", "in contact")
+    np.testing.assert_array_equal(~np.isnan(pressed.get_xdata()), case["total_force"] > 0.0)
 
 
 @pytest.mark.parametrize(
@@ -174,20 +165,6 @@ def test_no_text_on_the_relief_hides_another(rows, columns, share):
     )
 
 
-def test_the_color_bar_spans_the_final_heights():
-    case = drag()
-    low, high = axes(plots.surface_figure(case), "scale").get_ylim()
-    final = case["height"][-1] * 1e3
-    assert (low, high) == pytest.approx((final.min(), final.max()), rel=1e-12)
-
-
-def test_the_map_shows_the_fingers_path_in_contact_and_lifted():
-    lifted, pressed = axes(plots.surface_figure(drag()), "map").get_lines()
-    assert (lifted.get_label(), pressed.get_label()) == ("lifted", "in contact")
-    seen = ~np.isnan(pressed.get_xdata())
-    np.testing.assert_array_equal(seen, drag()["total_force"] > 0.0)
-
-
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
 def test_both_pictures_are_written_at_their_size(tmp_path, arrangement):
     case = drag(arrangement=arrangement)
@@ -199,15 +176,11 @@ def test_both_pictures_are_written_at_their_size(tmp_path, arrangement):
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1)])
-def test_a_single_row_or_column_still_has_a_session(tmp_path, shape):
-    assert plots.session(drag(*shape), tmp_path / "session.png", SetPoint(0.4)).stat().st_size > 40_000
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1)])
-def test_a_single_row_or_column_has_no_surface(tmp_path, shape):
+def test_a_single_row_or_column_has_a_session_and_no_surface(tmp_path, shape):
     with pytest.raises(ParameterError, match="2 x 2 pins at least"):
         plots.surface(drag(*shape), tmp_path / "surface.png")
     assert not list(tmp_path.iterdir())
+    assert plots.session(drag(*shape), tmp_path / "session.png", SetPoint(0.4)).stat().st_size > 40_000
 
 
 def test_a_session_of_one_row_can_be_drawn(tmp_path):
@@ -224,15 +197,10 @@ def test_a_folder_that_is_not_there_is_one_line(tmp_path):
 def python(script: str) -> str:
     """Run a script in a fresh interpreter and return what it prints."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        capture_output=True,
-        text=True,
-        timeout=TIMEOUT,
-        check=True,
-        env=environment,
-    )
-    return done.stdout
+    command = [sys.executable, "-c", script]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=TIMEOUT, check=True, env=environment
+    ).stdout
 
 
 def test_matplotlib_is_not_imported_before_it_is_needed():
