@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from digiclay.core.studies.speed_limits import Criterion, Follows, find_free_speed
+from digiclay.core.studies.speed_limits import Follows, find_free_speed
 
 from . import scenes
 from .relief_sections import LIMITS, Section, blister_section, sections
@@ -57,16 +57,15 @@ def speed(found: float | None) -> str:
 def relief(results: Results) -> Evidence:
     """Whether ridge, mound and valley have the sections asked for."""
     found = {method: list(sections(results.session[method])) for method in METHODS}
-    told = [f"{SHORT[method]}, {_told(one)}" for method in METHODS for one in found[method]]
-    level = {
-        method: ", ".join(f"{part} {one.level * MM:.1f} mm" for part, one in _parts(found[method]).items())
-        for method in METHODS
-    }
+    told = [f"{SHORT[method]}, {_write_section(one)}" for method in METHODS for one in found[method]]
+    levels = []
+    for method in METHODS:
+        parts = {one.part: f"{one.part} {one.level * MM:.1f} mm" for one in found[method]}
+        levels.append(f"{SHORT[method]} {', '.join(parts.values())}")
     why = (
         f"A section holds when its shape is {LIMITS}. Asked for is the method's own blister carried along "
         "the finger's path, at the level that was formed: beyond the finger's lowest point by "
-        + "; ".join(f"{SHORT[method]} {level[method]}" for method in METHODS)
-        + ". "
+        f"{'; '.join(levels)}. "
     )
     missed = [one.name for one in found[TWO] if not one.meets(LIMITS)]
     if missed:
@@ -78,11 +77,7 @@ def relief(results: Results) -> Evidence:
     return Evidence(told, [one.meets(LIMITS) for method in METHODS for one in found[method]], why.strip())
 
 
-def _parts(found: list[Section]) -> dict[str, Section]:
-    return {one.part: one for one in found}
-
-
-def _told(one: Section) -> str:
+def _write_section(one: Section) -> str:
     rim = f", rim {one.rim * MM:.1f} mm over its middle, {one.pins * MM:.1f} mm by all pins of the {one.part}"
     rim = rim if max(one.rim, one.pins) > LIMITS.rim * one.relief else ""
     low = abs(one.level) > LIMITS.level * one.middle
@@ -99,27 +94,16 @@ def tracking(results: Results) -> Evidence:
         for method in METHODS
         for name in WAYS
     ]
-    found = results.simple
-    missed = _missed(found, results.criterion)
-    return Evidence(
-        told,
-        [one.meets(results.criterion) for one in found.values()],
-        f"Not followed: {missed}." if missed else "",
-    )
+    holds = {key: one.meets(results.criterion) for key, one in results.simple.items()}
+    missed = "; ".join(f"{SHORT[method]}, {name}" for (method, name), follows in holds.items() if not follows)
+    return Evidence(told, list(holds.values()), f"Not followed: {missed}." if missed else "")
 
 
 def _followed(one: Follows) -> str:
-    lost = "never lost" if one.losses == 0 and one.loss_share == 0.0 else _lost(one)
+    lost = f"lost {one.losses} times, {one.loss_share:.0%} of the time without contact"
+    if one.losses == 0 and one.loss_share == 0.0:
+        lost = "never lost"
     return f"{lost}, lag ≤ {one.lag * MM:.1f} mm, RFD {one.rfd:.3f} N"
-
-
-def _lost(one: Follows) -> str:
-    return f"lost {one.losses} times, {one.loss_share:.0%} of the time without contact"
-
-
-def _missed(found: dict[tuple[str, str], Follows], criterion: Criterion) -> str:
-    missed = [f"{SHORT[method]}, {name}" for (method, name), one in found.items() if not one.meets(criterion)]
-    return "; ".join(missed)
 
 
 def largest_speed(results: Results) -> Evidence:
@@ -141,11 +125,6 @@ def largest_speed(results: Results) -> Evidence:
 MUCH = 1.5
 #: A response is quicker that takes less than this share of the time.
 QUICKER = 0.9
-
-
-def _ratio(results: Results, name: str) -> float | None:
-    one, two = (results.session[method].metrics[name] for method in METHODS)
-    return None if one is None or two is None or one == 0.0 else two / one
 
 
 DEVIATIONS = {
@@ -206,11 +185,12 @@ def reference_force(results: Results) -> Evidence:
             f"{_newton(known['rfd_shaping'])} while shaping, "
             f"{drag.rfd:.3f} N dragging a ridge at {PAPER_SPEED * MM:g} mm/s"
         )
-    ratios = [_ratio(results, name) or 0.0 for name in ("rfd", "rfd_shaping")]
+    pairs = [[results.session[method].metrics[name] for method in METHODS] for name in ("rfd", "rfd_shaping")]
+    greater = [bool(one and two and two > one) for one, two in pairs]
     less = [results.simple[ONE, name].rfd < results.simple[TWO, name].rfd for name in WAYS]
     return Evidence(
         told,
-        [*(ratio > 1.0 for ratio in ratios), *less],
+        [*greater, *less],
         "The paper's own values are not among what this project has of it, so ours stand alone.",
     )
 
@@ -337,11 +317,8 @@ def freezing(results: Results) -> Evidence:
             f"{SHORT[method]}: left {offset * MM:.2f} mm over the finger's path, even to {uneven * MM:.2f} mm"
         )
         holds.append(uneven < 1e-3)
-    return Evidence(
-        told,
-        holds,
-        "Over the path is how far the pins press into the finger, and what they rise once it has passed.",
-    )
+    why = "Over the path is how far the pins press into the finger, and what they rise once it has passed."
+    return Evidence(told, holds, why)
 
 
 def carried_out(results: Results) -> Evidence:

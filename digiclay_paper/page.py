@@ -192,54 +192,35 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
 def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
     """Return what is drawn: file name to caption and what draws it."""
     slow = f", {results.slow:g} times as long" if results.slow > 1.0 else ""
-    title = f"The paper's session{slow}"
-    pictures: dict[str, tuple[str, Callable[[], Any]]] = {
-        "fig04_blisters": (
-            "Fig. 4: blisters in section, convex and concave, both profiles and all methods",
-            lambda: paper_figures.blisters(results),
-        ),
-        "fig06_freezing": (
-            "Fig. 6: sections along a drag at several times, with the frozen cells",
-            lambda: paper_figures.freezing(results),
-        ),
-        "fig08_session": (
-            f"Fig. 8: heights of selected cells and total force over time{slow}",
-            lambda: figures_session.heights_and_force(results.session, title),
-        ),
-    }
-    if slow:
-        pictures["fig08_own_times.png"] = (
-            "Fig. 8 again, at the session's own times",
-            lambda: figures_session.heights_and_force(
-                results.printed, "The paper's session at its own times"
-            ),
-        )
-    return pictures | {
-        "fig09_details": (
-            "Fig. 9: a detail of the session's heights: the first press, and what swings in the lift",
-            lambda: figures_session.details(results, "Details of the heights in the paper's session"),
-        ),
-        SURFACES: (
-            f"Fig. 10: final surfaces{slow}",
-            lambda: figures_session.surfaces(results.session, f"Final surfaces. {title}"),
-        ),
-        "fig10_sections": (
-            f"Sections through the surfaces of Fig. 10, formed and asked for{slow}",
-            lambda: figures_session.profiles(results.session, f"Sections. {title}"),
-        ),
-        "oscillation": (
-            "Oscillation of the virtual master, and where it sets in",
-            lambda: paper_figures.oscillation(results),
-        ),
-        "tracking": (
-            "How fast a finger is followed: RFD and lag against speed",
-            lambda: paper_figures.tracking(results),
-        ),
-        "variants": (
-            "What the rise, the search radius and Method II's gain do",
-            lambda: paper_figures.variants(results),
-        ),
-    }
+    title, session, own = (
+        f"The paper's session{slow}",
+        results.session,
+        "The paper's session at its own times",
+    )
+    rows = (
+        ("fig04_blisters", "Fig. 4: blisters in section, convex and concave, both profiles and all methods",
+         lambda: paper_figures.blisters(results)),
+        ("fig06_freezing", "Fig. 6: sections along a drag at several times, with the frozen cells",
+         lambda: paper_figures.freezing(results)),
+        ("fig08_session", f"Fig. 8: heights of selected cells and total force over time{slow}",
+         lambda: figures_session.heights_and_force(session, title)),
+        ("fig08_own_times" if slow else "", "Fig. 8 again, at the session's own times",
+         lambda: figures_session.heights_and_force(results.printed, own)),
+        ("fig09_details",
+         "Fig. 9: a detail of the session's heights: the first press, and what swings in the lift",
+         lambda: figures_session.details(results, "Details of the heights in the paper's session")),
+        (SURFACES, f"Fig. 10: final surfaces{slow}",
+         lambda: figures_session.surfaces(session, f"Final surfaces. {title}")),
+        ("fig10_sections", f"Sections through the surfaces of Fig. 10, formed and asked for{slow}",
+         lambda: figures_session.profiles(session, f"Sections. {title}")),
+        ("oscillation", "Oscillation of the virtual master, and where it sets in",
+         lambda: paper_figures.oscillation(results)),
+        ("tracking", "How fast a finger is followed: RFD and lag against speed",
+         lambda: paper_figures.tracking(results)),
+        ("variants", "What the rise, the search radius and Method II's gain do",
+         lambda: paper_figures.variants(results)),
+    )  # fmt: skip
+    return {name: (caption, draw) for name, caption, draw in rows if name}
 
 
 def _numbers(results: Results) -> dict[str, Any]:

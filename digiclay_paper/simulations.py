@@ -57,10 +57,8 @@ from .scenes import METHODS, QUICKER, SINK, TALL, THIRD, Device
 #: Along the ridge and along the valley, s.
 ALONG_RIDGE, ALONG_VALLEY = (5.0, 10.0), (18.0, 25.0)
 WINDOWS = {
-    "both": (ALONG_RIDGE, ALONG_VALLEY),
-    "ridge alone": (ALONG_RIDGE,),
-    "valley alone": (ALONG_VALLEY,),
-}
+    "both": (ALONG_RIDGE, ALONG_VALLEY), "ridge alone": (ALONG_RIDGE,), "valley alone": (ALONG_VALLEY,),
+}  # fmt: skip
 
 
 def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:

@@ -25,18 +25,12 @@ FIGURES = ("rfd", "rfd_shaping", "max_total_force", "contact_loss_share", "lag_m
 
 
 def session(history: History, out: str | Path, set_point: SetPoint | None) -> Path:
-    """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written.
-
-    `out`: the PNG; `set_point`: force asked for; None where none is.
-    """
+    """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written."""
     return save(session_figure(history, set_point), out)
 
 
 def surface(history: History, out: str | Path) -> Path:
-    """Write `surface_figure` as a PNG and return its path; OutputError when it cannot be written.
-
-    `out`: the PNG.
-    """
+    """Write `surface_figure` as a PNG and return its path; OutputError when it cannot be written."""
     return save(surface_figure(history), out)
 
 
@@ -65,9 +59,8 @@ def session_cells(history: History) -> list[int]:
 def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     """Draw heights of chosen cells and the total force over time, as the paper's Fig. 8 does.
 
-    `history`: the arrays of ``history.npz``; `set_point`: force asked for; None where none is: then neither
-    it nor a deviation from it is shown. Returns its axes, by label: ``heights``, ``force``, ``map`` with its
-    ``scale``, and ``figures``.
+    Without a `set_point` neither it nor a deviation from it is shown. The axes are, by label: ``heights``,
+    ``force``, ``map`` with its ``scale``, and ``figures``.
     """
     time, total, height = (array(history, name) for name in ("time", "total_force", "height"))
     with canvas(12.5, 6.3) as (figure, place):
