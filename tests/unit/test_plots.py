@@ -14,7 +14,7 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.plots import run as plots
-from digiclay.plots.relief import hidden
+from digiclay.plots.bed import hidden
 
 from tests.timeouts import TIMEOUT
 

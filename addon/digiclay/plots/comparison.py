@@ -24,8 +24,7 @@ def comparison(
 ) -> Any:
     """Draw the total force over time, and a bar a method for each metric.
 
-    `found`: metrics by method; `forces`: time, s, total force, N, and the total force asked for, NaN where
-    none is, by method; `name`: of the scene.
+    `forces`: time, s, total force, N, and the total force asked for, NaN where none is, by method.
     """
     colors = {method: LINES[i % len(LINES)] for i, method in enumerate(found)}
     bar = 0.3

@@ -34,31 +34,23 @@ STYLE: dict[str, Any] = {
 
 
 @contextmanager
-def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **known: Any) -> Iterator[Figure]:
-    """Give an empty figure, its size in inches, in a style that also holds for what is drawn on it.
-
-    `width`, `height`: inches; `style`: Matplotlib's rc parameters; `known`: more arguments of
-    `matplotlib.figure.Figure`.
-    """
+def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **options: Any) -> Iterator[Figure]:
+    """Give an empty figure, inches, in a style that also holds for what is drawn on it."""
     try:
         from matplotlib import rc_context
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError:
         raise OutputError("Plots need matplotlib: run 'pip install digiclay[plots]'.") from None
-    known_style: dict[Any, Any] = dict(style)
-    with rc_context(known_style):
-        figure = Figure(figsize=(width, height), **known)
+    with rc_context(dict[Any, Any](style)):
+        figure = Figure(figsize=(width, height), **options)
         FigureCanvasAgg(figure)
         yield figure
 
 
 @contextmanager
 def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figure, Any]]:
-    """Give an empty figure, and what places axes on it (label, then a box in inches).
-
-    `width`, `height`: inches; `title`: upper left; none when empty.
-    """
+    """Give an empty figure, inches, and what places axes on it: label, then a box in inches."""
     with empty(width, height) as figure:
         if title:
             figure.text(0.3 / width, 1.0 - 0.33 / height, title, fontsize=14, fontweight="bold")
@@ -71,7 +63,7 @@ def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figur
 
 
 def legend_above(axes: Axes, columns: int = 6) -> None:
-    """Put the legend on the line of the title, where it hides nothing. `columns`: of the legend."""
+    """Put the legend on the line of the title, where it hides nothing."""
     close = {"handlelength": 1.4, "columnspacing": 1.2, "handletextpad": 0.5, "borderaxespad": 0.0}
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=columns, **close)
 
@@ -81,8 +73,6 @@ def save(figure: Figure, out: str | Path) -> Path:
 
     As an SVG if its name ends so, with its letters as outlines and the same bytes every time; else as
     a PNG. What an artist marks as rasterized is pixels in an SVG.
-
-    `out`: ends with .svg, or with anything else for a PNG.
     """
     content, path = io.BytesIO(), Path(out)
     if path.suffix == ".svg":
