@@ -43,3 +43,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.is_relative_to(WINDOW):
             item.add_marker(skip)
+
+
+@pytest.fixture
+def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out no control period: what a test forms must not depend on the machine's load."""
+    from digiclay.core.session import live_session
+
+    monkeypatch.setattr(live_session, "SHARE", 1e9)

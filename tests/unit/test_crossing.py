@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_session
 from digiclay.core.session.take import replay
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
@@ -19,6 +18,8 @@ from numpy.typing import NDArray
 from tests.hand import heights
 from tests.strokes import Places, begin_bed, form, relief
 
+pytestmark = pytest.mark.usefixtures("quick_machine")
+
 Floats = NDArray[np.float64]
 #: Pins in a row and column of a bed, half the length of a stroke, height of a ridge, depth of a groove, mm.
 SIZES = {"paper": (25, 24.0, 10.0, 4.0), "design": (34, 16.0, 6.0, 3.0)}
@@ -26,12 +27,6 @@ SIZES = {"paper": (25, 24.0, 10.0, 4.0), "design": (34, 16.0, 6.0, 3.0)}
 BOUND = 0.6
 #: The ridge lies beside the rows of pins by so much, mm: where it lay on them, spikes were smaller.
 BESIDE = {"paper": 1.0, "design": 0.5}
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def turned(bed: str, degrees: float, beside: float = 0.0) -> Places:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_session, snapshot
+from digiclay.core.session import snapshot
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
@@ -16,14 +16,10 @@ from digiclay.strokes.stroke import draw
 
 from tests.hand import TICK, Hand, heights, pose, started
 
+pytestmark = pytest.mark.usefixtures("quick_machine")
+
 #: A finger in the pins, mm, and how long it has pressed, ticks.
 PRESSED, TICKS = 37.0, 20
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period, whoever else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def pressed() -> tuple[Running, Hand]:

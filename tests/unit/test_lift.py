@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.session import live_session
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from numpy.typing import NDArray
@@ -13,16 +12,12 @@ from numpy.typing import NDArray
 from tests.hand import TICK
 from tests.strokes import begin_bed, measure_spikes, relief
 
+pytestmark = pytest.mark.usefixtures("quick_machine")
+
 Floats = NDArray[np.float64]
 #: What is left may be higher than what was shaped by so much, mm, and a pin so far off those around it.
 #: Measured: 0.3 and 0.5 mm; 4 and 2.7 mm where a search takes frozen cells along without a bound.
 BOUND = 1.0
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def move(session: Running, goal: tuple[float, float, float], duration: float) -> Running:

@@ -20,23 +20,19 @@ from digiclay.core.session.run_scene import run
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.settings.devices import BEDS, make_scene
-from digiclay.strokes.stroke import DEEPEST, Brush, start
+from digiclay.strokes.stroke import Brush
 from digiclay.strokes.tracking import find_tracking
 from numpy.typing import NDArray
 
 from tests.hand import TICK, heights
 from tests.strokes import Places, begin_bed, finish, form, queue, relief
 
+pytestmark = pytest.mark.usefixtures("quick_machine")
+
 Floats = NDArray[np.float64]
 #: Half the length of a stroke, mm.
 HALF = 30.0
 ALONG: Places = [(-HALF, 0.0), (HALF, 0.0)]
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def begin(**tables: object) -> Running:
@@ -92,9 +88,19 @@ def test_a_raise_presses_no_harder_than_a_press(ridge: Running) -> None:
     assert ridge.trace.force.max() < 2.0
 
 
-@pytest.mark.parametrize("preset", ["fast", "viscous"])
-def test_other_devices_raise_as_high(preset: str) -> None:
-    np.testing.assert_allclose(along(form(begin(preset=preset), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=1.5)
+@pytest.mark.parametrize(
+    ("tables", "bound"),
+    [
+        ({"preset": "fast"}, 1.5),
+        ({"preset": "viscous"}, 1.5),
+        ({"control": {"method": "cell_states"}}, 2.0),
+        ({"control": {"method": "hybrid"}}, 1.0),
+        ({"sensors": {"force_noise": "2 mN", "height_noise": "20 um"}}, 2.0),
+    ],
+    ids=str,
+)
+def test_other_devices_and_methods_raise_as_high(tables: dict[str, object], bound: float) -> None:
+    np.testing.assert_allclose(along(form(begin(**tables), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=bound)
 
 
 @pytest.mark.parametrize(("name", "height"), [("design", 5.0), ("design", 15.0), ("fine", 15.0)])
@@ -127,21 +133,6 @@ def test_every_method_goes_with_every_size_of_bed(method: str) -> None:
     for bed in BEDS.values():
         made = assemble(make_scene("paper", Layout(15, 15, bed.pitch), method, bed.share))
         assert made.controller is not None
-
-
-def test_method_2_raises_the_whole_line() -> None:
-    formed = along(form(begin(control={"method": "cell_states"}), ALONG, Brush.RAISE))
-    np.testing.assert_allclose(formed, 15.0, rtol=0, atol=2.0)
-
-
-def test_method_3_raises_the_whole_line() -> None:
-    formed = along(form(begin(control={"method": "hybrid"}), ALONG, Brush.RAISE))
-    np.testing.assert_allclose(formed, 15.0, rtol=0, atol=1.0)
-
-
-def test_noisy_sensors_do_not_lose_the_ridge() -> None:
-    noisy = {"force_noise": "2 mN", "height_noise": "20 um"}
-    np.testing.assert_allclose(along(form(begin(sensors=noisy), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=2.0)
 
 
 def test_ridges_drawn_in_quick_succession_both_form() -> None:
@@ -204,10 +195,6 @@ def test_ctrl_inverts_lower_and_raise_and_leaves_level_as_it_is() -> None:
     assert [brush.inverse for brush in (Brush.LOWER, Brush.RAISE, Brush.LEVEL)] == [
         Brush.RAISE, Brush.LOWER, Brush.LEVEL,
     ]  # fmt: skip
-
-
-def test_heights_stay_within_what_can_be_raised() -> None:
-    assert start(1, 0.0, 0.0, 1.0, brush=Brush.RAISE).samples[0].depth == DEEPEST
 
 
 def test_level_fills_a_valley_that_it_crosses_by_a_bend() -> None:

@@ -9,16 +9,12 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import live_session, snapshot
+from digiclay.core.session import snapshot
 from digiclay.sessions import running, sculpting
 
 from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
 
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
+pytestmark = pytest.mark.usefixtures("quick_machine")
 
 
 def test_a_press_forms_the_bed_as_it_goes_on() -> None:

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_session, snapshot
+from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 
 from tests.hand import Hand, started
 
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
+pytestmark = pytest.mark.usefixtures("quick_machine")
 
 
 def plays(session: Running) -> bool:

@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout
-from digiclay.core.session import live_session, snapshot
+from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
@@ -23,14 +23,10 @@ from tests.assemble import replayed
 from tests.hand import TICK, heights, pose, started
 from tests.reliefs import heighten, measure_roughness
 
+pytestmark = pytest.mark.usefixtures("quick_machine")
+
 Floats = NDArray[np.float64]
 SPIKE = 8e-3
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def spiked(*places: tuple[float, float]) -> Running:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_session
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.sessions.stroke_queue import change_stroke, find_stroke, last_place, queue_stroke
@@ -14,15 +13,11 @@ from digiclay.strokes.stroke import SYMMETRIES, draw
 
 from tests.hand import TICK, heights, started
 
+pytestmark = pytest.mark.usefixtures("quick_machine")
+
 DEPTH = 4e-3
 #: A pin that a finger of 4 mm depth has pressed is down by more than this, m.
 FORMED = 2e-3
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 def tap(session: Running, x: float, y: float) -> Running:

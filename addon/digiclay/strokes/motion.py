@@ -14,7 +14,7 @@ which the pins ahead come to that height in time.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -162,26 +162,54 @@ SEARCH, OUTRUN = 0.1, 5.0
 SLACK = 0.5e-3
 
 
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Pins as they were when a stroke began, and the fingertip that moves over them in control periods."""
+
+    grid: Grid
+    #: Heights (n,), m.
+    height: Floats
+    finger: Fingertip
+    #: Control period, s.
+    period: float
+
+    def find_surface(self, x: float, y: float) -> float:
+        """Return the height of the surface under the middle of the fingertip at a place, m."""
+        return find_ground_height(self.grid, self.height, x, y, self.finger.width / 2)
+
+    def find_touch(self, x: float, y: float) -> float:
+        """Return how high a fingertip is that descends at a place and first touches a pin, m."""
+        # On a slope it touches the pins beside it first, several millimeters above the surface below it.
+        cells, width = self.grid.disc(x, y, self.finger.width), self.finger.width
+        square = ((self.grid.x[cells] - x) ** 2 + (self.grid.y[cells] - y) ** 2) / width**2
+        gap = self.finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))
+        return float((self.height[cells] - gap).max(initial=0.0))
+
+    def find_lowest(self, stroke: Stroke, x: float, y: float) -> float:
+        """Return how low the fingertip is to be at a place of its path, m."""
+        sample, surface = stroke.samples[stroke.reached], self.find_surface(x, y)
+        if stroke.tracking is None or stroke.brush is Brush.LOWER:
+            return max(0.0, surface - sample.depth)
+        if stroke.brush is Brush.RAISE:
+            top = surface + sample.depth
+        else:
+            top = surface + sample.share * (self.find_surface(*stroke.place(0)) - surface)
+        return max(0.0, min(top, stroke.tracking.highest) - stroke.tracking.sink)
+
+
 def follow(
-    stroke: Stroke,
-    grid: Grid,
-    height: Floats,
-    finger: Fingertip,
-    pose: Floats,
-    count: int,
-    period: float,
-    now: float,
-    tracking: Tracking | None = None,
-) -> tuple[Stroke, Floats]:
+    stroke: Stroke, grid: Grid, height: Floats, finger: Fingertip, pose: Floats, count: int, period: float,
+    now: float, tracking: Tracking | None = None,
+) -> tuple[Stroke, Floats]:  # fmt: skip
     """Advance the fingertip along a press stroke; return the stroke and its path (k + 1, 7), k <= count."""
     if stroke.height is None:
         stroke = replace(_begin(stroke, height, tracking), turn=pose[3:])
     assert stroke.height is not None
-    path, peak = [pose], float(height.max())
-    clear = max(peak, float(stroke.height.max())) + CLEARANCE - NEAR
+    ground, path = Ground(grid, stroke.height, finger, period), [pose]
+    safe = max(float(height.max()), float(stroke.height.max())) + CLEARANCE
     while len(path) <= count and not stroke.done:
-        stroke, place = _step(stroke, grid, finger, path[-1], peak, period, now)
-        turn = advance_turn(stroke, path[-1][3:], place[2] >= clear, period)
+        stroke, place = _step(stroke, ground, path[-1][:3].tolist(), safe, now)
+        turn = advance_turn(stroke, path[-1][3:], place[2] >= safe - NEAR, period)
         path.append(np.array([*place, *turn]))
     return stroke, np.array(path)
 
@@ -194,97 +222,64 @@ def _begin(stroke: Stroke, height: Floats, tracking: Tracking | None) -> Stroke:
     return stroke
 
 
-def _step(
-    stroke: Stroke, grid: Grid, finger: Fingertip, pose: Floats, peak: float, period: float, now: float
-) -> tuple[Stroke, Place]:
-    """Return the stroke after a control period, and where the finger is then."""
-    assert stroke.height is not None
-    height = stroke.height
-    x, y, z = pose[:3].tolist()
-    stroke = run_clock(stroke, period, now)
-    safe = max(peak, float(height.max())) + CLEARANCE
+def _step(stroke: Stroke, ground: Ground, place: Place, safe: float, now: float) -> tuple[Stroke, Place]:
+    """Return the stroke after a control period, and where the fingertip is then."""
+    x, y, z = place
+    stroke = run_clock(stroke, ground.period, now)
     if stroke.phase == ABOVE:
-        return cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
-    radius = finger.width / 2
+        return cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, ground.period)
     if stroke.phase == LEAVING:
         lift = LIFT
         if stroke.tracking is not None:
             # Pins that look for the finger are not to find it again.
             speed = stroke.tracking.speed
-            top = _find_lowest(stroke, grid, x, y, radius) + stroke.tracking.sink
+            top = ground.find_lowest(stroke, x, y) + stroke.tracking.sink
             safe, lift = max(safe, top + max(CLEARANCE, SEARCH * speed)), max(LIFT, OUTRUN * speed)
-        z = min(safe, z + lift * period)
+        z = min(safe, z + lift * ground.period)
         return (finish_image(stroke) if z >= safe - NEAR else stroke), (x, y, z)
     move = _press if stroke.tracking is None or stroke.phase == PRESSING else _track
-    stroke, (x, y, z) = move(stroke, grid, finger, (x, y, z), period)
+    stroke, (x, y, z) = move(stroke, ground, (x, y, z))
     over = not stroke.held and stroke.reached == len(stroke.samples) - 1
-    if stroke.phase == DRAGGING and over and abs(z - _find_lowest(stroke, grid, x, y, radius)) < NEAR:
+    if stroke.phase == DRAGGING and over and abs(z - ground.find_lowest(stroke, x, y)) < NEAR:
         stroke = replace(stroke, phase=LEAVING)
     return stroke, (x, y, z)
 
 
-def _press(
-    stroke: Stroke, grid: Grid, finger: Fingertip, place: Place, period: float
-) -> tuple[Stroke, Place]:
+def _press(stroke: Stroke, ground: Ground, place: Place) -> tuple[Stroke, Place]:
     """Press into the surface, or drag at a depth below it."""
-    height, radius = stroke.height, finger.width / 2
-    assert height is not None
     x, y, z = place
     if stroke.phase == DRAGGING:
-        stroke, x, y = drag(stroke, x, y, min(DRAG, SPAN * radius) * period)
-    surface = find_ground_height(grid, height, x, y, radius)
+        stroke, x, y = drag(stroke, x, y, min(DRAG, SPAN * (ground.finger.width / 2)) * ground.period)
+    surface = touch = ground.find_surface(x, y)
     # Pins bottom out on the bed's floor.
     if stroke.tracking is None or stroke.brush is Brush.LOWER:
-        lowest, after = _find_lowest(stroke, grid, x, y, radius), DRAGGING
+        lowest, after = ground.find_lowest(stroke, x, y), DRAGGING
     else:
         lowest, after = max(0.0, surface - stroke.tracking.press), RISING
-    touch = max(surface, _find_touch(grid, height, finger, x, y)) if stroke.phase == PRESSING else surface
-    z = _sink(z, touch, lowest, period)
-    pressed = stroke.phase == PRESSING and abs(z - lowest) < NEAR
-    return (replace(stroke, phase=after) if pressed else stroke), (x, y, z)
+    pressing = stroke.phase == PRESSING
+    if pressing:
+        touch = max(surface, ground.find_touch(x, y))
+    z = _sink(z, touch, lowest, ground.period)
+    return (replace(stroke, phase=after) if pressing and abs(z - lowest) < NEAR else stroke), (x, y, z)
 
 
-def _track(
-    stroke: Stroke, grid: Grid, finger: Fingertip, place: Place, period: float
-) -> tuple[Stroke, Place]:
-    """Take the blister up, or along; it goes along where the finger is at its height."""
-    tracking, radius = stroke.tracking, finger.width / 2
+def _track(stroke: Stroke, ground: Ground, place: Place) -> tuple[Stroke, Place]:
+    """Take the blister up, or along; it goes along where the fingertip is at its height."""
+    tracking = stroke.tracking
     assert tracking is not None
     x, y, z = place
-    lowest = _find_lowest(stroke, grid, x, y, radius)
+    lowest = ground.find_lowest(stroke, x, y)
     if stroke.phase == DRAGGING and abs(z - lowest) <= SLACK:
-        stroke, x, y = drag(stroke, x, y, _limit_drag(stroke, grid, place) * period)
-        lowest = _find_lowest(stroke, grid, x, y, radius)
-    z, climb = _climb(z, stroke.climb, lowest, tracking.lift, period)
+        near = ground.height[ground.grid.disc(x, y, tracking.radius)]
+        change = float(np.abs(near - z - tracking.sink).max(initial=NEAR))
+        radii = PUSHED if stroke.brush is Brush.LOWER else RADII
+        # The pins ahead come to its height in time.
+        speed = min(DRAG, radii * tracking.radius, tracking.speed / (tracking.slope * change))
+        stroke, x, y = drag(stroke, x, y, speed * ground.period)
+        lowest = ground.find_lowest(stroke, x, y)
+    z, climb = _climb(z, stroke.climb, lowest, tracking.lift, ground.period)
     risen = stroke.phase == RISING and abs(z - lowest) < NEAR
     return replace(stroke, climb=climb, phase=DRAGGING if risen else stroke.phase), (x, y, z)
-
-
-def _find_lowest(stroke: Stroke, grid: Grid, x: float, y: float, radius: float) -> float:
-    """Return how low the fingertip is to be at a place of its path, m."""
-    height, sample = stroke.height, stroke.samples[stroke.reached]
-    assert height is not None
-    surface = find_ground_height(grid, height, x, y, radius)
-    if stroke.tracking is None or stroke.brush is Brush.LOWER:
-        return max(0.0, surface - sample.depth)
-    if stroke.brush is Brush.RAISE:
-        top = surface + sample.depth
-    else:
-        level = find_ground_height(grid, height, *stroke.place(0), radius)
-        top = surface + sample.share * (level - surface)
-    return max(0.0, min(top, stroke.tracking.highest) - stroke.tracking.sink)
-
-
-def _limit_drag(stroke: Stroke, grid: Grid, place: Place) -> float:
-    """Return how fast the finger may go along so that the pins ahead are at its height in time, m/s."""
-    assert stroke.height is not None
-    assert stroke.tracking is not None
-    x, y, z = place
-    tracking = stroke.tracking
-    near = stroke.height[grid.disc(x, y, tracking.radius)]
-    change = float(np.abs(near - z - tracking.sink).max(initial=NEAR))
-    radii = PUSHED if stroke.brush is Brush.LOWER else RADII
-    return min(DRAG, radii * tracking.radius, tracking.speed / (tracking.slope * change))
 
 
 def _climb(z: float, climb: float, aim: float, fastest: float, period: float) -> tuple[float, float]:
@@ -296,15 +291,6 @@ def _climb(z: float, climb: float, aim: float, fastest: float, period: float) ->
     if abs(far) <= max(abs(climb), gain * period) * period:
         return aim, 0.0
     return z + climb * period, climb
-
-
-def _find_touch(grid: Grid, height: Floats, finger: Fingertip, x: float, y: float) -> float:
-    """Return how high a fingertip is that descends at a place and first touches a pin, m."""
-    # On a slope it touches the pins beside it first, several millimeters above the surface below it.
-    cells = grid.disc(x, y, finger.width)
-    square = ((grid.x[cells] - x) ** 2 + (grid.y[cells] - y) ** 2) / finger.width**2
-    gap = finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))
-    return float((height[cells] - gap).max(initial=0.0))
 
 
 def _sink(z: float, surface: float, lowest: float, period: float) -> float:
