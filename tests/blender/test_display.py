@@ -15,12 +15,12 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.session.accuracy import Errors
 from digiclay.device import palettes, view
 from digiclay.live import bed_state
-from digiclay.operators.display import pick_pins
+from digiclay.operators.pin_view import pick_pins
 from digiclay.overlay import views
 from digiclay.overlay.picture import choose_colors
 from digiclay.overlay.sections import lay_out
 from digiclay.panels import display
-from digiclay.panels.live_session import error_line
+from digiclay.panels.session import error_line
 from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 

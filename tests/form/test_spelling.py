@@ -25,6 +25,7 @@ READ = re.compile(r'\bcentring_time\b|"(--)?colour"|"Colour by Force"|"Top Colou
 ALLOWED = {
     "__init__": "the front door of a package",
     "__main__": "what `python -m` runs",
+    "live_session": "the kind of session that Blender and the server have",
     "scene_source": "what reads a scene, from whatever source",
 }
 #: Packages whose modules are named after what others contain, and why.

@@ -174,7 +174,7 @@ def views(blender: Any) -> Iterator[float | None]:
     areas = len(blender.window().screen.areas)
     blender.call(bpy.ops.screen.screen_full_area)  # a quarter of a small view has no room for the overlay
     yield from blender.until(lambda: len(blender.window().screen.areas) < areas)
-    blender.part("operators.display").pick_pins(blender.beds()[0], [312])
+    blender.part("operators.pin_view").pick_pins(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter(blender) is not None)
     region = top_quarter(blender)

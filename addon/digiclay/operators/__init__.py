@@ -9,10 +9,10 @@ from ..compat import bpy
 from . import (
     add_bed,
     bake_session,
-    display,
     export_mesh,
     make_mesh,
     open_scene,
+    pin_view,
     presets,
     press_adjust,
     press_presets,
@@ -28,7 +28,7 @@ from . import (
 MODULES = (
     add_bed,
     presets,
-    display,
+    pin_view,
     press_stroke,
     press_shape,
     press_adjust,

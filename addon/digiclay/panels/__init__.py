@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import display, live_session, parameters, press_options, shape_exchange
+from . import display, parameters, press_options, session, shape_exchange
 
 #: In the order they are drawn, each with a `bl_order` of its own: session 10, finger 20, display 30,
 #: shapes 40, takes 50, export 60; then what is technical, device 70 and control 80.
 CLASSES: tuple[type, ...] = (
     *parameters.CLASSES,
-    *live_session.CLASSES,
+    *session.CLASSES,
     *display.CLASSES,
     *shape_exchange.CLASSES,
     *press_options.CLASSES,
