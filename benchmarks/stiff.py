@@ -72,7 +72,7 @@ class Case:
     factor: float = 1.0
 
 
-#: A press with a finger that then rises, dragged a little; everything at its default.
+#: A press with a fingertip that then rises, dragged a little; everything at its default.
 EASY = "easy"
 #: Everything at once.
 ALL = "all together"
@@ -176,7 +176,7 @@ STEPS = (1e-3, 5e-3, 20e-3, 50e-3)
 PERIOD = 5e-3
 #: Physics step of the reference, by Richardson extrapolation, s.
 FINE, ROUGH = 0.2e-3, 0.5e-3
-#: Steppers that hold every pin within what its valve and the finger can do, by construction.
+#: Steppers that hold every pin within what its valve and the fingertip can do, by construction.
 BOUNDED = ("bernoulli", "richardson", "adaptive")
 #: From this height error on, m, a run's own estimate has to show that it is wrong.
 WRONG = 1e-4

@@ -77,7 +77,7 @@ def measure_skin(rows: int, columns: int, updates: int) -> SkinCost:
 TICK = 33e-3
 #: What a tick does, in this order.
 PARTS = ("read", "simulate", "keep", "write", "evaluate")
-#: Ticks that are not counted: the finger comes down, and everything is used for the first time.
+#: Ticks that are not counted: the fingertip comes down, and everything is used for the first time.
 WARM_UP = 30
 #: Size of the circle the pressed finger draws, m, and how many ticks it takes to go round.
 CIRCLE, ROUND = 8e-3, 120

@@ -46,7 +46,7 @@ class Claim(NamedTuple):
     why: str = ""
 
 
-#: Cells ahead count as lowered by this share of how far the finger is in the surface.
+#: Cells ahead count as lowered by this share of how far the fingertip is in the surface.
 LOWERED = 0.1
 #: A search radius rejects noise that leaves at most this share of the scatter there is without it.
 REJECTED = 0.5
@@ -75,7 +75,7 @@ def rise(results: Results) -> Evidence:
 
 
 def ahead(results: Results) -> Evidence:
-    """Whether Method I lowers cells before the finger is over them."""
+    """Whether Method I lowers cells before the fingertip is over them."""
     told, holds = [], []
     for variant, method, name in results.dragged:
         one = results.dragged[variant, method, name]
@@ -92,7 +92,7 @@ def ahead(results: Results) -> Evidence:
     )
 
 
-#: How far the finger is in the surface, m.
+#: How far the fingertip is in the surface, m.
 DEPTH = {name: -way.height for name, way in DRAGS.items() if way.height < 0.0}
 
 
@@ -126,7 +126,7 @@ def _find_radius(results: Results) -> float:
 
 
 def radius(results: Results) -> Evidence:
-    """Whether looking for the finger only near the master rejects what noisy sensors add elsewhere."""
+    """Whether looking for the fingertip only near the master rejects what noisy sensors add elsewhere."""
     told, holds, lost = [], [], []
     least = _find_radius(results)
     for near in (one for one in results.located if one.radius == least):

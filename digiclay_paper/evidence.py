@@ -322,7 +322,7 @@ def freezing(results: Results) -> Evidence:
 
 
 def carried_out(results: Results) -> Evidence:
-    """Whether the finger was lost on the way, and what it took not to lose it."""
+    """Whether the fingertip was lost on the way, and what it took not to lose it."""
     told = []
     for method in METHODS:
         known = results.printed[method]

@@ -111,7 +111,7 @@ def _detailed(results: Results) -> list[tuple[str, Session]]:
 
 
 def _under(session: Session) -> list[int]:
-    """Return the cell the finger first presses, and some beside it in its row, outwards."""
+    """Return the cell the fingertip first presses, and some beside it in its row, outwards."""
     place, first = session.history["position"], session.history["fingertip"][0, :2]
     pitch = session.scene.layout.pitch
     return [int(np.argmin(np.hypot(*(place - first - (step * pitch, 0.0)).T))) for step in range(0, 5)]

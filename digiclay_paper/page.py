@@ -76,7 +76,7 @@ SECTIONS: tuple[tuple[str, Callable[[Session], float]], ...] = (
 )
 
 
-#: The chain of Fig. 3, from the finger to the pins.
+#: The chain of Fig. 3, from the fingertip to the pins.
 CHAIN = (
     ("VM Locate", "centroid of the forces within r_VM of the master's last place (equation 13)"),
     ("VM Control", "virtual spring until the force reaches F_trig, then force control to F_ref"),
@@ -268,5 +268,5 @@ def _numbers(results: Results) -> dict[str, Any]:
 
 
 def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    """Return a table without the infinite lag of a finger that never touches."""
+    """Return a table without the infinite lag of a fingertip that never touches."""
     return {name: None if value == float("inf") else value for name, value in values.items()}

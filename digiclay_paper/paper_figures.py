@@ -125,7 +125,7 @@ def blisters(results: Results) -> Any:
 
 
 def _section(axes: Any, done: Result, look: tuple[str, str, float], name: str) -> None:
-    """Draw the heights of the middle row; cells that feel the finger are filled."""
+    """Draw the heights of the middle row; cells that feel the fingertip are filled."""
     place, height, force = (done.history[key] for key in ("position", "height", "force"))
     row = np.abs(place[:, 1]) < 1e-6
     color, marker, size = look

@@ -67,7 +67,7 @@ class Section(NamedTuple):
         Where its cells are on its line, m.
     found, asked : ndarray (k,)
         Heights over the bed at rest, m: formed, and asked for. `asked` is scaled so that in the middle
-        it is as high as `found`: how deep the pins press into the finger is no matter of shape.
+        it is as high as `found`: how deep the pins press into the fingertip is no matter of shape.
     level : float
         By how much it was higher there than it had been asked for, m; in a crease: lower.
     middle : float
@@ -148,7 +148,7 @@ def sections(session: Session) -> Iterator[Section]:
 
 
 def blister_section(done: Result) -> Section:
-    """Return the section along x through a blister under a finger in the middle of the bed."""
+    """Return the section along x through a blister under a fingertip in the middle of the bed."""
     history, scene = done.history, done.scene
     assert scene.blister is not None  # both methods have one
     place, rest = history["position"], scene.actuator.rest_height

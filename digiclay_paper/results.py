@@ -14,11 +14,11 @@ from .scenes import SINK, TALL
 
 #: The speed up to which the paper says both methods track, m/s, and its session.
 PAPER_SPEED, SESSION = 15e-3, "ridge_mound_valley"
-#: The simple trajectories: straight and level drags over the finger's height, m; and one more, less deep.
+#: The simple trajectories: straight and level drags over the fingertip's height, m; and one more, less deep.
 RIDGE = "a ridge 15 mm high"
 WAYS = {"in the surface": Drag(height=-4.5e-3), RIDGE: Drag(height=TALL), "a valley": Drag(height=SINK)}
 DRAGS = WAYS | {"less deep": Drag(height=-1.5e-3)}
-#: How far ahead of the finger cells are looked at that do not feel it yet, m.
+#: How far ahead of the fingertip cells are looked at that do not feel it yet, m.
 AHEAD = (9e-3, 12e-3)
 #: The scene without a change, among its variants.
 AS_IT_IS = "as it is"
@@ -45,7 +45,7 @@ class Extent:
     ways : tuple of str
         Which of the simple trajectories the variants of the scene are tried on.
     noises : tuple of float
-        Standard deviations of the force sensors with which the finger is located, N.
+        Standard deviations of the force sensors with which the fingertip is located, N.
     third : tuple of str
         What Method III is run on besides the session: blisters, tracks.
     """
@@ -117,7 +117,7 @@ class Dragged(NamedTuple):
     unevenness : float or None
         See the metric ``ridge_unevenness``, m.
     ahead : float or None
-        Mean height over the bed at rest of cells that do not feel the finger and lie `AHEAD` of it, m.
+        Mean height over the bed at rest of cells that do not feel the fingertip and lie `AHEAD` of it, m.
     """
 
     follows: Follows
@@ -142,7 +142,7 @@ class Located(NamedTuple):
     scatter : float or None
         Root mean square distance of the virtual master from its mean place, m; None: it never shapes.
     losses : int
-        How often the finger was lost.
+        How often the fingertip was lost.
     """
 
     noise: float
@@ -165,11 +165,11 @@ class Session(NamedTuple):
     metrics : dict
         As `Result.figures`.
     lost : list of float
-        When the finger was lost though it rose no faster than a pin can, s.
+        When the fingertip was lost though it rose no faster than a pin can, s.
     followers : float
         Mean number of cells that follow the force while there are any.
     windows : dict
-        RFD, N, and standard deviations over time of total force, N, and of the height under the finger, m,
+        RFD, N, and standard deviations over time of total force, N, and of the height under the fingertip, m,
         by the names of `windows.WINDOWS` and of the metrics.
     """
 

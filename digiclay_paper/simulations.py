@@ -85,16 +85,16 @@ VARIANTS: dict[str, tuple[Setting, tuple[str, ...]]] = {
     STAGGERED: (Setting("layout.arrangement", "staggered"), METHODS),
     GAUSSIAN: (Setting("blister.profile", "gaussian"), METHODS),
 }
-#: A search radius as wide as no bed of ours: every cell the finger may touch is looked at, m.
+#: A search radius as wide as no bed of ours: every cell the fingertip may touch is looked at, m.
 EVERYWHERE = 1.0
-#: Control periods at the end in which the place of the finger is looked at.
+#: Control periods at the end in which the place of the fingertip is looked at.
 STILL = 300
 
 Told = Callable[[str], None]
 
 
 def vary(results: Results, extent: Extent, told: Told) -> None:
-    """Run the drags of every variant, and locate a finger under noise.
+    """Run the drags of every variant, and locate a fingertip under noise.
 
     `results`: takes them in; `told`: hears what comes next.
     """
@@ -120,7 +120,7 @@ def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragge
     _, start, end = way.path(speed, scene.actuator.rest_height)
     part = select_rows(done.history, start, end)
     total, following = part["total_force"], np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)
-    # The cells in the finger's line, short of the place where it stops.
+    # The cells in the fingertip's line, short of the place where it stops.
     place = part["position"]
     line = np.abs(place[:, 1]) < 0.5 * scene.layout.pitch
     away = place[line, 0] - part["fingertip"][:, :1]
@@ -135,7 +135,7 @@ def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragge
 
 
 def located(noise: float, radius: float | None, *, thresholds: bool) -> Located:
-    """Hold a finger still under Method I with noisy force sensors, and look where it is located.
+    """Hold a fingertip still under Method I with noisy force sensors, and look where it is located.
 
     `noise`: standard deviation of a cell's force sensor, N; `radius`: r_VM, m; None: its default;
     `thresholds`: whether the controller knows of the noise, and takes readings below its threshold for none.
@@ -231,7 +231,7 @@ def _go_wild(results: Results, told: Told) -> None:
 
 
 def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
-    """Measure how fast a finger a method follows; every drag of the bisection is one more of `tracks`."""
+    """Measure how fast a fingertip a method follows; every drag of the bisection is one more of `tracks`."""
     found = load(find(SESSION), [Setting("control.method", method)])
     for name, way in DRAGS.items():
         told(f"drag at {PAPER_SPEED * 1e3:g} mm/s, {name}, {method}")
@@ -265,7 +265,7 @@ def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
 
 
 def sessions(results: Results, told: Told, session: str = SESSION) -> None:
-    """Run the paper's session at its times, and again slowly where a method loses the finger."""
+    """Run the paper's session at its times, and again slowly where a method loses the fingertip."""
     for method in METHODS:
         told(f"the paper's session, {method}")
         found = load(find(session), [Setting("control.method", method)])

@@ -116,7 +116,7 @@ def _laid(scene: Scene) -> tuple[Scene, Fitted]:
 
 
 def before_the_finger(result: Result) -> int:
-    """Return the last row before the finger touches."""
+    """Return the last row before the fingertip touches."""
     assert result.history is not None
     touching = np.flatnonzero(result.history["total_force"] > 0.0)
     return int(touching[0]) - 1 if touching.size else len(result.history["time"]) - 1

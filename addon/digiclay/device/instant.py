@@ -115,7 +115,7 @@ class Instant:
 
 
 def find_ellipsoid(scene: Scene) -> Fingertip:
-    """Return the ellipsoid a bed's fingertip is drawn as, also where a scene leaves the finger out."""
+    """Return the ellipsoid a bed's fingertip is drawn as, also where a scene leaves the fingertip out."""
     return require_one(scene.fingers).fingertip or Fingertip()
 
 

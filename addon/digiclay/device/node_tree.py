@@ -25,7 +25,7 @@ ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
 FORM, MEMBRANE, FAR = "Form", "Membrane", "Far"
 #: How long an arrow is drawn by default, mm for each N.
 LENGTH = 150.0
-#: Smaller forces get no arrow, N: a millinewton is what the pulp of a finger just feels.
+#: Smaller forces get no arrow, N: a millinewton is what the pulp of a fingertip just feels.
 LEAST = 1e-3
 
 

@@ -125,7 +125,7 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
 
 def make_fingertip(collection: Any, bed: Any) -> Any:
     """Make the fingertip: an empty that is moved, and in it an ellipsoid to see and to click on."""
-    # The empty carries the pose alone. Its scale is locked: the finger's size is a parameter
+    # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
     # of the device, kept in the ellipsoid's scale.
     made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=bed)
     bed[FINGER] = made

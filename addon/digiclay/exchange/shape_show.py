@@ -32,7 +32,7 @@ from ..settings import properties
 SURFACED = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 #: Simulated time after which a shape that does not stand is shown as far as it has come, s.
 LONGEST = 60.0
-#: The finger waits so far above the bed while the shape comes up, m.
+#: The fingertip waits so far above the bed while the shape comes up, m.
 AWAY = 50.0
 
 

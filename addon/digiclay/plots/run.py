@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Letter of each chosen cell, in the order in which the finger passes them.
+#: Letter of each chosen cell, in the order in which the fingertip passes them.
 LETTERS = "ABCDEF"
 #: Metrics in the picture of a session.
 FIGURES = ("rfd", "rfd_shaping", "max_total_force", "contact_loss_share", "lag_mean", "height_range")
@@ -37,7 +37,7 @@ def surface(history: History, out: str | Path) -> Path:
 def session_cells(history: History) -> list[int]:
     """Choose up to six cells along the fingertip path in contact, evenly spaced.
 
-    They are different, in the order in which the finger passes them, the first and the last
+    They are different, in the order in which the fingertip passes them, the first and the last
     contact among them. Without any contact they are those that moved most.
     """
     count = len(LETTERS)
@@ -108,7 +108,7 @@ def _draw_set_point(axes: Axes, history: History, set_point: SetPoint | None) ->
 def surface_figure(history: History) -> Figure:
     """Draw the final surface in relief and from above, as the paper's Fig. 10 does.
 
-    The axes are, by label: ``relief`` (3-D, to scale) and ``map``, with the finger's path,
+    The axes are, by label: ``relief`` (3-D, to scale) and ``map``, with the fingertip's path,
     with its ``scale``. Raises ParameterError when the bed is a single row or column.
     """
     with canvas(12.5, 5.5) as (figure, place):

@@ -36,7 +36,7 @@ from .stroke_queue import drop_strokes, take_path
 GESTURES, GESTURE_BYTES = 20, 200_000_000
 #: What is told when the state of other parts is taken up.
 CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or its method have changed"
-#: A finger that moves on after resting so long makes another gesture, s.
+#: A fingertip that moves on after resting so long makes another gesture, s.
 REST = 0.5
 #: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one that is put
 #: to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by 1e-6 m beside it.

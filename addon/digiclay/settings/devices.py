@@ -113,7 +113,7 @@ def _scale_finger(scene: Scene, share: float) -> Scene:
 
 
 def _scale_tip(finger: Finger, share: float) -> Finger:
-    """Return a finger with a tip of another size, of the same pulp."""
+    """Return a fingertip with a tip of another size, of the same pulp."""
     # As many pins as before are under it, and each has a smaller area: its share of the law of a flat plate
     # goes with the square of the size.
     tip, contact = finger.fingertip, finger.contact
@@ -125,7 +125,7 @@ def _scale_tip(finger: Finger, share: float) -> Finger:
 
 
 def _scale_control(control: ControlParameters, share: float) -> ControlParameters:
-    """Return a control for a finger of another size, on pins of another bore, behind the same valves."""
+    """Return a control for a fingertip of another size, on pins of another bore, behind the same valves."""
     # The pins' areas go with the square of the size: so do all forces, and the pins' speeds with its inverse.
     # The flow goes with the square of the opening, which is the gain times the force. So a gain that goes
     # with the inverse of the size leaves the fingertip's speed at a given share of the set point what it was.

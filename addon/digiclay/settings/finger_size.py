@@ -15,7 +15,7 @@ from .declared import assign, read
 from .devices import LENGTHS, fit_blister, scale_blister
 from .shown_units import SHOWN, to_si
 
-#: Least and largest size, m: narrower than that a finger falls between pins, wider than that no hand is.
+#: Least and largest size, m: narrower than that a fingertip falls between pins, wider than that no hand is.
 SMALLEST, LARGEST = 1e-3, 0.2
 
 
@@ -63,8 +63,8 @@ def _pose(tip: Any) -> Any | None:
 
 
 def _scale_blister(settings: Any, before: Fingertip, after: Fingertip) -> None:
-    """Scale the blister with the width of the finger, no wider than the bed."""
-    # One that the bed has limited remembers the width of the finger that it suits, so that a palm and then
+    """Scale the blister with the width of the fingertip, no wider than the bed."""
+    # One that the bed has limited remembers the width of the fingertip that it suits, so that a palm and then
     # a fingertip again leave it as it was.
     blister = Blister(**read(settings.blister, Blister, {}, "blister"))
     layout = Layout(**read(settings.layout, Layout, {}, "layout"))

@@ -74,7 +74,7 @@ def read_stored_settings(bed: Any) -> StoredSettings:
 
 
 def scene_of(bed: Any) -> Scene:
-    """Return the scene a bed's settings describe; the finger's path is one press in the middle."""
+    """Return the scene a bed's settings describe; the fingertip's path is one press in the middle."""
     scene = read_scene(bed)
     reason = find_layout_mismatch(bed, scene.layout)
     if reason:

@@ -1,10 +1,10 @@
 """Motion of the fingertip along a press stroke.
 
-The hand draws in its own time, and the finger follows later, in the session's: it comes from above,
+The hand draws in its own time, and the fingertip follows later, in the session's: it comes from above,
 presses to its depth where the mouse went down, goes along the whole path, never ahead of the hand and
 never faster than a drag may be, and leaves upwards. A slow machine, or clay that gives way slowly, thus
-makes the finger late, and loses nothing of the path. Depth counts from the surface as it was when the
-finger began: pins that give way do not draw the finger after them. No Blender in here.
+makes the fingertip late, and loses nothing of the path. Depth counts from the surface as it was when the
+finger began: pins that give way do not draw the fingertip after them. No Blender in here.
 
 A brush that raises presses until the blister starts, and rises to its height there, no faster than the
 pins can follow. Every brush then goes along at its height, up and down over what is formed, at a speed at
@@ -25,7 +25,7 @@ from ..core.surface.pointing import find_ground_height
 from .stroke import ABOVE, DONE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Mirror, Stroke
 from .tracking import Tracking
 
-#: Lowest point of the finger, m.
+#: Lowest point of the fingertip, m.
 Place = tuple[float, float, float]
 
 #: How fast it leaves, m/s: well above any pin's free speed, so that no blister follows it up; and how fast
@@ -37,12 +37,12 @@ DRAG = 0.1
 #: Fastest drag of a finger that presses, in its half widths a second: on the bed "design", half as wide, 6 mm
 #: deep, it leaves a valley uneven by 0.7 mm at 100 mm/s, by 0.05 mm at 60 mm/s.
 SPAN = 30.0
-#: How far above the highest pin the finger passes over the bed, m.
+#: How far above the highest pin the fingertip passes over the bed, m.
 CLEARANCE = 4e-3
 #: Heights that differ by less count as equal, m.
 NEAR = 1e-9
 #: How far a session slower than the wall's clock may fall behind the hand's times, s: what a hand does
-#: in seconds is not to take minutes. The path stays whole, since the finger drags no faster than `DRAG`.
+#: in seconds is not to take minutes. The path stays whole, since the fingertip drags no faster than `DRAG`.
 LATE = 0.5
 
 
@@ -73,7 +73,7 @@ def drag(stroke: Stroke, x: float, y: float, length: float) -> tuple[Stroke, flo
         last, aim = samples[reached], samples[reached + 1]
         (last_x, last_y), (aim_x, aim_y) = stroke.place(reached), stroke.place(reached + 1)
         passed = aim.time <= stroke.clock
-        # On the way to a move yet to come the finger is no farther than the hand was.
+        # On the way to a move yet to come the fingertip is no farther than the hand was.
         part = 1.0 if passed else (stroke.clock - last.time) / (aim.time - last.time)
         to_x, to_y = last_x + part * (aim_x - last_x), last_y + part * (aim_y - last_y)
         far = math.hypot(to_x - x, to_y - y)
@@ -94,7 +94,7 @@ def finish_image(stroke: Stroke) -> Stroke:
     return replace(stroke, phase=DONE)
 
 
-#: How fast the finger turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt read in
+#: How fast the fingertip turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt read in
 #: coarse steps does not jerk it.
 TURN = 3.0
 
@@ -145,10 +145,10 @@ def _multiply(first: Floats, second: Floats) -> Floats:
     return np.concatenate([[a * b - u @ v], a * v + b * u + np.cross(u, v)])
 
 
-#: How fast the finger comes down to the surface, and presses, m/s. Pressed faster, it runs into pins whose
+#: How fast the fingertip comes down to the surface, and presses, m/s. Pressed faster, it runs into pins whose
 #: valves have not opened yet: 2 N at 20 mm/s on the paper's device, 24 N at 50 mm/s.
 APPROACH, SPEED = 0.1, 0.02
-#: How long a finger that takes a blister up gains speed, s: at once at half the free speed, it leaves the
+#: How long a fingertip that takes a blister up gains speed, s: at once at half the free speed, it leaves the
 #: pins behind, whose valves have not opened yet.
 SPEED_UP = 1.0
 #: Fastest drag of a blister, in its radii a second: the control finds the finger so much later. The pins of
@@ -156,9 +156,9 @@ SPEED_UP = 1.0
 RADII = 2.0
 #: Likewise of a finger that presses a valley, and pushes the pins out of its way; `DRAG` on the paper's bed.
 PUSHED = 20.0 / 3.0
-#: How long pins look for a finger that leaves, s, and how many times as fast as they it is.
+#: How long pins look for a fingertip that leaves, s, and how many times as fast as they it is.
 SEARCH, OUTRUN = 0.1, 5.0
-#: How far the finger may be off its height while it goes on along the path, m.
+#: How far the fingertip may be off its height while it goes on along the path, m.
 SLACK = 0.5e-3
 
 
@@ -231,7 +231,7 @@ def _step(stroke: Stroke, ground: Ground, place: Place, safe: float, now: float)
     if stroke.phase == LEAVING:
         lift = LIFT
         if stroke.tracking is not None:
-            # Pins that look for the finger are not to find it again.
+            # Pins that look for the fingertip are not to find it again.
             speed = stroke.tracking.speed
             top = ground.find_lowest(stroke, x, y) + stroke.tracking.sink
             safe, lift = max(safe, top + max(CLEARANCE, SEARCH * speed)), max(LIFT, OUTRUN * speed)

@@ -53,7 +53,7 @@ class Brush(Enum):
 
     @property
     def needs_blister(self) -> bool:
-        """Whether the blister of the device has to follow the finger."""
+        """Whether the blister of the device has to follow the fingertip."""
         return self in (Brush.RAISE, Brush.LEVEL)
 
 
@@ -70,7 +70,7 @@ class Sample:
     depth: float
     #: Share of the way from the surface to the level, or strength of the smoothing, from 0 to 1.
     share: float = 1.0
-    #: How far the finger leans towards x and y of the bed, rad; see `stroke_motion.lean_finger`.
+    #: How far the fingertip leans towards x and y of the bed, rad; see `stroke_motion.lean_finger`.
     lean: tuple[float, float] = (0.0, 0.0)
 
 
@@ -84,19 +84,19 @@ class Stroke:
     samples: tuple[Sample, ...]
     #: Whether the hand still draws.
     held: bool = True
-    #: What the finger does.
+    #: What the fingertip does.
     phase: int = WAITING
-    #: Index of the sample the finger is at, or past.
+    #: Index of the sample the fingertip is at, or past.
     reached: int = 0
-    #: Time since the finger came above the path's first place, s: simulated, or by the wall less `LATE`.
+    #: Time since the fingertip came above the path's first place, s: simulated, or by the wall less `LATE`.
     clock: float = 0.0
     #: When it came there, by the wall, s.
     began: float = 0.0
-    #: (n,), heights of the pins when the finger began, m; None before.
+    #: (n,), heights of the pins when the fingertip began, m; None before.
     height: Floats | None = None
     #: Factors of x and y: the path itself, then its mirror images.
     mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
-    #: Index of the one that the finger is at.
+    #: Index of the one that the fingertip is at.
     image: int = 0
     #: Up to when every move has come, s; what was drawn since may still wait in Blender's queue.
     known: float = 0.0
@@ -105,18 +105,18 @@ class Stroke:
     #: Index of the first sample that came together with the last one.
     burst: int = 0
     brush: Brush = Brush.LOWER
-    #: How the blister follows, of a brush that needs one; found when the finger begins.
+    #: How the blister follows, of a brush that needs one; found when the fingertip begins.
     tracking: Tracking | None = None
-    #: How fast the finger rises with the blister, m/s.
+    #: How fast the fingertip rises with the blister, m/s.
     climb: float = 0.0
-    #: When a finger that smooths, or waits, came to the end of the path, s of `clock`.
+    #: When a fingertip that smooths, or waits, came to the end of the path, s of `clock`.
     left: float = 0.0
-    #: (4,), orientation of the finger when it began, which it has again when it is done; None before.
+    #: (4,), orientation of the fingertip when it began, which it has again when it is done; None before.
     turn: Floats | None = None
 
     @property
     def done(self) -> bool:
-        """Whether the finger has gone along all of the path and left it."""
+        """Whether the fingertip has gone along all of the path and left it."""
         return self.phase == DONE
 
     @property
@@ -127,7 +127,7 @@ class Stroke:
         return (path[self.reached :] * self.mirrors[self.image], *later)
 
     def place(self, index: int) -> tuple[float, float]:
-        """Return where a sample is on the path the finger is at, m."""
+        """Return where a sample is on the path the fingertip is at, m."""
         (along, across), one = self.mirrors[self.image], self.samples[index]
         return along * one.x, across * one.y
 

@@ -78,7 +78,7 @@ TOUCHED = 0.1e-3
 NARROW, WIDE = 2.0, 4.0
 #: How long a spike is settled before the next look, s, and how long a stroke settles at most.
 STRETCH, LONGEST = 0.02, 1.0
-#: Which way the finger of a brush moves the pins below it.
+#: Which way the fingertip of a brush moves the pins below it.
 SIGN = {Brush.LOWER: -1.0, Brush.RAISE: 1.0}
 
 
@@ -96,7 +96,7 @@ def settle(
     """Settle the worst spike for a while, or wait until the pins have arrived; returns as `sweep`."""
     gone = stroke.clock - stroke.left
     if gone < 0.0:
-        # The device still looks for the finger, and takes back what rises meanwhile.
+        # The device still looks for the fingertip, and takes back what rises meanwhile.
         most = min(count, math.ceil(-gone / period))
         clock = min(stroke.clock + most * period, stroke.left)
         return replace(stroke, clock=clock), np.tile(pose, (most + 1, 1)), np.zeros((most, ORDER))

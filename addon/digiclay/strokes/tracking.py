@@ -1,6 +1,6 @@
 """Tracking of a fingertip by a device's blister: what a press stroke that raises has to keep to. No Blender.
 
-Methods I, II and III hold the force under the finger: once it has been pressed in, pins that feel it rise
+Methods I, II and III hold the force under the fingertip: once it has been pressed in, pins that feel it rise
 with it. So clay is raised by a light press and a rise that the pins can follow, and it is leveled by a
 finger that goes along at one height.
 """
@@ -24,13 +24,13 @@ from ..core.model.touch import Touch
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
 
-#: How long a pin is under a finger that drags, s: some 4 mm at 14 mm/s. The pulp relaxes meanwhile.
+#: How long a pin is under a fingertip that drags, s: some 4 mm at 14 mm/s. The pulp relaxes meanwhile.
 CONTACT_TIME = 0.3
 #: How far beyond the depth that starts a blister the first press goes, m.
 MARGIN = 0.5e-3
-#: Share of the pins' own speed at which a finger rises: at 0.8 Method II loses it.
+#: Share of the pins' own speed at which a fingertip rises: at 0.8 Method II loses it.
 SHARE = 0.7
-#: Samples across a finger, and halvings, in the search for its sink.
+#: Samples across a fingertip, and halvings, in the search for its sink.
 SAMPLES, HALVINGS = 41, 40
 
 
@@ -38,13 +38,13 @@ SAMPLES, HALVINGS = 41, 40
 class Tracking:
     """Limits within which the blister of a device follows a fingertip."""
 
-    #: How far the finger's lowest point lies below the pins' tops while they hold its force, m.
+    #: How far the fingertip's lowest point lies below the pins' tops while they hold its force, m.
     sink: float
     #: Depth of a press that starts a blister, m.
     press: float
     #: Speed at which pins rise without load, m/s.
     speed: float
-    #: Speed at which a finger can rise with the blister under it, m/s.
+    #: Speed at which a fingertip can rise with the blister under it, m/s.
     lift: float
     #: Steepest slope of the blister's profile per height, 1/m.
     slope: float

@@ -135,7 +135,7 @@ class BatchStepper:
     alike: bool
     """The cells of all runs are alike, so they are moved as those of one large bed."""
     valve: int
-    """From this row on there is what moves a pin without a finger: its opening and its commands."""
+    """From this row on there is what moves a pin without a fingertip: its opening and its commands."""
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> BatchMovement:
         """Prepare to move one set of cells of all runs; see `interfaces.Stepper`."""

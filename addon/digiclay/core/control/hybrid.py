@@ -420,7 +420,7 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
     assert device.blister is not None
     asked = parameters.force_setpoint
     check_floor(HEAVIEST * asked, "force_setpoint", asked, device.force_floor)
-    # Without a finger nothing is ever felt.
+    # Without a fingertip nothing is ever felt.
     touch = device.cell.touch or Touch(Fingertip(), Contact(), Unrelaxed())
     servo = make_flow_servo(device.cell, device.period, device.dead_time, parameters.dead_band)
     noise = max(device.force_floor / 5.0, QUIET)

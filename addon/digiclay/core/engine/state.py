@@ -87,7 +87,7 @@ class ActiveSet:
     """(m,) or (m, b): Numbers in their own beds: first those the finger may touch, then the others that move
     or are controlled."""
     near: int
-    """Number k of those the finger may touch."""
+    """Number k of those the fingertip may touch."""
     block: Floats
     """(r, m) or (r, m, b): Their rows, see `Rows`."""
     mode: NDArray[np.int8]
@@ -99,7 +99,7 @@ class ActiveSet:
     """Discs of which every cell is in, the finger's and the controller's: center x, y, radius, m; arrays (b,)
     of b runs."""
     peak: Any
-    """No pin top in the finger's part is higher while this set is in use, m; a number or (b,)."""
+    """No pin top in the fingertip's part is higher while this set is in use, m; a number or (b,)."""
     until: int
     """Control period by which the set is to be made anew."""
     own: tuple[ActiveSet, ...] = ()
@@ -115,7 +115,7 @@ class ActiveSet:
 
     @cached_property
     def touched(self) -> Measurement:
-        """The cells the finger may touch."""
+        """The cells the fingertip may touch."""
         return self._part(self.near, [one.near for one in self.own])
 
     def _part(self, count: int, present: list[int]) -> Measurement:

@@ -36,7 +36,7 @@ class System:
     selection: Selection
     """Of the active cells."""
     instants: Floats
-    """(p,): Times into the period at which the finger's pose is needed, first 0, last `period`, s."""
+    """(p,): Times into the period at which the fingertip's pose is needed, first 0, last `period`, s."""
     rows: Rows
     by_set: bool
     """Whether what becomes of a cell depends on which others are active: in a batch each run then keeps the

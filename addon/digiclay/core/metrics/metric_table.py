@@ -46,12 +46,12 @@ METRICS: dict[str, Metric] = {
         "N", "total force asked for; one that changes from row to row: its mean while shaping",
         "set point", "N",
     ),
-    "rfd": Metric("N", "rms over time of (total force - set point) while the finger touches", "RFD", "mN"),
+    "rfd": Metric("N", "rms over time of (total force - set point) while the fingertip touches", "RFD", "mN"),
     "rfd_shaping": Metric(
         "N", "the same, only while a cell follows the force: without touching down", "RFD while shaping", "mN"
     ),
     "rfd_session": Metric("N", "the same over the whole session; without contact the force is 0"),
-    "contact_share": Metric("1", "share of the session's time in which the finger touches"),
+    "contact_share": Metric("1", "share of the session's time in which the fingertip touches"),
     "contact_loss_share": Metric(
         "1", "share of the time from first to last contact in which it does not touch", "without contact", "%"
     ),
@@ -70,10 +70,10 @@ METRICS: dict[str, Metric] = {
         "s", "first touch: from touching down until the force stays within 10 % of its set point"
     ),
     "height_deviation": Metric(
-        "m", "standard deviation over time of the surface's height over the finger, shaping",
+        "m", "standard deviation over time of the surface's height over the fingertip, shaping",
         "height deviation", "mm",
     ),
-    "ridge_offset": Metric("m", "mean height of what the finger left behind over its path"),
+    "ridge_offset": Metric("m", "mean height of what the fingertip left behind over its path"),
     "ridge_error": Metric("m", "rms of the same", "ridge-height error", "mm"),
     "ridge_unevenness": Metric("m", "standard deviation of the same", "unevenness", "mm"),
     "max_cell_force": Metric("N", "largest force on one cell"),
@@ -96,7 +96,7 @@ METRICS: dict[str, Metric] = {
 }  # fmt: skip
 #: Metrics of a run beside those of its history.
 RUN: dict[str, Metric] = {
-    "losses": Metric("1", "how often the controller lost the finger, at every lift-off too", "losses"),
+    "losses": Metric("1", "how often the controller lost the fingertip, at every lift-off too", "losses"),
     "run_time": Metric("s", "time the simulation took", "run time", "s"),
     "real_time_factor": Metric("1", "simulated time over run time"),
     "simulated": Metric("s", "simulated time", "simulated", "s"),

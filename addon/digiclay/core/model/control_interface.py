@@ -61,7 +61,7 @@ class Controller(Protocol):
         ...
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
-        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control."""
+        """Take in the cells the fingertip may touch; return memory and the disc x, y, radius to control."""
         ...
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
@@ -76,7 +76,7 @@ class SetPoint:
     force: float
     """F_ref, N."""
     per_cell: bool = False
-    """Whether every cell that follows the finger is asked for it, and not all cells together."""
+    """Whether every cell that follows the fingertip is asked for it, and not all cells together."""
 
     def total(self, following: ArrayLike) -> Floats:
         """Return the set point of n following cells, N: F_ref, or per cell n F_ref, NaN at n = 0."""

@@ -2,7 +2,7 @@
 
 Beyond nine tenths of the way to its rim the ellipsoid is continued by the paraboloid
 that meets it with equal slope. The ellipsoid itself ends there with infinite slope; the
-finger does not end there, and a tall pin that the finger runs into sideways must be met
+finger does not end there, and a tall pin that the fingertip runs into sideways must be met
 by a force that grows, not by one that jumps.
 """
 

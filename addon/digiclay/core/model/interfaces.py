@@ -17,7 +17,7 @@ from ..base.arrays import Floats
 from .control_interface import Measurement
 from .delay import Queue
 
-#: Moves a block of cells on by one control period, in place. It takes the underside of the finger over the
+#: Moves a block of cells on by one control period, in place. It takes the underside of the fingertip over the
 #: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. Of
 #: the cells of b runs all arrays have one axis more, the last.
 Movement = Callable[[Floats], Floats]
@@ -148,7 +148,7 @@ class Stepper(Protocol):
 
     @property
     def nodes(self) -> tuple[float, ...]:
-        """When, in shares of a physics step, the finger's pose is needed."""
+        """When, in shares of a physics step, the fingertip's pose is needed."""
         ...
 
     @property

@@ -29,7 +29,7 @@ class ValveObserver(Sensors):
     In a control period a pin moves by ``A ΔH = ∫ α(K) (P_s(K) - F/A) dt``, where α is the
     conductance of valve and conduit. The opening K is known from the commands, so
     ``F = A (<α P_s> - A ΔH/T) / <α>``: the mean force of the period, weighted with α. It is
-    not below 0, for a finger cannot pull. Where the valve is shut, or the pin is at an end
+    not below 0, for a fingertip cannot pull. Where the valve is shut, or the pin is at an end
     stop, the motion says nothing, and the last estimate is held.
     """
 

@@ -22,7 +22,7 @@ class Cell:
     """Parts of every cell.
 
     A block of n cells has state rows ``y`` of shape (r, n): height, m; the pulp's rows (used
-    for the first k cells, which the finger may touch); the lag's rows.
+    for the first k cells, which the fingertip may touch); the lag's rows.
     """
 
     actuator: Actuator
@@ -59,7 +59,7 @@ class Speeds:
     def reach(self, height: Floats, under: Floats, time: Floats | float) -> tuple[Floats, Floats]:
         """Return the lowest and the highest that pins can be after some time, (n, ..), m.
 
-        A finger that pushes a pin leaves it where they part, and what it does not push goes no faster than
+        A fingertip that pushes a pin leaves it where they part, and what it does not push goes no faster than
         its valve lets it: no pin is lower than it was, or than the undersides (p, k, ..), m, by more.
         """
         lowest = height.copy()

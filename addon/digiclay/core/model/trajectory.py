@@ -47,7 +47,7 @@ class Trajectory:
 
     *smooth* joins them by monotone cubics (Fritsch and Carlson): velocity is continuous,
     and no coordinate overshoots a waypoint. *linear* joins them by straight lines.
-    Before the first and after the last waypoint the finger stays.
+    Before the first and after the last waypoint the fingertip stays.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Trajectory:
         return float(self.times[-1])
 
     def poses(self, times: Floats) -> Floats:
-        """Return the finger's poses, shape (k, 7), at `times`, shape (k,), s."""
+        """Return the fingertip's poses, shape (k, 7), at `times`, shape (k,), s."""
         poses = np.empty((times.size, 7))
         if self.times.size == 1:
             poses[:, :3], poses[:, 3:] = self.positions[0], self.orientations[0]

@@ -118,6 +118,6 @@ def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> i
 
 
 def find_last_touch(history: Mapping[str, NDArray[Any]]) -> int:
-    """Return the last row in which the finger touches, or the last one: there is most to be seen."""
+    """Return the last row in which the fingertip touches, or the last one: there is most to be seen."""
     touching = np.flatnonzero(history["total_force"] > 0.0)
     return int(touching[-1]) if touching.size else len(history["time"]) - 1

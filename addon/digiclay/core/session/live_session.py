@@ -111,9 +111,9 @@ def interpolate_path(start: Floats, end: Floats, count: int) -> Floats:
 
 
 def clamp_pose(pose: Floats, stroke: float) -> Floats:
-    """Return the pose, raised to where a finger can be: its lowest point no deeper than the bed's floor.
+    """Return the pose, raised to where a fingertip can be: its lowest point no deeper than the bed's floor.
 
-    Pins bottom out there. A finger an artist drags below it would press with more newtons than
+    Pins bottom out there. A fingertip an artist drags below it would press with more newtons than
     floating-point numbers have.
 
     `pose` (7,); `stroke`: highest pin top, m; sideways and upwards a thousand strokes are as good as

@@ -134,7 +134,7 @@ def to_scene(take: Take, name: str) -> Scene:
 
 
 def _make_path(times: Floats, poses: Floats) -> Path:
-    """Return a finger's poses (t, 7) at times (t,), s, as the path of a scene."""
+    """Return a fingertip's poses (t, 7) at times (t,), s, as the path of a scene."""
     waypoints = (
         Waypoint(float(times[row]), tuple(poses[row, :3].tolist()), tuple(poses[row, 3:].tolist()))
         for row in np.flatnonzero(_find_turns(poses))

@@ -2,7 +2,7 @@
 
 Each control period is done with whole steps and with half steps. Where the two differ by
 more than a cell may add to its error, that cell alone is done again with quarter steps, and
-so on. Under the finger what is kept is the extrapolation of the two finest, whose error is
+so on. Under the fingertip what is kept is the extrapolation of the two finest, whose error is
 smaller still.
 """
 
@@ -20,13 +20,13 @@ from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 from .richardson import bound
 
-#: A block to work in, the map to the finger's underside at the instants of a level's steps, and what moves
+#: A block to work in, the map to the fingertip's underside at the instants of a level's steps, and what moves
 #: the block on.
 Bound = tuple[Floats, Floats, Movement]
 
 #: Steps are halved at most so often.
 FINEST = 7
-#: Share of the tolerance that a control period may add to a cell under the finger, where errors
+#: Share of the tolerance that a control period may add to a cell under the fingertip, where errors
 #: die out within some periods, and to any other, where they add up over the session.
 PRESSED, FREE = 0.1, 0.001
 

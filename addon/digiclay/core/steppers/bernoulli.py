@@ -1,12 +1,12 @@
 """Closed-form stepper: exact for an exponential spring behind a linear flow resistance.
 
 The valve's opening is known in closed form all through a period. Over a physics step its
-conductance, the force lost to relaxation and the finger's speed are frozen at their means, and
+conductance, the force lost to relaxation and the fingertip's speed are frozen at their means, and
 what remains is solved exactly (`closed_form`). The step is therefore stable at any length and
 stiffness, without iteration, and second order. What the frozen speeds leave out most of, that
 free pin and finger go bent paths, is put back by its mean, the chord deviation. A valve that changes
 reservoir within a step needs no care (conductance and drive are averaged at Gauss points of the
-exact opening), and a cell that meets or leaves the finger does so at the exact instant.
+exact opening), and a cell that meets or leaves the fingertip does so at the exact instant.
 """
 
 from __future__ import annotations
@@ -317,7 +317,7 @@ class StepWorkspace:
         np.copysign(size, opening, self.signed)
 
     def _press(self) -> None:
-        """Move the block on step by step, its first k cells under the finger, and their pulp with them."""
+        """Move the block on step by step, its first k cells under the fingertip, and their pulp with them."""
         height, near = self.height, self.near
         first, mean, last, lost, relaxed = self.first, self.mean, self.last, self.lost, self.relaxed
         m, offset, per_m, most, zero, one, half, tiny = self.constants
@@ -372,7 +372,7 @@ class StepWorkspace:
                 end = near * m - offset - self._seen(2 * len(self.steps) + s + 1)
                 _tension(end, zero, most, last)
                 np.putmask(mean, stopped, half * (first + last))
-            # Where the finger is not touched all through the step the mean is that of no tension.
+            # Where the fingertip is not touched all through the step the mean is that of no tension.
             np.maximum(mean, zero, out=mean)
             # Of a tension that falls steeply a straight line would make a filter that pulls.
             propagate()
@@ -380,7 +380,7 @@ class StepWorkspace:
         self.pulp[:] = self.filters
 
     def _seen(self, row: int) -> Floats:
-        """Return what one row of the plan's `path` makes of the finger's underside."""
+        """Return what one row of the plan's `path` makes of the fingertip's underside."""
         seen: Floats = apply_map(self.plan.path[row : row + 1], self.under)[0]
         return seen
 

@@ -1,11 +1,11 @@
 """Exact solution of a loaded cell's equation over a step with frozen coefficients.
 
 An exponential spring behind a linear flow resistance. All is dimensionless: the exponent
-``e = m (x - x0)`` of the indentation x, time s in steps (0 to 1). While the finger presses,
+``e = m (x - x0)`` of the indentation x, time s in steps (0 to 1). While the fingertip presses,
 
     de/ds = slip + decay (pulp - exp(e)),
 
-where `slip` is m times the way the pin and the finger approach without load, `decay` the
+where `slip` is m times the way the pin and the fingertip approach without load, `decay` the
 hydraulic stiffness, and ``pulp = 1 + S m/b`` the exponent at which the relaxed pulp begins
 to push. ``u = exp(-e)`` obeys the linear equation ``du/ds = decay - growth u`` with
 ``growth = slip + decay pulp``: a Bernoulli equation. Where no force acts, ``de/ds = slip``.
@@ -78,7 +78,7 @@ def solve_carefully(
 def solve_crossing(
     exponent: Floats, deviation: Floats, slip: Floats, decay: Floats, pulp: Floats
 ) -> tuple[Floats, Floats]:
-    """Solve for cells that meet or leave the finger within the step.
+    """Solve for cells that meet or leave the fingertip within the step.
 
     `exponent`, `slip`, `decay`, `pulp` (k,), see the module. Below ``log(pulp)`` at the start means meeting,
     above it leaving; `deviation` (k,), chord deviation of the path without load: its mean above the straight
@@ -131,7 +131,7 @@ class StepStart(NamedTuple):
     finger_deviation: Floats
     """The finger's part in it, with its sign changed."""
     lift: Floats
-    """Rise of the finger, in 1/m."""
+    """Rise of the fingertip, in 1/m."""
     relaxed: Floats
     """exp(e) at which the pulp begins to push."""
     idle: NDArray[np.bool_]
@@ -226,7 +226,7 @@ def _limit(
     """
     alone = valve.rises(0.0)
     highest, fall = np.maximum(alone, 0.0).sum(axis=0), np.minimum(alone, 0.0).sum(axis=0)
-    # Along the parabola of the finger's way, at its middle and its end.
+    # Along the parabola of the fingertip's way, at its middle and its end.
     middle = 0.5 * start.lift + 1.5 * start.finger_deviation
     deepest = np.maximum(start.exponent - np.minimum(np.minimum(middle, start.lift), 0.0), 0.0)
     most = _exponential(deepest + m * highest)

@@ -18,7 +18,7 @@ from ..scene.recorder import Recorder
 from ..scene.schema import Scene
 from ..session.run_scene import Result, run, select_rows
 
-#: How long the finger rests at the ends of a phase, s.
+#: How long the fingertip rests at the ends of a phase, s.
 REST = 0.3
 
 
@@ -78,7 +78,7 @@ class Drag(Parameters):
     length: float = quantity(42e-3, "how far it drags", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the finger's path, and when it starts and ends to drag, s, for a surface at `rest`, m."""
+        """Return the fingertip's path, and when it starts and ends to drag, s, for a surface at `rest`, m."""
         left, right, down, level = (
             -0.5 * self.length,
             0.5 * self.length,
@@ -107,7 +107,7 @@ class Lift(Parameters):
     rise: float = quantity(18e-3, "how far it lifts", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the finger's path, and when it starts and ends to lift, s, for a surface at `rest`, m."""
+        """Return the fingertip's path, and when it starts and ends to lift, s, for a surface at `rest`, m."""
         down, start = rest - self.press, 2.0
         # A cubic that starts and ends at rest is 1.5 times as fast in the middle as on the whole.
         end = start + 1.5 * self.rise / speed
@@ -162,7 +162,7 @@ def judge(done: Result, start: float, end: float, speed: float) -> Follows:
 
 
 def _refuse_small(scene: Scene, way: Drag | Lift) -> None:
-    """Refuse a bed the finger would leave."""
+    """Refuse a bed the fingertip would leave."""
     needed = way.length if isinstance(way, Drag) else 0.0
     wide = (scene.layout.columns - 1) * scene.layout.pitch
     if wide < needed:
@@ -192,7 +192,7 @@ def find_largest_speed(
     resolution: float = 0.5e-3,
     told: Callable[[Follows], None] | None = None,
 ) -> float | None:
-    """Return the largest speed, m/s, at which a finger is followed, by bisection; see `bisect`."""
+    """Return the largest speed, m/s, at which a fingertip is followed, by bisection; see `bisect`."""
 
     def holds(speed: float) -> bool:
         judged, _ = track(scene, way, speed)
