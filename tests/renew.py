@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from digiclay.core.base.quantity import list_quantities
+from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import periods
 from digiclay.core.model.valve import Fluid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
-from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.schema import SECTIONS, Scene, import_parameters
 from digiclay.core.session import snapshot
 from digiclay.core.session.accuracy import estimate_errors
 from digiclay.core.session.run_scene import Result, run
@@ -56,6 +58,19 @@ def run_turbulent() -> dict[str, Any]:
     }
 
 
+def list_declarations() -> dict[str, list[Any]]:
+    """Return default, unit and bounds of every parameter of a scene, by section, method and name."""
+    return {
+        f"{section} {method} {name}": [
+            getattr(kind(), name), known.unit, dict(known.list_bounds()), list(known.choices)
+        ]
+        for section in SECTIONS
+        for method in (METHODS if section == "control" else ("",))
+        for kind in [import_parameters(section, method or "virtual_master")]
+        for name, known in list_quantities(kind).items()
+    }  # fmt: skip
+
+
 def go_on(file: Path) -> dict[str, NDArray[np.float64]]:
     """Return heights and forces of 50 periods from a state, or heights of a take, every tenth row."""
     if file.suffix == ".take":
@@ -79,9 +94,14 @@ def run_again(scene: Scene, metrics: dict[str, Any]) -> Result:
     return result.with_errors(errors) if errors else result
 
 
+def collect_golden() -> dict[str, Any]:
+    """Return the present numbers and declarations."""
+    return {**run_golden(), **run_turbulent(), "parameters": list_declarations()}
+
+
 def renew() -> None:
     """Write all of it."""
-    GOLDEN.write_text(json.dumps({**run_golden(), **run_turbulent()}, indent=1) + "\n", encoding="utf-8")
+    GOLDEN.write_text(json.dumps(collect_golden(), indent=1) + "\n", encoding="utf-8")
     for file in sorted([*SAMPLES.glob("states/*.state"), *SAMPLES.glob("takes/*.take")]):
         stored = dict(np.load(file.with_suffix(".npz")))
         np.savez_compressed(file.with_suffix(".npz"), **{**stored, **go_on(file)})

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from tests.renew import GOLDEN, run_golden, run_turbulent
+from tests.renew import GOLDEN, collect_golden, run_golden
 
 #: N and mm: hundreds of times what rounding does, a tenth or less of what a part in 1e9 does.
 FORCE, HEIGHT, WEIGHED = {"abs": 1e-11}, {"abs": 1e-10}, {"rel": 1e-12}
@@ -28,7 +28,7 @@ TOLERANCES = {
 @pytest.fixture(scope="module")
 def golden() -> dict[str, Any]:
     """Return the present numbers."""
-    return {**run_golden(), **run_turbulent()}
+    return collect_golden()
 
 
 @pytest.mark.parametrize("name", TOLERANCES)
@@ -42,3 +42,8 @@ def test_a_part_in_1e9_is_seen() -> None:
     moved = run_golden(f"contact.exponent={2000.0 * (1.0 + 1e-9)!r}")
     for name, found in moved.items():
         assert found != pytest.approx(stored[name], **TOLERANCES[name])
+
+
+def test_every_parameter_is_declared_as_it_was(golden: dict[str, Any]) -> None:
+    stored = json.loads(GOLDEN.read_text(encoding="utf-8"))
+    assert json.loads(json.dumps(golden["parameters"])) == stored["parameters"]
