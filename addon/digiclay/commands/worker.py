@@ -6,6 +6,7 @@ and when whoever started it has died.
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import os
 import subprocess
@@ -47,9 +48,11 @@ def find_program(module: str = "") -> tuple[list[str], dict[str, str]]:
     bpy: Any = sys.modules.get("bpy")
     if bpy is not None and bpy.app.binary_path:
         return start_blender(bpy.app.binary_path), {}
-    # Packages beside this one, and what an extension brings along, are elsewhere.
-    folders = [str(Path(__file__).resolve().parents[2]), *filter(None, sys.path)]
-    environment = {"PYTHONPATH": os.pathsep.join(folders)}
+    folders = [str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
+    bundled = importlib.util.find_spec("trimesh") if PACKAGE.startswith("bl_ext.") else None
+    if bundled is not None and bundled.origin is not None:  # what an extension brings along is elsewhere
+        folders.append(str(Path(bundled.origin).parents[1]))
+    environment = {"PYTHONPATH": os.pathsep.join(filter(None, folders))}
     return [sys.executable, "-m", f"{Path(__file__).resolve().parents[1].name}{module}"], environment
 
 

@@ -76,7 +76,12 @@ def show(bed: Any, session: Running) -> None:
 def place_finger(context: Any, bed: Any, session: Running) -> None:
     """Put the fingertip where a session has it; an animation or constraint of the fingertip prevails."""
     if _move_finger(bed, session):
-        context.view_layer.update()
+        _evaluate(context)
+
+
+def _evaluate(context: Any) -> None:
+    """Have Blender evaluate what has changed: only then the world's matrix of a moved fingertip is right."""
+    context.view_layer.update()
 
 
 def _move_finger(bed: Any, session: Running) -> bool:
@@ -158,7 +163,7 @@ def _advance_session(
     if before.stale or before.blocking_reason or changes or not np.array_equal(seen, _visible_rows(later)):
         view.show_state(bed, later.system, later.state)
     if moved:  # One evaluation of pins and fingertip takes less time than one of each.
-        context.view_layer.update()
+        _evaluate(context)
 
 
 def _visible_rows(session: Running) -> Floats:
