@@ -89,4 +89,4 @@ def test_threads_that_were_started_before_are_kept_to_the_core_too() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=TIMEOUT, check=True,
         cwd=ROOT,
     ).stdout  # fmt: skip
-    assert told.split() == ["1", "1"]
+    assert told.splitlines()[-1].split() == ["1", "1"]  # Blender may log before
