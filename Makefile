@@ -57,7 +57,7 @@ form: ## mend style, format and generated pages; then check types, layers, names
 MODULES ?=
 mutants: ## change the core's physics, engine, control and metrics here and there, and list what no test notices
 	@$(ENVIRONMENT) requirements/mutation.txt $(IN_311)
-	@rm -f .reports/mutants.txt; .venv/bin/python tools/mutants.py --report .reports/mutants.txt --count 150 --limit 600 --most 0.21 $(MODULES)
+	@rm -f .reports/mutants.txt; .venv/bin/python tools/mutants.py --report .reports/mutants.txt --count 100 --limit 900 --most 0.21 $(MODULES)
 
 # Some of them: make test-matrix BLENDERS="4.2 5.2"
 BLENDERS ?= 4.2 4.5 5.0 5.2
