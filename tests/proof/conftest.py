@@ -42,12 +42,8 @@ def meshes(paper: Path) -> Path:
         assert main(["export", str(paper), "--kind", kind, "--out", str(out / "bilinear"), *every]) == 0
     for skin in ("smooth", "membrane"):
         for kind in (["solid"], ["features", "--separate"]):
-            assert (
-                main(
-                    ["export", str(paper), "--kind", *kind, "--skin", skin, "--out", str(out / skin), *every]
-                )
-                == 0
-            )
+            words = ["--kind", *kind, "--skin", skin, "--out", str(out / skin), *every]
+            assert main(["export", str(paper), *words]) == 0
     return out
 
 

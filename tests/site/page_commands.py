@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import NamedTuple
 
 #: Programs whose lines are commands; a number behind a name is a version.
 PROGRAM = re.compile(
-    r"(?:\$ )?(python tools/\w+\.py(?: .*)?|(?:digiclay|python -m (?:benchmarks|digiclay)|make|pip install"
+    r"(?:\$ )?(python (?:tools|docs/examples)/\w+\.py(?: .*)?"
+    r"|(?:digiclay|python -m (?:benchmarks|digiclay)|make|pip install"
     r"|blender (?:--command|--background|-b)|dask|\.venv/bin/\w+) (?!\d).*)"
 )
 #: Word in place of which a reader writes something: DIR, RUN, SCENE.
@@ -20,18 +20,8 @@ TITLE = re.compile(r'```\w+ title="([^"]+)"')
 
 
 class Command(NamedTuple):
-    """One command of a page.
+    """One command of a page, and whether it stands in a block of code; else within a sentence or a table."""
 
-    Attributes
-    ----------
-    line : int
-        Number of its line.
-    text : str
-    block : bool
-        Whether it stands in a block of code; else within a sentence or a table.
-    """
-
-    line: int
     text: str
     block: bool
 
@@ -54,17 +44,17 @@ def find_commands(text: str) -> list[Command]:
     One of a sentence with a placeholder is a form, and one without arguments a name.
     """
     found, fenced = [], False
-    for number, line in enumerate(text.splitlines(), 1):
+    for line in text.splitlines():
         fence = line.lstrip().startswith("```")
         fenced ^= fence
         if fenced or line.startswith("    "):
             match = PROGRAM.fullmatch(line.strip())
-            found += [Command(number, _complete(match[1]), True)] if match else []
+            found += [Command(_complete(match[1]), True)] if match else []
             continue
         for inside in re.findall(r"`([^`]+)`", line):
             match = PROGRAM.fullmatch(inside)
             if match and not PLACEHOLDER.search(inside) and not NAME.fullmatch(inside):
-                found.append(Command(number, _complete(match[1]), False))
+                found.append(Command(_complete(match[1]), False))
     return found
 
 
@@ -82,8 +72,3 @@ def find_files(text: str) -> list[Given]:
                 content.append(inside)
             found.append(Given(title[1], "\n".join(content) + "\n"))
     return found
-
-
-def list_commands(page: Path) -> list[Command]:
-    """Return the commands of a page that is a file."""
-    return find_commands(page.read_text(encoding="utf-8"))

@@ -42,13 +42,7 @@ def _excused() -> set[str]:
 
 @functools.cache
 def execute(command: str, folder: Path) -> str:
-    """Carry out a command in a folder; return why it failed, or "".
-
-    Parameters
-    ----------
-    command : str
-    folder : Path
-    """
+    """Carry out a command in a folder; return why it failed, or ""."""
     program, *words = shlex.split(command)
     beside = Path(sys.executable).parent / Path(program).name
     found = str(beside) if beside.exists() else shutil.which(program)
@@ -62,17 +56,9 @@ def execute(command: str, folder: Path) -> str:
 
 
 def play(text: str, folder: Path, excused: set[str]) -> list[str]:
-    """Carry out the commands of a page in a folder that has its files; return the failures.
+    """Carry out the commands of a page that are not excused, in a folder with its files; return the failures.
 
     `make` runs in the checkout, where it belongs, and once for all pages.
-
-    Parameters
-    ----------
-    text : str
-        The page.
-    folder : Path
-    excused : set of str
-        Commands that are not executed.
     """
     for name, source in _listed()["own"].items():
         shutil.copyfile(ROOT / source, folder / name)
