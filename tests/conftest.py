@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -51,3 +52,23 @@ def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     from digiclay.core.session import live_session
 
     monkeypatch.setattr(live_session, "SHARE", 1e9)
+
+
+@pytest.fixture
+def here(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml: the module's SCENE, or a tap on 3 x 4 pins."""
+    from tests.scene_files import SCENE, folder_with
+
+    return folder_with(getattr(request.module, "SCENE", SCENE), tmp_path, monkeypatch)
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[[list[str], str], None]:
+    """Give a check that a command ends with exit code 2 and one line that has some words."""
+    from digiclay.cli import main
+
+    def check(arguments: list[str], said: str) -> None:
+        code, (out, err) = main(arguments), capsys.readouterr()
+        assert (code, out, err.count("\n"), said in err) == (2, "", 1, True), err
+
+    return check

@@ -1,11 +1,18 @@
-"""Other processes, for tests of what they leave behind."""
+"""Other processes, for tests of what they do and leave behind."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 from tests.timeouts import TIMEOUT
+
+ADDON = Path(__file__).parents[1] / "addon"
+#: The command line as a script.
+PROGRAM = "from digiclay.cli import console; console()"
 
 
 def dead() -> int:
@@ -13,3 +20,20 @@ def dead() -> int:
     process = subprocess.Popen([sys.executable, "-c", ""])
     process.wait(TIMEOUT)
     return process.pid
+
+
+def start(script: str, *arguments: str, env: dict[str, str] | None = None, **options: Any) -> Any:
+    """Start Python on a script that may import the package."""
+    return subprocess.Popen(
+        [sys.executable, "-c", script, *arguments], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ADDON), **(env or {})}, **options,
+    )  # fmt: skip
+
+
+def finish(process: Any) -> tuple[int, str, str]:
+    """Wait for a process; return exit code, stdout and stderr."""
+    try:
+        out, err = process.communicate(timeout=TIMEOUT)
+    finally:
+        process.kill()
+    return process.returncode, out, err

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import os
+import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,6 +28,10 @@ def scene_text(rows: int, columns: int, *waypoints: tuple[float, float], parts: 
     return "\n".join([bed, "[trajectory]", "waypoints = [", *places, "]\n"])
 
 
+#: A tap on 3 x 4 pins, the least that most commands need.
+SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
+
+
 def folder_with(scene: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in an empty folder with one scene, my.toml."""
     (folder / "my.toml").write_text(scene, encoding="utf-8")
@@ -34,3 +42,24 @@ def folder_with(scene: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 def left(folder: Path) -> list[str]:
     """Return what lies in the folder besides the scene, hidden things too."""
     return sorted(path.name for path in folder.iterdir() if path.name != "my.toml")
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    """Return the lines of a table."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def interrupt_after(count: int, monkeypatch: pytest.MonkeyPatch, number: int = signal.SIGINT) -> None:
+    """Have this process get a signal when so many points of a series are kept."""
+    from digiclay.core.studies.sweep_plan import Folder
+
+    keep, kept = Folder.keep, []
+
+    def told(*given: Any) -> None:
+        keep(*given)
+        kept.append(given)
+        if len(kept) == count:
+            os.kill(os.getpid(), number)
+
+    monkeypatch.setattr(Folder, "keep", told)

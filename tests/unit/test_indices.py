@@ -96,6 +96,10 @@ def test_first_and_total_indices_need_no_second_order(tmp_path: Path) -> None:
     assert np.all(np.abs(found.first - FIRST) <= found.first_interval)
     assert np.all(np.abs(found.total - TOTAL) <= found.total_interval)
     assert np.isnan(found.second).all()
+    # What does not vary has none.
+    for size in (0.0, 1e-12):
+        noise = np.random.default_rng(1).normal(0.0, size, 40)
+        assert compute_indices(5.0 + noise, 3, 1, second=False) is None
 
 
 def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path) -> None:
@@ -125,12 +129,6 @@ def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone()
     found = [compute_indices(values, 2, seed, second=False) for seed in (3, 3, 4)]
     intervals = [indices.first_interval.tolist() for indices in found if indices is not None]
     assert intervals[0] == intervals[1] != intervals[2]
-
-
-@pytest.mark.parametrize("size", [0.0, 1e-12])
-def test_an_output_that_does_not_vary_has_no_indices(size: float) -> None:
-    noise = np.random.default_rng(1).normal(0.0, size, 40)
-    assert compute_indices(5.0 + noise, 3, 1, second=False) is None
 
 
 def record(rfd: float | None, loss: float | None = 0.0) -> Record:

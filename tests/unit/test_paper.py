@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,40 +59,28 @@ def test_a_fingertip_that_a_method_loses_is_named_with_the_method() -> None:
     assert claim.verdict == "holds in part"
     assert "Not followed: Method II" in claim.why
     assert "Method I," not in claim.why
-    assert "lost 1 times, 40% of the time without contact" in claim.measured
-    late = tracking(results(cell_states=replace(GOOD, lag=3.1e-3)))  # a pitch is 3 mm
-    assert (late.verdict, late.why[:24]) == ("holds in part", claim.why[:24])
-
-
-def test_the_onset_lies_between_the_last_calm_gain_and_the_first_that_swings() -> None:
-    assert results(*CALM_THEN_WILD).onset(500.0) == (5.0, 50.0)
-    assert results(*CALM_THEN_WILD[:2]).onset(500.0) == (5.0, None)
-    assert results(*CALM_THEN_WILD[2:]).onset(500.0) == (None, 50.0)
-    assert not Swing(2.0, 500.0, 0.5, None, None).sustained  # a slow drift
+    # Method III is beside the methods of the paper in figures and in no claim.
+    two, three = results(), Results(simple={(scenes.THIRD, name): GOOD for name in WAYS})
+    both = replace(two, third=three).compared()
+    assert {method for method, _ in both.simple} == set(scenes.COMPARED)
+    assert two.compared() is two
+    assert "Method III" not in tracking(replace(two, third=three)).measured
 
 
 def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session() -> None:
-    never = onset(results(*CALM_THEN_WILD[:2]))
-    assert never.verdict == "differs"
-    assert "none up to K_f = 5 1/N" in never.measured
     swings = results(*CALM_THEN_WILD)
-    beyond = onset(swings)
-    assert beyond.verdict == "holds in part"
+    assert swings.onset(500.0) == (5.0, 50.0)  # between the last calm gain and the first that swings
+    assert results(*CALM_THEN_WILD[:2]).onset(500.0) == (5.0, None)
+    assert results(*CALM_THEN_WILD[2:]).onset(500.0) == (None, 50.0)
+    assert not Swing(2.0, 500.0, 0.5, None, None).sustained  # a slow drift
+    never, beyond = onset(results(*CALM_THEN_WILD[:2])), onset(swings)
+    assert (never.verdict, beyond.verdict) == ("differs", "holds in part")
+    assert "none up to K_f = 5 1/N" in never.measured
     assert "at 50 1/N (amplitude 0.200 N, 10 Hz)" in beyond.measured
     assert "are below the onset, 10 times this K_f" in beyond.why  # the scene's own K_f is 5 1/N
     scene = resolve({"control": {"method": "virtual_master", "force_gain": 60.0}})
     swings.printed[scenes.METHODS[0]] = swings.printed[scenes.METHODS[0]]._replace(scene=scene)
     assert onset(swings).verdict == "holds"
-
-
-def test_speed_counts_along_every_way_and_not_along_the_ridge_alone() -> None:
-    found, (one, two) = results(), scenes.METHODS
-    found.printed[two], found.lifting = found.printed[one], {one: 20e-3, two: 20e-3}
-    found.fastest = {(method, way): 20e-3 for method in scenes.METHODS for way in WAYS}
-    assert largest_speed(found).verdict == "holds"
-    slow = replace(found, fastest=found.fastest | {(two, "a valley"): 14e-3})
-    still = replace(found, lifting={one: 20e-3, two: None})
-    assert [largest_speed(some).verdict for some in (slow, still)] == ["holds in part"] * 2
 
 
 @pytest.mark.parametrize(
@@ -104,13 +93,6 @@ def test_deviations_count_in_each_of_the_papers_windows(height: float | None, sa
     two.windows["valley alone"] = twice | {"height_deviation": height}
     found = dict(zip(scenes.METHODS, (one, two), strict=True))
     assert deviations(replace(results(), printed=found, session=found)).verdict == said
-
-
-def test_the_trade_needs_a_response_that_gets_quicker_and_an_oscillation() -> None:
-    assert trade(results(*CALM_THEN_WILD)).verdict == "holds"
-    slower = (swing(2.0, 0.001, 0.2), swing(5.0, 0.001, 0.3), swing(50.0, 0.2, None))
-    assert trade(results(*slower)).verdict == "holds in part"
-    assert "never settles" in trade(results(CALM_THEN_WILD[2])).measured
 
 
 def test_a_slowed_session_takes_as_many_times_as_long() -> None:
@@ -135,23 +117,16 @@ def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float
     assert find_unintended_losses(done) == pytest.approx(times)
 
 
-def test_every_arrow_of_the_controller_is_a_row_of_the_page() -> None:
-    text = page(results(), [], {}, 1.0, "0")
+def test_every_arrow_of_the_controller_and_every_claim_is_a_row_of_the_page() -> None:
+    text = page(results(), [Claim("said", "one; two", "differs", "because")], {"a": "caption"}, 1.0, "0")
+    rows = ("| said | one;<br>two | **differs** | because |", "![caption](a.svg)", "[Data](a.csv)")
+    assert [row for row in rows if row not in text] == []
     assert [mode for mode in MEANINGS if mode.name in ("REST", "HOLD") and MEANINGS[mode] not in text] == []
     rows = [line for line in text.splitlines() if line.startswith("| ") and " own force |" in line]
     places = [line for line in text.splitlines() if line.endswith("nearest cell under the finger |")]
     assert (len(rows), len(places)) == (len(BY_FORCE), len(BY_PLACE))
-    conditions = [arrow.condition.replace("_", " ") for arrow in (*BY_FORCE, *BY_PLACE)]
-    assert [
-        said for said, row in zip(conditions, rows + places, strict=True) if f"| {said} |" not in row
-    ] == []
-
-
-def test_a_claim_is_a_row_of_the_page_with_its_verdict() -> None:
-    text = page(results(), [Claim("said", "one; two", "differs", "because")], {"a": "caption"}, 1.0, "0")
-    assert "| said | one;<br>two | **differs** | because |" in text
-    assert "![caption](a.svg)" in text
-    assert "[Data](a.csv)" in text
+    for arrow, row in zip((*BY_FORCE, *BY_PLACE), rows + places, strict=True):
+        assert f"| {arrow.condition.replace('_', ' ')} |" in row
 
 
 #: A lift of 10 mm/s at its fastest: Method I follows it, Method II's cells rise at 8.7 mm/s at the most.
@@ -186,17 +161,12 @@ def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost:
     # 10 mm/s over four fifths of 6 mm/s is 2.08; in steps of a tenth.
     assert lost.slow == pytest.approx(2.1)
     assert [lost.session[method].lost for method in scenes.METHODS] == [[], []]
-
-
-def test_a_finger_lost_in_the_session_is_told_with_its_time_and_its_cause(lost: Results) -> None:
     claim = carried_out(lost)
     assert claim.verdict == "holds in part"
     assert f"Method II: finger lost at {lost.printed['cell_states'].lost[0]:.2f} s" in claim.measured
     assert "lifts at up to 10.0 mm/s, and Method II follows a lift of 6.0 mm/s" in claim.why
     assert "run again 2.1 times as long: Method I never lost, Method II never lost" in claim.why
-
-
-def test_a_session_is_drawn_with_the_same_cells_and_scales_for_both_methods(lost: Results) -> None:
+    # It is drawn with the same cells and scales for both methods.
     figure = heights_and_force(lost.session, "title")
     one, two = (axes for axes in figure.axes if axes.get_label().endswith("heights"))
     assert len(one.get_lines()) == len(two.get_lines()) > 0
@@ -222,15 +192,6 @@ def test_the_detail_of_the_session_shows_heights_of_cells_side_by_side_at_every_
     assert len(figure.axes) == 4
 
 
-def test_method_three_is_beside_the_methods_of_the_paper_in_figures_and_in_no_claim() -> None:
-    two = results(Swing(5.0, 500.0, 0.001, None, 0.3))
-    three = Results(simple={(scenes.THIRD, name): GOOD for name in WAYS})
-    both = replace(two, third=three).compared()
-    assert {method for method, _ in both.simple} == set(scenes.COMPARED)
-    assert two.compared() is two
-    assert "Method III" not in tracking(replace(two, third=three)).measured
-
-
 SURFACE = "in the surface"
 EASY = Dragged(GOOD, force=0.4, deviation=0.02, followers=10.0, unevenness=1e-4, ahead=-1e-3)
 HARD = EASY._replace(force=0.8, follows=replace(GOOD, rfd=0.08))
@@ -253,30 +214,54 @@ def two_methods() -> dict[str, Session]:
     }
 
 
-def test_a_rise_that_raises_force_and_rfd_causes_them() -> None:
-    claim = rise(Results(dragged=dragged(it_II=HARD, rise_II=EASY)))
-    assert claim.verdict == "holds"
-    assert "0.80 N with the rise and 0.40 N without" in claim.measured
-    assert rise(Results(dragged=dragged(it_II=HARD, rise_II=HARD))).verdict == "differs"
-    louder = HARD._replace(force=0.4)
-    assert rise(Results(dragged=dragged(it_II=louder, rise_II=EASY))).verdict == "holds in part"
+def limits(third: float, lift: float | None = 20e-3) -> Results:
+    """Return results of both methods with the speed of the second in a valley, and at a lift, m/s."""
+    found, (one, two) = results(), scenes.METHODS
+    found.printed[two], found.lifting = found.printed[one], {one: 20e-3, two: lift}
+    speeds = {(method, way): 20e-3 for method in scenes.METHODS for way in WAYS}
+    return replace(found, fastest=speeds | {(two, "a valley"): third})
 
 
-def test_cells_ahead_that_stay_up_are_not_lowered() -> None:
-    assert ahead(Results(dragged=dragged(it_I=EASY))).verdict == "holds"
-    stays = EASY._replace(ahead=-0.4e-3)  # less than a tenth of 4.5 mm
-    assert ahead(Results(dragged=dragged(it_I=stays, it_II=EASY))).verdict == "differs"
-    assert ahead(Results(dragged=dragged(it_I=EASY._replace(ahead=None)))).verdict == "differs"
-    shallow = {(AS_IT_IS, scenes.METHODS[0], "less deep"): EASY._replace(ahead=0.0)}
-    assert ahead(Results(dragged=dragged(it_I=EASY) | shallow)).verdict == "holds in part"
+LOUDER = HARD._replace(force=0.4)
+STAYS = EASY._replace(ahead=-0.4e-3)  # less than a tenth of 4.5 mm
+SHALLOW = {(AS_IT_IS, scenes.METHODS[0], "less deep"): EASY._replace(ahead=0.0)}
+SLOWER = (swing(2.0, 0.001, 0.2), swing(5.0, 0.001, 0.3), swing(50.0, 0.2, None))
 
 
-def test_a_method_that_swings_at_some_gain_has_not_escaped() -> None:
-    calm = Results(cell_swings=[swing(15.0, 0.001, None), swing(50.0, 0.002, None)], printed=two_methods())
-    assert escape(calm).verdict == "holds"
-    wild = Results(cell_swings=[swing(15.0, 0.001, None), swing(90.0, 0.4, None)], printed=two_methods())
-    assert escape(wild).verdict == "holds in part"
-    assert "above 15, at 90 1/N, 6.0 times that" in escape(wild).why
+@pytest.mark.parametrize(
+    ("claim", "found", "verdict", "words"),
+    [
+        # A rise that raises force and RFD causes them.
+        (rise, lambda: Results(dragged=dragged(it_II=HARD, rise_II=EASY)), "holds", "0.80 N with the rise a"),
+        (rise, lambda: Results(dragged=dragged(it_II=HARD, rise_II=HARD)), "differs", ""),
+        (rise, lambda: Results(dragged=dragged(it_II=LOUDER, rise_II=EASY)), "holds in part", ""),
+        # Cells ahead that stay up are not lowered.
+        (ahead, lambda: Results(dragged=dragged(it_I=EASY)), "holds", ""),
+        (ahead, lambda: Results(dragged=dragged(it_I=STAYS, it_II=EASY)), "differs", ""),
+        (ahead, lambda: Results(dragged=dragged(it_I=EASY._replace(ahead=None))), "differs", ""),
+        (ahead, lambda: Results(dragged=dragged(it_I=EASY) | SHALLOW), "holds in part", ""),
+        # A method that swings at some gain has not escaped.
+        (escape, lambda: escaped(swing(50.0, 0.002, None)), "holds", ""),
+        (escape, lambda: escaped(swing(90.0, 0.4, None)), "holds in part", "above 15, at 90 1/N, 6.0 times"),
+        # The trade needs a response that gets quicker and an oscillation.
+        (trade, lambda: results(*CALM_THEN_WILD), "holds", ""),
+        (trade, lambda: results(*SLOWER), "holds in part", ""),
+        (trade, lambda: results(CALM_THEN_WILD[2]), "holds in part", "never settles"),
+        # Speed counts along every way, and not along the ridge alone.
+        (largest_speed, lambda: limits(20e-3), "holds", ""),
+        (largest_speed, lambda: limits(14e-3), "holds in part", ""),
+        (largest_speed, lambda: limits(20e-3, None), "holds in part", ""),
+    ],
+)  # fmt: skip
+def test_a_claim_has_the_verdict_of_its_evidence(claim: Any, found: Any, verdict: str, words: str) -> None:
+    evidence = claim(found())
+    assert evidence.verdict == verdict
+    assert words in evidence.measured + evidence.why
+
+
+def escaped(point: Swing) -> Results:
+    """Return results of a sweep of Method II's gain with two points."""
+    return Results(cell_swings=[swing(15.0, 0.001, None), point], printed=two_methods())
 
 
 @pytest.mark.parametrize(
@@ -295,18 +280,12 @@ def test_a_search_radius_has_to_halve_the_scatter_with_and_without_thresholds(
     assert claim.why.endswith("lost with and without the radius: 1 mN, no such thresholds: 7 and 0 times.")
 
 
-def test_without_noise_the_finger_is_located_where_it_is_held() -> None:
-    one = located(0.0, None, thresholds=True)
-    assert (one.radius, one.losses) == (8e-3, 0)
-    assert one.scatter == pytest.approx(0.0, abs=1e-9)  # rounding in places of millimeters, and far below one
-
-
 def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_as_well() -> None:
+    quiet = located(0.0, None, thresholds=True)
+    assert (quiet.radius, quiet.losses) == (8e-3, 0)
+    assert quiet.scatter == pytest.approx(0.0, abs=1e-9)  # rounding in places of millimeters
     near, everywhere = (located(1e-3, one, thresholds=False).scatter for one in (None, 1.0))
     known = located(1e-3, 1.0, thresholds=True).scatter
-    assert near is not None
-    assert everywhere is not None
-    assert known is not None
     # Noise of the 61 cells in reach, or of the 21 within 8 mm, with arms in proportion: 0.18 and 0.06 mm.
     assert 0.0 < near < 0.5 * everywhere
     assert 0.0 < known < 0.5 * everywhere
@@ -325,38 +304,22 @@ def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant: str) -> N
     assert judge(**{"it_I": BAD, f"{variant}_I": BAD}).verdict == "differs"
 
 
-def test_panels_are_lettered_and_their_named_curves_are_the_data(tmp_path: Path) -> None:
+def test_panels_are_lettered_and_their_named_curves_are_the_data() -> None:
     with canvas(6.0, 3.0) as (figure, place):
         one, two = place("one", 0.5, 0.5, 2.0, 2.0), place("two", 3.5, 0.5, 2.0, 2.0)
         one.plot([1.0, 2.0], [3.0, np.nan], label="$K_f$ low")
         one.plot([1.0], [9.0])
         one.axhline(0.5, label="limit")
         one.set(title="left", xlabel="time (s)", ylabel="force (N)")
-        two.plot([4.0], [1.0 / 3.0], label="b")
+        two.plot([-0.0, 2.0], [1.0 / 3.0, -1.0], label="b")
+        two.set_yticks([0.0, -1.0], ["in the surface", "a valley"])
+        two.set_gid(NAMED)
     letter(figure)
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["(a) left", "(b)"]
-    rows = list(curves(figure))
-    # No unnamed curve, no line across the panel, nothing that is no number.
-    assert rows == [
-        ("a", "K_f low", 1.0, "time (s)", 3.0, "force (N)"), ("b", "b", 4.0, "", pytest.approx(1 / 3), "")
-    ]  # fmt: skip
-    lines = table(rows).splitlines()
-    assert lines == [",".join(COLUMNS), "a,K_f low,1,time (s),3,force (N)", "b,b,4,,0.333333,"]
-
-
-def test_the_data_of_named_places_have_their_names_and_shared_axes_their_label() -> None:
-    with canvas(6.0, 3.0) as (figure, place):
-        one, two = place("one", 0.5, 0.5, 2.0, 2.0), place("two", 3.5, 0.5, 2.0, 2.0)
-        one.plot([-0.0, 2.0], [0.1, -0.9], label="force")
-        one.set_yticks([0.0, -1.0], ["in the surface", "a valley"])
-        one.set_gid(NAMED)
-        two.plot([0.0], [5.0], label="b")
-        one.set(xlim=(0.0, 3.0))
-        two.set(xlim=(0.0, 3.0), xlabel="force (N)")
-    letter(figure)
-    assert table(curves(figure)).splitlines()[1:] == [
-        "a,force,0,force (N),in the surface,", "a,force,2,force (N),a valley,", "b,b,0,force (N),5,"
-    ]  # fmt: skip
+    # No unnamed curve, no line across the panel, nothing that is no number; named places have their names.
+    lines = table(curves(figure)).splitlines()
+    named = ["b,b,0,,in the surface,", "b,b,2,,a valley,"]
+    assert lines == [",".join(COLUMNS), "a,K_f low,1,time (s),3,force (N)", *named]
 
 
 def test_a_vector_file_is_the_same_every_time(tmp_path: Path) -> None:

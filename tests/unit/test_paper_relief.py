@@ -69,62 +69,47 @@ def test_the_flank_asked_for_is_that_of_the_method_s_own_profile() -> None:
         assert asked_for(one)[at(one, 0, -9)][0] == pytest.approx(RIDGE * share, rel=1e-9)
 
 
-def test_the_relief_asked_for_meets_the_limits_in_every_section(bare: Session) -> None:
+def missed(bare: Session, over: Floats) -> list[str]:
+    """Return the names of the sections that do not meet the limits."""
+    return [one.name for one in sections(formed(bare, over)) if not one.meets(LIMITS)]
+
+
+def test_the_relief_asked_for_meets_the_limits_in_every_section_and_less_of_it_in_none(bare: Session) -> None:
     found = list(sections(formed(bare, asked_for(bare))))
     assert len(found) == 6
-    assert [one.name for one in found if not one.meets(LIMITS)] == []
+    assert missed(bare, asked_for(bare)) == []
     assert max(one.largest for one in found) < 1e-12
-
-
-def test_pins_that_press_into_the_finger_everywhere_alike_keep_the_shape(bare: Session) -> None:
-    found = list(sections(formed(bare, 1.1 * asked_for(bare))))
-    assert [one.name for one in found if not one.meets(LIMITS)] == []
-    levels = {one.part: one.level for one in found}
+    for share in (0.0, 0.5):
+        assert missed(bare, share * asked_for(bare)) == [one.name for one in found]
+    # Pins that press into the finger everywhere alike keep the shape.
+    assert missed(bare, 1.1 * asked_for(bare)) == []
+    levels = {one.part: one.level for one in sections(formed(bare, 1.1 * asked_for(bare)))}
     assert levels == pytest.approx({"ridge": 1.35e-3, "mound": 2.3e-3, "valley": 1e-3}, rel=1e-9)
 
 
-def test_a_cross_with_a_raised_rim_is_no_mound(bare: Session) -> None:
+def test_a_raised_rim_is_no_mound_and_a_crease_with_a_hump_no_valley(bare: Session) -> None:
+    mound = ["along ridge and mound", "across the mound", "slantwise across the mound"]
     # What Method II leaves: arms along the bed's sides, their ends higher than the middle.
     over, place = asked_for(bare), bare.history["position"] - (21e-3, -21e-3)
-    near = np.hypot(*place.T) < 12e-3
-    arms = np.abs(place).min(axis=1) < 2e-3
+    near, arms = np.hypot(*place.T) < 12e-3, np.abs(place).min(axis=1) < 2e-3
     over[near & ~arms] = RIDGE
-    ends = near & arms & (np.hypot(*place.T) > 5e-3)
-    over[ends] = MOUND + 4.5e-3
-    missed = {one.name for one in sections(formed(bare, over)) if not one.meets(LIMITS)}
-    assert {"along ridge and mound", "across the mound", "slantwise across the mound"} <= missed
-
-
-def test_a_rim_alone_fails_however_small_the_deviation_is_on_the_whole(bare: Session) -> None:
+    over[near & arms & (np.hypot(*place.T) > 5e-3)] = MOUND + 4.5e-3
+    assert set(mound) <= set(missed(bare, over))
+    # A rim alone fails however small the deviation is on the whole.
     over = asked_for(bare)
     over[at(bare, 15, -21)] = MOUND + 1.5e-3
-    (one,) = (one for one in sections(formed(bare, over)) if one.name == "along ridge and mound")
-    assert one.rms < LIMITS.rms * one.relief
-    assert one.largest < LIMITS.largest * one.relief
+    (one,) = (one for one in sections(formed(bare, over)) if one.name == mound[0])
+    assert (one.rms < LIMITS.rms * one.relief, one.largest < LIMITS.largest * one.relief) == (True, True)
     assert not one.meets(LIMITS)
-
-
-def test_a_rim_beside_the_sections_counts(bare: Session) -> None:
     # 9 mm to the left of the mound's middle and 3 mm off the ridge, where no section goes.
     over = asked_for(bare)
     over[at(bare, 12, -24)] = MOUND + 1.5e-3
-    found = {one.name: one for one in sections(formed(bare, over))}
-    assert [name for name, one in found.items() if not one.meets(LIMITS)] == [
-        "along ridge and mound", "across the mound", "slantwise across the mound",
-    ]  # fmt: skip
-    assert found["across the mound"].pins == pytest.approx(1.5e-3, rel=1e-9)
-
-
-def test_a_crease_with_a_hump_is_no_valley(bare: Session) -> None:
+    assert missed(bare, over) == mound
+    (across,) = (one for one in sections(formed(bare, over)) if one.name == mound[1])
+    assert across.pins == pytest.approx(1.5e-3, rel=1e-9)
     over = asked_for(bare)
     over[at(bare, 12, 21)] = -4e-3
-    assert "along the valley" in [one.name for one in sections(formed(bare, over)) if not one.meets(LIMITS)]
-
-
-@pytest.mark.parametrize("share", [0.0, 0.5])
-def test_less_relief_is_not_the_relief(bare: Session, share: float) -> None:
-    found = list(sections(formed(bare, share * asked_for(bare))))
-    assert [one.name for one in found if one.meets(LIMITS)] == []
+    assert "along the valley" in missed(bare, over)
 
 
 def blister(method: str, rim: float, sign: float) -> Result:

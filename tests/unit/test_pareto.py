@@ -15,14 +15,10 @@ POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [
 
 def test_a_front_has_the_points_that_none_dominates_in_order() -> None:
     assert find_front(POINTS).tolist() == [0, 1, 4]
-
-
-def test_every_other_point_is_dominated_by_one_of_the_front() -> None:
     values = np.random.default_rng(5).random((200, 2))
     front = find_front(values)
-    better = np.all(values[front][:, None] <= values[None], axis=2) & np.any(
-        values[front][:, None] < values[None], axis=2
-    )
+    one, other = values[front][:, None], values[None]
+    better = np.all(one <= other, axis=2) & np.any(one < other, axis=2)
     assert better.any(axis=0).sum() == len(values) - len(front)
     assert not better[:, front].any()
 
@@ -71,10 +67,8 @@ def find_gap(values: NDArray[np.float64]) -> float:
 def test_generations_come_near_the_known_front_and_nearer_than_the_same_number_of_random_points() -> None:
     found = evolve(12)
     shares = np.random.default_rng(1).random((len(found), 2))
-    assert find_gap(found) < 0.1
-    assert find_gap(found) < 0.5 * find_gap(measure(shares))
-
-
-def test_the_same_outcomes_lead_to_the_same_generations() -> None:
-    assert np.array_equal(evolve(4), evolve(4), equal_nan=True)
-    assert not np.array_equal(evolve(4), evolve(4, 2), equal_nan=True)
+    assert find_gap(found) < min(0.1, 0.5 * find_gap(measure(shares)))
+    # The same outcomes lead to the same generations.
+    first = found[: 4 * 24]
+    assert np.array_equal(evolve(4), first, equal_nan=True)
+    assert not np.array_equal(evolve(4, 2), first, equal_nan=True)

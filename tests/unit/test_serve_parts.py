@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.take import Take, from_bytes, make_take, replay, to_bytes
+from digiclay.core.session.take import Take, from_bytes, make_take, replay
 
 from digiclay_serve.door_link import LEASE, Lease, claim, release
 from digiclay_serve.doors import Order, make_slot, open_slot, pack_order, unpack_order
@@ -29,33 +28,25 @@ from digiclay_serve.served_session import (
     record,
     reset,
 )
+from tests.timeouts import wait_until
 
 PERIOD = 1e-3
 SMALL = {
     "layout": {"rows": 7, "columns": 7},
     "blister": {"radius": 5e-3, "edge_radius": 8e-3, "flat_radius": 2e-3},
 }
-SCENE = resolve(
-    {
-        **SMALL,
-        "trajectory": {
-            "waypoints": [{"time": 0.0, "position": [0, 0, 0.05]}, {"time": 1.0, "position": [0, 0, 0.05]}]
-        },
-    }
-)
+WAIT = {"waypoints": [{"time": time, "position": [0, 0, 0.05]} for time in (0.0, 1.0)]}
+SCENE = resolve({**SMALL, "trajectory": WAIT})
 DOWN = np.array([0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0])
 
 
-def test_a_period_is_due_from_its_beginning_once() -> None:
+def test_a_period_is_due_from_its_beginning_once_and_the_oldest_late_ones_are_left_out() -> None:
     schedule, counts = Schedule(10.0, PERIOD, 5), []
     for now in (9.9995, 10.0, 10.0004, 10.001, 10.0035):
         due, schedule = plan_periods(schedule, now)
         counts.append(due.count)
     assert counts == [0, 1, 0, 1, 2]
     assert schedule.begins == pytest.approx(10.004)
-
-
-def test_late_periods_are_made_up_for_and_the_oldest_left_out() -> None:
     due, schedule = plan_periods(Schedule(10.0, PERIOD, 5), 10.0085)
     assert (due.count, schedule.planned, schedule.left_out) == (5, 9, 4)
     # All that have begun are judged, those left out as well.
@@ -65,23 +56,20 @@ def test_late_periods_are_made_up_for_and_the_oldest_left_out() -> None:
 def test_shares_of_times_are_those_of_the_sorted_times() -> None:
     times = np.random.default_rng(3).exponential(3e-4, 5000)
     counts = TimeCounts(1e-5)
+    assert counts.find_share(0.5) == 0.0
     for time in times:
         counts.count(time)
     for share in (0.5, 0.99, 0.999):
-        assert counts.find_share(share) == pytest.approx(
-            np.quantile(times, share, method="inverted_cdf"), abs=1e-5
-        )
+        wanted = np.quantile(times, share, method="inverted_cdf")
+        assert counts.find_share(share) == pytest.approx(wanted, abs=1e-5)
     assert counts.count_above(PERIOD) == np.count_nonzero(times >= PERIOD)
     told = counts.describe()
     assert told["longest"] == times.max()
     assert sum(count for _, count in told["bins"]) == 5000
-
-
-def test_a_time_longer_than_all_bins_is_the_longest() -> None:
-    counts = TimeCounts(1e-5)
-    counts.count(7.0)
-    assert (counts.find_share(0.5), counts.count_above(PERIOD)) == (7.0, 1)
-    assert TimeCounts(1e-5).find_share(0.5) == 0.0
+    late = counts.count_above(PERIOD)
+    for _ in range(5000):
+        counts.count(7.0)  # longer than all bins
+    assert (counts.find_share(0.9), counts.count_above(PERIOD)) == (7.0, late + 5000)
 
 
 def pressed(session: Session, count: int = 20) -> Session:
@@ -175,35 +163,29 @@ def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path: Pa
             session = record(session, 10)
         end = snapshot.dump(session.system, session.state)
         writer.end_session()
-        writer.put(taken(pressed(record(reset(session), 10), 5)))
+        part = taken(pressed(record(reset(session), 10), 5))
+        writer.put(part)
         written = writer.finish()
     assert [path.name for path in written] == ["take_001.npz", "take_002.npz"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["take_001.npz", "take_002.npz"]
     take = from_bytes(written[0].read_bytes())
-    assert (take.periods, take.end) == (30, end)
+    assert (take.periods, take.end, take.poses.shape) == (30, end, (31, 1, 7))
     *_, last = replay(take)
     assert snapshot.dump(session.system, last) == end
-
-
-def test_parts_that_do_not_follow_each_other_are_refused() -> None:
-    session = pressed(record(begin_session(SCENE), 10), 3)
-    take = taken(session)
     with pytest.raises(OutputError, match="must follow each other"):
-        join_parts([take, take])
+        join_parts([part, part])
 
 
 def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path: Path) -> None:
-    session = pressed(record(begin_session(SCENE), 10), 3)
-    with PartWriter(tmp_path / "out") as writer:
-        writer.put(taken(session))
-        while not list((tmp_path / "out").glob("*_part_00001.npz")):
-            threading.Event().wait(0.001)
-        (tmp_path / "out" / "take_001_part_00002.npz").mkdir()
-        writer.put(taken(session))
-        while not writer.failure:
-            threading.Event().wait(0.001)
-        writer.put(taken(session))
-        (tmp_path / "out" / "take_001_part_00002.npz").rmdir()
+    take, blocked = taken(pressed(record(begin_session(SCENE), 10), 3)), tmp_path / "take_001_part_00002.npz"
+    with PartWriter(tmp_path) as writer:
+        writer.put(take)
+        wait_until(lambda: list(tmp_path.glob("*_part_00001.npz")))
+        blocked.mkdir()
+        writer.put(take)
+        wait_until(lambda: writer.failure)
+        writer.put(take)
+        blocked.rmdir()
         (path,) = writer.finish()
     assert "take ends here: Cannot write" in writer.failure
     assert from_bytes(path.read_bytes()).periods == 3
@@ -224,38 +206,24 @@ def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.npz", "take_001.npz"]
 
 
-def test_a_take_of_parts_is_the_format_of_old_takes() -> None:
-    take = taken(pressed(record(begin_session(SCENE), 10), 3))
-    assert from_bytes(to_bytes(take)).poses.shape == (4, 1, 7)
-
-
-def test_a_slot_gives_the_newest_value_once() -> None:
+def test_a_slot_gives_the_newest_value_once_and_none_that_is_being_written() -> None:
     slot, path = make_slot(16)
     other = open_slot(path)
-    path.unlink()
     assert other.read() is None
     for value in (b"a" * 16, b"b" * 16):
         slot.write(value)
     assert (other.read(), other.read()) == (b"b" * 16, None)
     with pytest.raises(ValueError, match="must have 16 bytes"):
         slot.write(b"c")
-
-
-def test_a_value_that_is_being_written_is_not_read() -> None:
-    slot, path = make_slot(16)
-    other = open_slot(path)
     slot.write(b"a" * 16)
-    content = bytearray(path.read_bytes())
+    content = path.read_bytes()
     for place, changed in ((0, 1), (16, 1)):  # the number is odd; the value is another one
-        torn = content.copy()
+        torn = bytearray(content)
         torn[place] ^= changed
         with path.open("r+b") as file:
             file.write(torn)
         assert other.read() is None
     path.unlink()
-
-
-def test_an_order_is_read_as_it_was_written() -> None:
     for order in (Order(), Order((1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0), 2**32 - 1, 5)):
         assert unpack_order(pack_order(order)) == order
 
@@ -270,16 +238,13 @@ def test_a_token_comes_from_the_option_the_environment_or_chance(monkeypatch: py
     assert choose_token("from-the-option") == ("from-the-option", False)
 
 
-@pytest.mark.parametrize("token", ["", "short", "with a space", "x" * 129, "umlaut-ä-ä-ä"])
-def test_a_token_that_is_none_is_refused_and_not_shown(token: str) -> None:
-    with pytest.raises(OutputError, match=r"--token must have 8 to 128") as caught:
-        choose_token(token)
-    assert not token or token not in str(caught.value)
-
-
-def test_only_the_same_token_is_the_right_one() -> None:
+def test_only_the_same_token_is_the_right_one_and_one_that_is_none_is_refused_and_not_shown() -> None:
     wrong = ("", "a-token-of-test", "a-token-of-testss", None, 7, b"a-token-of-tests", "\ud800")
     assert [is_token(one, "a-token-of-tests") for one in ("a-token-of-tests", *wrong)] == [True] + [False] * 7
+    for token in ("", "short", "with a space", "x" * 129, "umlaut-ä-ä-ä"):
+        with pytest.raises(OutputError, match=r"--token must have 8 to 128") as caught:
+            choose_token(token)
+        assert not token or token not in str(caught.value)
 
 
 def test_the_fingertip_is_anothers_when_its_client_is_silent_or_gone() -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import shutil
-import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +12,17 @@ import pytest
 from digiclay.cli import main
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.axes import Point
-from digiclay.core.studies.sweep_plan import Folder
 
-from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
+from tests.scene_files import SCENE, interrupt_after, rows
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
-SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
 GAINS = ["--vary", "control.position_gain=100:1000:log", "--vary", "control.force_gain=1:10"]
 STUDY = ["study", "my.toml", *GAINS, "--samples", "8", "--workers", "1", "--metric", "rfd,lag,max_cell_force"]
 QUIET = [*STUDY, "--quiet", "--out", "out"]
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder with one scene, my.toml."""
-    return folder_with(SCENE, tmp_path, monkeypatch)
+pytestmark = pytest.mark.usefixtures("here")
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +33,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     study = [str(folder / "my.toml") if word == "my.toml" else word for word in STUDY]
     assert main([*study, "--second", "--out", str(folder / "out"), "--quiet"]) == 0
     return folder / "out"
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    """Return the lines of a table."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -70,6 +55,10 @@ def test_a_study_leaves_tables_a_page_and_a_plot(whole: Path) -> None:
     assert [row["index"] == "" for row in found] == [row["output"] == "lag_mean" for row in found]
     assert all(float(row["interval (95%, +-)"]) > 0.0 for row in found if row["index"])
     assert (whole / "indices.png").read_bytes()[:4] == b"\x89PNG"
+    page = (whole / "study.md").read_text(encoding="utf-8")
+    assert "| `control.position_gain` | 100 to 1000, log |" in page
+    assert "| `rfd` | N |" in page
+    assert (page.count("± "), page.count("It does not vary.")) == (2 * 5 + 1, 1)
 
 
 def test_every_point_is_the_run_with_its_settings(whole: Path) -> None:
@@ -87,13 +76,6 @@ def test_every_point_is_the_run_with_its_settings(whole: Path) -> None:
 KEYS = (("control.position_gain", "1/m"), ("control.force_gain", "1/N"))
 
 
-def test_the_page_names_ranges_and_outputs(whole: Path) -> None:
-    page = (whole / "study.md").read_text(encoding="utf-8")
-    assert "| `control.position_gain` | 100 to 1000, log |" in page
-    assert "| `rfd` | N |" in page
-    assert (page.count("± "), page.count("It does not vary.")) == (2 * 5 + 1, 1)
-
-
 def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_before(
     whole: Path, here: Path
 ) -> None:
@@ -104,20 +86,6 @@ def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_befo
     command = next(line for line in page.splitlines() if line.startswith("    digiclay study"))
     assert main([*command.split()[1:-1], "again", "--workers", "1", "--quiet"]) == 0
     assert files(Path("again")) == files(whole)
-
-
-def interrupt_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have this process get Ctrl-C when so many points are kept."""
-    keep: Callable[..., None] = Folder.keep
-    kept: list[Point] = []
-
-    def told(self: Folder, point: Point, *given: Any) -> None:
-        keep(self, point, *given)
-        kept.append(point)
-        if len(kept) == count:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    monkeypatch.setattr(Folder, "keep", told)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
@@ -156,60 +124,46 @@ def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("words", "message"),
     [
-        (["--samples", "0"], "digiclay study: argument --samples: must be a power of two"),
-        (["--samples", "100"], "digiclay study: argument --samples: must be a power of two"),
-        (["--samples", "9" * 99], "digiclay study: argument --samples: must be a power of two"),
-        (["--samples", "4096"], "--samples must come to 10000 points at most (got 16384 points)."),
-        (["--seed", "0"], "digiclay study: argument --seed: must be a whole number from 1 to"),
-        (["--vary", "control.force_gian=1:2"], "--vary: control.force_gian must be a known key"),
-        (["--vary", "control.travel=2e-3:1e-3"], "--vary control.travel must have LOW below HIGH"),
-        (["--vary", "control.force_gain=1:2"], "--vary control.force_gain must be given once (got 2 times)."),
-        (["--metric", "rdf"], "--metric must be a known metric (got 'rdf')."),
-        (["--set", "recorder=absent"], "Metrics need a recorder, and the scene has recorder = 'absent'."),
-        (["--set", "simulation.duration=1e6"], "The unchanged scene fails: recorder.every must be at least"),
-        ([], "A study needs at least two --vary"),
-        (["--method", "no"], "--method: control.method must be one of"),
+        ("--samples 0", "digiclay study: argument --samples: must be a power of two"),
+        ("--samples 100", "digiclay study: argument --samples: must be a power of two"),
+        (f"--samples {'9' * 99}", "digiclay study: argument --samples: must be a power of two"),
+        ("--samples 4096", "--samples must come to 10000 points at most (got 16384 points)."),
+        ("--seed 0", "digiclay study: argument --seed: must be a whole number from 1 to"),
+        ("--vary control.force_gian=1:2", "--vary: control.force_gian must be a known key"),
+        ("--vary control.travel=2e-3:1e-3", "--vary control.travel must have LOW below HIGH"),
+        ("--vary control.force_gain=1:2", "--vary control.force_gain must be given once (got 2 times)."),
+        ("--metric rdf", "--metric must be a known metric (got 'rdf')."),
+        ("--set recorder=absent", "Metrics need a recorder, and the scene has recorder = 'absent'."),
+        ("--set simulation.duration=1e6", "The unchanged scene fails: recorder.every must be at least"),
+        ("", "A study needs at least two --vary"),
+        ("--method no", "--method: control.method must be one of"),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_is_told_in_one_line_and_leaves_no_point(
-    arguments: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]
+    words: str, message: str, here: Path, refused: Any
 ) -> None:
-    study = ["study", "my.toml", *GAINS[:2], "--quiet", "--out", "out"] if arguments == [] else QUIET
-    assert main([*study, *arguments]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith(message)
-    assert err.count("\n") == 1
+    study = QUIET if words else ["study", "my.toml", *GAINS[:2], "--quiet", "--out", "out"]
+    refused([*study, *words.split()], message)
     assert len(list(here.glob("out/points/*"))) <= 1
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (["--samples", "4"], "samples 8"),
-        (["--seed", "2"], "seed 1"),
-        (["--set", "layout.pitch=2.9 mm"], "with another scene"),
-        ([], "orders first, second"),
-    ],
-)
-def test_a_folder_of_another_study_is_refused(
-    change: list[str], said: str, whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_of_another_study_is_refused(whole: Path, here: Path, refused: Any) -> None:
     shutil.copytree(whole, here / "out")
     before = files(here / "out")
-    assert main([*QUIET, *(["--second"] if change else []), *change]) == 2
-    err = capsys.readouterr().err
-    assert err == f"out holds another study ({said}): choose another folder with --out.\n"
+    for change, said in (
+        (["--second", "--samples", "4"], "samples 8"), (["--second", "--seed", "2"], "seed 1"),
+        (["--second", "--set", "layout.pitch=2.9 mm"], "with another scene"), ([], "orders first, second"),
+    ):  # fmt: skip
+        refused([*QUIET, *change], f"out holds another study ({said}): choose another folder with --out.\n")
     assert files(here / "out") == before
 
 
 @pytest.mark.parametrize(("command", "library"), [("study", "SALib"), ("tune", "optuna")])
 def test_a_missing_library_is_told_with_the_extra_that_has_it(
-    command: str, library: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: str, library: str, monkeypatch: pytest.MonkeyPatch, refused: Any
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)  # as Python marks what cannot be imported
-    assert main([command, "my.toml", *GAINS, "--out", "out"]) == 2
-    assert (
-        capsys.readouterr().err == f"digiclay {command} needs {library}: run 'pip install digiclay[study]'.\n"
-    )
+    said = f"digiclay {command} needs {library}: run 'pip install digiclay[study]'.\n"
+    refused([command, "my.toml", *GAINS, "--out", "out"], said)

@@ -8,12 +8,14 @@ import math
 import statistics
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
 from scipy.stats import t as student
@@ -37,6 +39,7 @@ from tests.scene_files import folder_with, left, scene_text
 SCENE = scene_text(11, 11, (0.0, 0.041), (0.1, 0.036), (0.2, 0.036))
 BOTH = ("virtual_master", "hybrid")
 SHORT = ["compare", "my.toml", "--suite", "--trajectories", "session", "--repeats", "2", "--workers", "1"]
+BOTH_METHODS = [*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet"]
 
 
 def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
@@ -52,29 +55,21 @@ def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("suite")
     with pytest.MonkeyPatch.context() as monkeypatch:
         folder_with(SCENE, folder, monkeypatch)
-        assert main([*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet"]) == 0
+        assert main(BOTH_METHODS) == 0
     return folder / "league"
 
 
-def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_seed(
-    league: Path,
-) -> None:
+def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_seed(league: Path) -> None:
     files = {path.name for path in league.iterdir() if not path.name.startswith(".")}
-    assert files == {
-        "index.html", "league.csv", "trajectories.csv", "results.csv", "rfd.svg", "measures.svg",
-        "suite.json", "points",
-    }  # fmt: skip
+    wanted = "index.html league.csv trajectories.csv results.csv rfd.svg measures.svg suite.json points"
+    assert files == set(wanted.split())
     _, rows = read_table(league / "results.csv")
     assert [(row["method"], row["trajectory"], row["seed"]) for row in rows] == [
         (method, "session", seed) for method in BOTH for seed in "12"
     ]
-    assert all(row["error"] == "" for row in rows)
+    assert all(row["error"] == "" and float(row["period_cost (s)"]) > 0.0 for row in rows)
     assert len({row["rfd (N)"] for row in rows}) == 4
-    assert all(float(row["period_cost (s)"]) > 0.0 for row in rows)
-
-
-def test_the_league_holds_means_and_student_s_intervals_of_the_results(league: Path) -> None:
-    _, rows = read_table(league / "results.csv")
+    # The league holds means and Student's intervals of the results.
     _, ranks = read_table(league / "league.csv")
     assert [row["rank"] for row in ranks] == ["1", "2"]
     assert float(ranks[0]["rfd (N)"]) <= float(ranks[1]["rfd (N)"])
@@ -89,22 +84,31 @@ def test_tables_and_page_name_their_origin(league: Path) -> None:
     identity = json.loads((league / "suite.json").read_text(encoding="utf-8"))["scenes"]
     comments, _ = read_table(league / "league.csv")
     page = (league / "index.html").read_text(encoding="utf-8")
+    words = [
+        identity,
+        "digiclay compare my.toml --suite --methods virtual_master,hybrid",
+        "seeds 1 to 2",
+        "noise 2 mN",
+    ]
     for text in ("\n".join(comments), page):
-        assert identity in text
-        assert "digiclay compare my.toml --suite --methods virtual_master,hybrid" in text
-        assert "seeds 1 to 2" in text
-        assert "noise 2 mN" in text
+        assert [word for word in words if word not in text] == []
     assert "Student&#x27;s t" in page
     assert 'src="rfd.svg"' in page
 
 
-def test_a_finished_suite_runs_no_trial_again(league: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_finished_suite_runs_no_trial_again_and_no_other_goes_into_its_folder(
+    league: Path, monkeypatch: pytest.MonkeyPatch, refused: Any
+) -> None:
     monkeypatch.chdir(league.parent)
+    said = (
+        f"league holds another suite (4 trials, digiclay {__version__}): choose another folder with --out.\n"
+    )
+    refused([*SHORT, "--methods", "hybrid", "--out", "league", "--quiet"], said)
     before = {path: path.stat().st_mtime_ns for path in (league / "points").iterdir()}
     gone = league / "points" / "000003.json"
     record = json.loads(gone.read_text(encoding="utf-8"))
     gone.unlink()
-    assert main([*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet"]) == 0
+    assert main(BOTH_METHODS) == 0
     after = {path: path.stat().st_mtime_ns for path in (league / "points").iterdir()}
     assert [path for path in before if path != gone and before[path] != after[path]] == []
     again = json.loads(gone.read_text(encoding="utf-8"))["figures"]
@@ -112,73 +116,47 @@ def test_a_finished_suite_runs_no_trial_again(league: Path, monkeypatch: pytest.
     assert again == record["figures"]
 
 
-def test_another_suite_does_not_go_into_the_folder(
-    league: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(league.parent)
-    assert main([*SHORT, "--methods", "hybrid", "--out", "league", "--quiet"]) == 2
-    assert capfd.readouterr().err == (
-        f"league holds another suite (4 trials, digiclay {__version__}): choose another folder with --out.\n"
-    )
-
-
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("words", "said"),
     [
-        (["--suite", "--trajectories", "figure-eigth"], "Did you mean figure-eight?"),
-        (["--suite", "--trajectories", ","], "--trajectories must name at least one trajectory"),
-        (["--suite", "--repeats", "0"], "--repeats: must be a whole number from 1 to 100 (got '0')"),
-        (["--suite", "--repeats", "two"], "must be a whole number from 1 to 100 (got 'two')"),
-        (["--suite", "--drags", "-3"], "--drags: must be a whole number from 1 to 200"),
-        (["--suite", "--noise", "nan"], "--noise: sensors.force_noise must be a finite number"),
-        (["--suite", "--noise", "-1 mN"], "force_noise must be at least 0 N"),
-        (["--suite", "--noise", "0"], "--repeats must be 1 without noise (got 5)"),
-        (["--suite", "--trajectories", "ridge-15"], "must make the bed at least as wide as the drag"),
-        (["--suite", "--methods", "hybird"], "did you mean hybrid"),
-        (["--suite", "--method", "hybird"], "Did you mean hybrid?"),
-        (["--suite", "--overwrite"], "--overwrite is not for --suite"),
-        (["--suite", "--speed"], "--speed is not for --suite"),
-        (["--repeats", "2"], "--repeats is for --suite"),
-        ([], "The following arguments are required: SCENE, or --suite."),
+        ("--suite --trajectories figure-eigth", "Did you mean figure-eight?"),
+        ("--suite --trajectories ,", "--trajectories must name at least one trajectory"),
+        ("--suite --repeats 0", "--repeats: must be a whole number from 1 to 100 (got '0')"),
+        ("--suite --repeats two", "must be a whole number from 1 to 100 (got 'two')"),
+        ("--suite --drags -3", "--drags: must be a whole number from 1 to 200"),
+        ("--suite --noise nan", "--noise: sensors.force_noise must be a finite number"),
+        ("--suite --noise=-1mN", "force_noise must be at least 0 N"),
+        ("--suite --noise 0", "--repeats must be 1 without noise (got 5)"),
+        ("--suite --trajectories ridge-15", "must make the bed at least as wide as the drag"),
+        ("--suite --methods hybird", "did you mean hybrid"),
+        ("--suite --method hybird", "Did you mean hybrid?"),
+        ("--suite --overwrite", "--overwrite is not for --suite"),
+        ("--suite --speed", "--speed is not for --suite"),
+        ("--repeats 2", "--repeats is for --suite"),
+        ("", "The following arguments are required: SCENE, or --suite."),
     ],
 )
-def test_a_mistake_is_one_line_and_leaves_nothing(
-    arguments: list[str],
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    folder_with(SCENE, tmp_path, monkeypatch)
-    code = main(["compare", *(["my.toml"] if arguments else []), *arguments])
-    err = capfd.readouterr().err
-    assert (code, err.count("\n"), said in err) == (2, 1, True), err
-    assert left(tmp_path) == []
+def test_a_mistake_is_one_line_and_leaves_nothing(words: str, said: str, here: Path, refused: Any) -> None:
+    refused(["compare", *(["my.toml"] if words else []), *words.split()], said)
+    assert left(here) == []
 
 
-def test_a_method_of_one_s_own_enters_by_one_option(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder_with(SCENE, tmp_path, monkeypatch)
-    write_method(tmp_path)
+def test_a_method_of_one_s_own_enters_by_one_option(here: Path) -> None:
+    write_method(here)
     with forgotten():
         arguments = ["--methods", "virtual_master", "--method", "pad.py:SoftPad", "--repeats", "1"]
         assert main([*SHORT, *arguments, "--out", "mine"]) == 0
-    _, ranks = read_table(tmp_path / "mine" / "league.csv")
+    _, ranks = read_table(here / "mine" / "league.csv")
     # It asks for no force, so that it has no RFD, and is last.
     assert [bool(row["rfd (N)"]) for row in ranks] == [True, False]
-    comments, _ = read_table(tmp_path / "mine" / "results.csv")
+    comments, _ = read_table(here / "mine" / "results.csv")
     assert "--methods virtual_master,pad.py:SoftPad" in comments[1]
 
 
 def test_an_interval_is_student_s_and_one_value_has_none() -> None:
-    found = find_interval([1.0, 2.0, None, 3.0, math.nan])
-    assert found
-    assert (found.mean, found.count) == (2.0, 3)
+    found, single = find_interval([1.0, 2.0, None, 3.0, math.nan]), find_interval([1.0])
+    assert (found.mean, found.count, single.half) == (2.0, 3, None)
     assert found.half == pytest.approx(4.302652729911275 / math.sqrt(3.0))  # t(0.975, 2), table
-    single = find_interval([1.0])
-    assert single
-    assert single.half is None
     assert find_interval([None, math.inf]) is None
 
 
@@ -218,25 +196,22 @@ def test_every_trajectory_can_be_placed_and_judged_and_random_drags_follow_their
         assert placed[name].trajectories()[0].poses(np.array([1e3]))[0, 2] > 75e-3
 
 
-def test_a_phase_is_judged_alone() -> None:
-    scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": "virtual_master"}})
-    placed, _ = place_trial(scene, Trial("lift", "lift"))
+def placed_lift(method: str) -> tuple[Scene, Any]:
+    """Return the league's lift on a small bed, and what measures it."""
+    scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": method}})
+    return place_trial(scene, Trial("lift", "lift"))
+
+
+def test_a_phase_is_judged_alone_and_a_method_that_counts_nothing_itself_loses_the_fingertip() -> None:
+    placed, _ = placed_lift("virtual_master")
     short = placed.with_sections(simulation=replace(placed.simulation, duration=2.5))
-    whole, part = measure_trial(short), measure_trial(short, phase=(2.0, 2.4))
-    assert whole
-    assert part
-    assert list(whole["figures"]) == list(part["figures"]) == list(OUTCOMES)
-    assert part["figures"]["rfd"] != whole["figures"]["rfd"]
-
-
-def test_a_method_that_counts_nothing_itself_loses_the_fingertip_in_the_league() -> None:
-    scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": "elastic"}})
-    placed, measure = place_trial(scene, Trial("lift", "lift"))
-    phase, whole = measure(placed, None), measure_trial(placed)
-    assert phase
-    assert whole
-    assert phase["figures"]["contact_loss_share"] > 0.5
-    assert (phase["figures"]["losses"], whole["figures"]["losses"]) == (1.0, 1.0)
+    whole, part = (measure_trial(short, phase=phase)["figures"] for phase in (None, (2.0, 2.4)))
+    assert list(whole) == list(part) == list(OUTCOMES)
+    assert part["rfd"] != whole["rfd"]
+    placed, measure = placed_lift("elastic")
+    phase, whole = (found["figures"] for found in (measure(placed, None), measure_trial(placed)))
+    assert phase["contact_loss_share"] > 0.5
+    assert (phase["losses"], whole["losses"]) == (1.0, 1.0)
 
 
 def test_a_relief_that_is_nominal_has_no_error() -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import shutil
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +13,8 @@ from digiclay.cli import main
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.axes import Point
-from digiclay.core.studies.sweep_plan import Folder
 
-from tests.scene_files import SMALL_BLISTER, folder_with
+from tests.scene_files import SMALL_BLISTER, interrupt_after, rows
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
@@ -42,10 +38,7 @@ TUNE = ["tune", "my.toml", *VARIED, *SMALL, "--out", "out", "--quiet"]
 ALL = 1 + 4 * 8
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder with one scene, my.toml."""
-    return folder_with(SCENE, tmp_path, monkeypatch)
+pytestmark = pytest.mark.usefixtures("here")
 
 
 @pytest.fixture(scope="module")
@@ -58,12 +51,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-def rows(path: Path) -> list[dict[str, str]]:
-    """Return the lines of a table."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def values(path: Path) -> Any:
     """Return both metrics of a table."""
     return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
@@ -71,10 +58,8 @@ def values(path: Path) -> Any:
 
 def files(folder: Path) -> dict[str, bytes]:
     """Return the content of tables and scene."""
-    return {
-        name: (folder / name).read_bytes()
-        for name in ("points.csv", "front.csv", "chosen.toml", "tuning.json")
-    }
+    names = ("points.csv", "front.csv", "chosen.toml", "tuning.json")
+    return {name: (folder / name).read_bytes() for name in names}
 
 
 def test_a_tuning_leaves_tables_a_plot_and_a_scene(whole: Path) -> None:
@@ -133,17 +118,8 @@ def test_a_tuning_of_which_points_are_missing_proposes_the_same_ones_again(
 def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(
     here: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    keep = Folder.keep
-    kept: list[Point] = []
-
-    def told(self: Folder, point: Point, *given: Any) -> None:
-        keep(self, point, *given)
-        kept.append(point)
-        if len(kept) == 12:
-            os.kill(os.getpid(), signal.SIGINT)
-
     with monkeypatch.context() as patch:
-        patch.setattr(Folder, "keep", told)
+        interrupt_after(12, patch)
         assert main([*TUNE[:-1], "--generations", "4"]) == 130
     # The second generation is one stack, which is kept whole.
     assert f"Stopped: 17 of {ALL} points are done and kept in out." in capsys.readouterr().out
@@ -152,42 +128,33 @@ def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(
     assert files(here / "out") == files(whole)
 
 
-def test_points_of_another_search_are_refused(
-    whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
+def test_points_of_another_search_are_refused_and_without_any_contact_there_is_no_front(
+    whole: Path, here: Path, refused: Any
 ) -> None:
     shutil.copytree(whole, here / "out")
     one, other = (here / "out" / "points" / f"{index:06d}.json" for index in (12, 13))
     one.write_bytes(other.read_bytes())
-    assert main([*TUNE, "--generations", "4"]) == 2
-    assert capsys.readouterr().err.startswith("out holds points of another version of optuna")
+    refused([*TUNE, "--generations", "4"], "out holds points of another version of optuna")
+    shutil.rmtree(here / "out")
+    (here / "my.toml").write_text(SCENE.replace("0.038", "0.045"), encoding="utf-8")
+    refused([*TUNE, "--generations", "1"], "No run has both metrics without losing the fingertip")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("words", "message"),
     [
-        (["--metric", "rfd"], "--metric must name two metrics (got 'rfd')."),
-        (["--metric", "rfd,lag,relief"], "--metric must name two metrics"),
-        (["--choose", "relief"], "--choose must be knee, rfd or lag_mean (got 'ridge_error')."),
-        (["--choose", "kneee"], "--choose must be knee, rfd or lag_mean (got 'kneee')."),
-        (["--population", "3"], "digiclay tune: argument --population: must be a whole number from 4 to"),
-        (["--generations", "0"], "digiclay tune: argument --generations: must be a whole number from 1 to"),
-        (["--generations", "4096"], "--population times --generations must come to 10000 points at most"),
-        (
-            ["--vary", "control.travel=1:nan"],
-            "--vary control.travel must have two different finite numbers at LOW and HIGH",
-        ),
+        ("--metric rfd", "--metric must name two metrics (got 'rfd')."),
+        ("--metric rfd,lag,relief", "--metric must name two metrics"),
+        ("--choose relief", "--choose must be knee, rfd or lag_mean (got 'ridge_error')."),
+        ("--choose kneee", "--choose must be knee, rfd or lag_mean (got 'kneee')."),
+        ("--population 3", "digiclay tune: argument --population: must be a whole number from 4 to"),
+        ("--generations 0", "digiclay tune: argument --generations: must be a whole number from 1 to"),
+        ("--generations 4096", "--population times --generations must come to 10000 points at most"),
+        ("--vary control.travel=1:nan", "--vary control.travel must have two different finite numbers at LO"),
     ],
 )
 def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(
-    arguments: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]
+    words: str, message: str, here: Path, refused: Any
 ) -> None:
-    assert main([*TUNE, *arguments]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith(message)
-    assert (err.count("\n"), (here / "out").exists()) == (1, False)
-
-
-def test_without_any_contact_there_is_no_front(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (here / "my.toml").write_text(SCENE.replace("0.038", "0.045"), encoding="utf-8")
-    assert main([*TUNE, "--generations", "1"]) == 2
-    assert capsys.readouterr().err.startswith("No run has both metrics without losing the fingertip")
+    refused([*TUNE, *words.split()], message)
+    assert not (here / "out").exists()
