@@ -95,9 +95,7 @@ def test_a_second_shallower_press_leaves_a_plastic_bed_as_it_is() -> None:
 
 @pytest.mark.parametrize("time_constant", [0.3, 1.0])
 @pytest.mark.parametrize("diffusivity", [0.0, 10e-6])
-def test_a_viscous_dent_s_volume_recovers_with_its_time_constant(
-    time_constant: float, diffusivity: float
-) -> None:
+def test_a_viscous_dent_s_volume_recovers_with_its_time_constant(time_constant, diffusivity):
     result = run(scene("viscous", recovery_time=time_constant, diffusivity=diffusivity, side=17))
     first, last = at(result, 2.1), at(result, 2.1 + time_constant)
     dent = (REST - heights(result)).sum(axis=1)
@@ -309,9 +307,7 @@ def test_a_displayed_shape_holds_against_a_finger() -> None:
 
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
 @pytest.mark.parametrize("method", TOUCHING)
-def test_every_cell_is_in_a_resting_mode_a_second_after_the_finger_left(
-    method: str, arrangement: str
-) -> None:
+def test_every_cell_is_in_a_resting_mode_a_second_after_the_finger_left(method, arrangement):
     result = pressed(method, arrangement)
     modes = result.history["mode"]
     assert set(modes[at(result, 1.5)].tolist()) - RESTING

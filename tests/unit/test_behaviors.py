@@ -20,11 +20,7 @@ FREE = 24e-3
 
 def control(method: str, **known: Any) -> Any:
     """Return a behavior, put together for a bed of 5 x 5 cells, without conduits."""
-    table = {
-        "layout": {"rows": 5, "columns": 5},
-        "conduit": "absent",
-        "control": {"method": method, **known},
-    }
+    table = {"layout": {"rows": 5, "columns": 5}, "conduit": "absent", "control": {"method": method, **known}}
     return assemble(resolve(table)).controller
 
 
@@ -125,9 +121,7 @@ TABLE = 2e-5 * FREE
         ("force_display", {"rise": 1e-3}, {"height": 1.1, "force": 10.0}, -5e-3),
     ],
 )
-def test_a_cell_moves_by_its_law(
-    method: str, known: dict[str, Any], given: dict[str, float], speed: float
-) -> None:
+def test_a_cell_moves_by_its_law(method, known, given, speed):
     behavior = control(method, **known)
     command = orders(behavior, seen(behavior, **given)).command
     assert speeds(behavior, command) == pytest.approx(speed, abs=TABLE)
@@ -225,9 +219,7 @@ def test_push_pull_never_reads_the_force() -> None:
 @pytest.mark.parametrize(
     ("drift", "dragged"), [(-0.09, 0.0), (-0.11, -0.01), (0.09, 0.0), (0.11, 0.01), (-0.5, -0.4), (0.5, 0.4)]
 )
-def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height_along(
-    drift: float, dragged: float
-) -> None:
+def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height_along(drift, dragged):
     behavior = control("push_pull", threshold=0.1e-3)
     given = cycle(behavior, seen(behavior, height=middle(drift)))
     assert (given.mode[12] == Mode.FORCE_FOLLOW) == bool(dragged)

@@ -49,9 +49,7 @@ def test_a_pin_without_load_moves_at_the_speed_asked_for(gap: str, share: float)
 
 
 @pytest.mark.parametrize(("speed", "opening"), [(-1.0, -1.0), (0.0, 0.0), (1.0, 1.0)])
-def test_more_than_a_pin_can_do_opens_the_valve_fully_and_no_speed_shuts_it(
-    speed: float, opening: float
-) -> None:
+def test_more_than_a_pin_can_do_opens_the_valve_fully_and_no_speed_shuts_it(speed, opening):
     assert driven().open_for(np.array([speed])).tolist() == [opening]
 
 
@@ -60,9 +58,7 @@ def test_more_than_a_pin_can_do_opens_the_valve_fully_and_no_speed_shuts_it(
     [(-9.9e-6, 0.0), (9.9e-6, 0.0), (1e-3, 50e-3)],
     ids=["within", "the band", "1 mm in 20 ms"],
 )
-def test_a_height_beyond_the_dead_band_is_approached_with_the_settling_time(
-    error: float, speed: float
-) -> None:
+def test_a_height_beyond_the_dead_band_is_approached_with_the_settling_time(error, speed):
     assert driven().approach(np.array([error])) == pytest.approx(speed)
 
 

@@ -77,9 +77,7 @@ def test_a_cell_is_driven_by_its_own_force(before: Mode, force: float, after: Mo
 @pytest.mark.parametrize(
     ("low", "high", "mode"), [(0.0, BLISTER.radius * (1 - 1e-6), Mode.BLISTER), (12e-3, 15.5e-3, Mode.EDGE)]
 )
-def test_the_neighbors_of_a_following_cell_become_its_blister_and_its_edge(
-    low: float, high: float, mode: Mode
-) -> None:
+def test_the_neighbors_of_a_following_cell_become_its_blister_and_its_edge(low, high, mode):
     modes = ordered(seen({MIDDLE: 0.1}))[1].mode
     assert {Mode(int(m)) for m in modes[[low < distance(c) < high for c in range(BED.count)]]} == {mode}
 

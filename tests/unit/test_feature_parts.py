@@ -215,9 +215,7 @@ def test_the_crests_of_a_cross_keep_to_its_lines(arrangement: str, pitch: float)
 
 @pytest.mark.parametrize("name", ["ridge with a mound at its end", "two mounds on a ridge", "two domes"])
 @pytest.mark.parametrize(("arrangement", "pitch"), BEDS)
-def test_the_parts_of_a_boss_share_its_pins_area_and_volume(
-    name: str, arrangement: str, pitch: float
-) -> None:
+def test_the_parts_of_a_boss_share_its_pins_area_and_volume(name, arrangement, pitch):
     bed = formed(name, arrangement, pitch)
     parts = find(fit_skin(bed, "bilinear", 1, 1e-3))
     whole = np.flatnonzero(bed.raised > Finding().threshold)

@@ -98,9 +98,7 @@ def test_a_skin_and_its_resolution_can_be_chosen(run: Path) -> None:
 
 
 @pytest.mark.parametrize("said", ["0.8", "0.8 mm", "0.8mm", "800um"])
-def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(
-    said: str, run: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run, capsys):
     assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--up", "z", "--quiet"]) == 0
     heights = [
         float(line.split()[3]) for line in (run / "surface.obj").read_text().splitlines() if line[:2] == "v "
@@ -118,10 +116,7 @@ def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(
         (["export", "run", "--base-thickness", "0"], "--base-thickness must be above 0 m (got 0 m)."),
         (["export", "run", "--base-thickness", "thick"], "argument --base-thickness: must be a number"),
         (["export", "run", "--kind", "features", "--time", "0"], "There is no feature of at least 3 pins"),
-        (
-            ["features", "run", "--threshold", "-1"],
-            "--threshold must be at least 1e-06 m (got -0.001 m).",
-        ),
+        (["features", "run", "--threshold", "-1"], "--threshold must be at least 1e-06 m (got -0.001 m)."),
         (
             ["features", "run", "--threshold", "1 furlong"],
             "argument --threshold: must have a unit known here",
@@ -133,9 +128,7 @@ def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(
         (["features", "nowhere"], "nowhere is no run's folder"),
     ],
 )
-def test_a_mistake_is_one_line_and_no_file(
-    run: Path, capfd: pytest.CaptureFixture[str], arguments: list[str], said: str
-) -> None:
+def test_a_mistake_is_one_line_and_no_file(run, capfd, arguments, said):
     before = sorted(path.name for path in run.iterdir())
     code = main(arguments)
     out, err = capfd.readouterr()

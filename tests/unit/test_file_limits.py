@@ -138,9 +138,7 @@ def test_a_history_as_its_scene_leaves_it_is_read(tmp_path: Path) -> None:
         ({"height": np.zeros((11, 4), "c16")}, "height must hold numbers of at most 8 bytes"),
     ],
 )  # fmt: skip
-def test_a_history_that_is_not_its_scenes_is_not_unpacked(
-    tmp_path: Path, arrays: dict[str, np.ndarray], said: str
-) -> None:
+def test_a_history_that_is_not_its_scenes_is_not_unpacked(tmp_path, arrays, said):
     folder = history(tmp_path, **arrays)
     assert (folder / "history.npz").stat().st_size < 200_000
     assert said in refused(lambda: read_run(folder, "height"))

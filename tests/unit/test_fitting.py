@@ -93,9 +93,7 @@ def test_scaled_to_the_stroke_the_highest_pin_is_at_its_end() -> None:
         (make_height_map("x.npy", np.linspace(0.0, 7e-3, 12).reshape(3, 4), 1.0), {"fit": "stretch"}, 7.0),
     ],
 )
-def test_a_true_relief_is_as_high_as_the_plan_or_its_own_unit_makes_it(
-    what: Any, known: dict[str, Any], high: float
-) -> None:
+def test_a_true_relief_is_as_high_as_the_plan_or_its_own_unit_makes_it(what, known, high):
     assert table(laid(what, relief="true", **known)).max() == pytest.approx(high, abs=ROUNDING * 1e3)
 
 

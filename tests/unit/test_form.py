@@ -89,9 +89,7 @@ def test_the_folder_alone_repeats_the_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", list_shapes())
-def test_every_sample_shape_can_be_pressed_by_name(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_sample_shape_can_be_pressed_by_name(tmp_path, name, capsys):
     out = form(tmp_path, name, "--finger", "press")
     history = read(out)
     assert history["total_force"].max() > 0.1
@@ -151,9 +149,7 @@ def test_the_finger_touches_at_the_height_it_is_said_to(x: float, y: float) -> N
         (["form", "dome", "--set", "layout.rows=1"], "form needs at least 2 x 2 cells"),
     ],
 )
-def test_what_cannot_be_formed_is_told_in_a_line(
-    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_formed_is_told_in_a_line(arguments, said, tmp_path, capsys):
     out = tmp_path / "out"
     assert main([*arguments, "--out", str(out), "--quiet"]) == WRONG
     told = capsys.readouterr().err

@@ -45,10 +45,7 @@ def gltf(folder: Path, change: Callable[[dict[str, Any]], None] = lambda tree: N
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
             {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
         ],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": 48},
-            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
-        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
         "buffers": [inline(places + corners)],
     }
     change(tree)
@@ -179,9 +176,7 @@ def many_nodes(tree: dict[str, Any]) -> None:
         (with_uri("nowhere.bin"), "must have its files beside it"),
     ],
 )  # fmt: skip
-def test_a_gltf_that_makes_no_sense_is_refused(
-    tmp_path: Path, change: Callable[[dict[str, Any]], None], said: str
-) -> None:
+def test_a_gltf_that_makes_no_sense_is_refused(tmp_path, change, said):
     began = time.monotonic()
     with pytest.raises(ParameterError) as caught:
         read(gltf(tmp_path, change))
@@ -343,18 +338,14 @@ ITEM = '<item objectid="1"/>'
         ),
     ],
 )  # fmt: skip
-def test_what_would_break_a_reader_is_refused(
-    tmp_path: Path, resources: str, build: str, head: str, said: str
-) -> None:
+def test_what_would_break_a_reader_is_refused(tmp_path, resources, build, head, said):
     with pytest.raises(ParameterError) as caught:
         read(packed(tmp_path / "x.3mf", resources, build, head))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_a_zip_that_unpacks_to_more_than_is_allowed_is_not_unpacked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_zip_that_unpacks_to_more_than_is_allowed_is_not_unpacked(tmp_path, monkeypatch):
     path = packed(tmp_path / "bomb.3mf", OBJECT + 3_000_000 * " ", ITEM)
     assert path.stat().st_size < 20_000
     read(path)

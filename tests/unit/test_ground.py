@@ -60,9 +60,7 @@ RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e
         pytest.param(RISEN, (12, 0), 40e-3 + SHARE * 10e-3, id="from where it was when the blister came"),
     ],
 )
-def test_a_cell_rises_from_its_own_ground(
-    measured: Measurement, place: tuple[float, float], height: float
-) -> None:
+def test_a_cell_rises_from_its_own_ground(measured, place, height):
     assert command(master(height=50e-3), measured).target[at(*place)] == pytest.approx(height, abs=1e-9)
 
 
@@ -89,9 +87,7 @@ def test_a_cell_that_was_outside_takes_its_commanded_height_for_its_ground(mode:
         (39.9e-3, 40e-3, 30e-3, False),  # a deeper blister takes it along
     ],
 )
-def test_what_is_left_behind_a_blister_that_travels(
-    target: float, ground: float, top: float, kept: bool
-) -> None:
+def test_what_is_left_behind_a_blister_that_travels(target, ground, top, kept):
     behind = seen(np.full(BED.count, target), Mode.FROZEN, own=np.full(BED.count, ground))
     found = command(master(*EAST, height=top), behind).target[at(-12, 0)]
     assert (found == target) == kept
@@ -149,8 +145,8 @@ EVEN = 40e-3 + 0.03 * BED.x
     ids=["sinks into a slope", "rises", "sinks into even ground"],
 )
 def test_on_uneven_ground_that_a_blister_sinks_into_cells_freeze_sooner_and_are_freed_ahead(
-    ground: Floats, top: float, left: Mode, ahead: Mode
-) -> None:
+    ground, top, left, ahead
+):
     assert pressed(3.0, top, ground=ground).mode[at(-3, 0)] == left
     assert pressed(0.0, top, Mode.FROZEN, ground).mode[at(6, 0)] == ahead
 

@@ -163,9 +163,7 @@ def test_a_byte_order_mark_changes_nothing(tmp_path: Path, kind: str) -> None:
         ("few.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "3 of its 4 lines"),
     ],
 )  # fmt: skip
-def test_a_head_that_promises_more_than_there_is_is_refused(
-    tmp_path: Path, name: str, content: str | bytes, said: str
-) -> None:
+def test_a_head_that_promises_more_than_there_is_is_refused(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(ParameterError) as caught:
         read(tmp_path / name)

@@ -48,9 +48,7 @@ def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file() ->
     assert run(scene).history["height"].min() < softer < 0.04
 
 
-def test_the_command_line_takes_it_wherever_it_takes_a_method(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_line_takes_it_wherever_it_takes_a_method(here, capsys):
     write_method(here)
     size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.1"]
     own = ["tap", "--method", "pad.py:SoftPad", "--quiet", *size]
@@ -81,9 +79,7 @@ def test_the_code_is_shipped_to_processes_that_have_no_file(here: Path) -> None:
     assert pickle.loads(packed).control.step == 70e-6
 
 
-def test_an_installed_package_offers_a_method_by_its_name(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
     write_method(here, name="padpackage.py")
     monkeypatch.syspath_prepend(here)
     info = here / "pads-1.2.dist-info"
@@ -206,9 +202,7 @@ def prepare() -> int:
     return code
 
 
-def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(
-    jobs: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(jobs, capsys):
     assert prepare() == 0
     assert sorted(path.name for path in JOB.iterdir()) == ["job.toml", "method.py", "scene.toml"]
     assert not (JOB.with_name("tap-elastic-small") / "method.py").exists()
@@ -242,9 +236,7 @@ def test_a_series_runs_with_it_in_processes_and_farms_are_told_its_code(jobs: Pa
     assert "--method method.py:SoftPad" in lists
 
 
-def test_a_series_with_a_method_that_cannot_be_loaded_leaves_nothing(
-    jobs: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_series_with_a_method_that_cannot_be_loaded_leaves_nothing(jobs, capsys):
     assert main(["batch", "jobs.toml", "--method", "pad.py:Pad"]) == 2
     said = capsys.readouterr().err
     assert said == "--method: pad.py:Pad: the file must have the class Pad (it has pad.py:SoftPad).\n"
@@ -257,9 +249,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "own-methods.md"
 CODE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 
-def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, capsys):
     assert main(["new-method", "soft_pad", "--out", "own"]) == 0
     assert "--method own/soft_pad.py:SoftPad" in capsys.readouterr().out
     size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.25"]
@@ -290,9 +280,7 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(
         (["pad", "--out", "mine.py"], "mine.py is a file"),
     ],
 )
-def test_a_name_that_cannot_be_is_refused_in_a_line(
-    here: Path, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_that_cannot_be_is_refused_in_a_line(here, arguments, said, capsys):
     (here / "mine.py").write_text("", encoding="utf-8")
     assert main(["new-method", *arguments]) == 2
     err = capsys.readouterr().err
@@ -300,9 +288,7 @@ def test_a_name_that_cannot_be_is_refused_in_a_line(
     assert [(path.name, path.stat().st_size) for path in here.iterdir()] == [("mine.py", 0)]
 
 
-def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(here, capsys):
     assert main(["new-method", "mine", "--quiet"]) == 0
     size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.05"]
     varied = ["--vary", "control.method=elastic,mine.py:Mine", "--workers", "1", "--out", "s", "--quiet"]

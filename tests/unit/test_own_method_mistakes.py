@@ -94,9 +94,7 @@ def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFi
         (PAD + '\n    blister = {"radius": -1.0}\n', "blister must hold values of the section [blister]"),
     ],
 )
-def test_a_class_that_is_no_method_is_refused_in_a_line(
-    here: Path, text: str, rule: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_class_that_is_no_method_is_refused_in_a_line(here, text, rule, capsys):
     write_method(here, text)
     assert main(["run", "tap", "--method", "pad.py:SoftPad"]) == 2
     said = capsys.readouterr().err
@@ -119,9 +117,7 @@ def test_a_class_that_is_no_method_is_refused_in_a_line(
         ("magic", "control.method must be one of virtual_master"),
     ],
 )
-def test_a_word_that_names_no_code_is_refused_in_a_line(
-    here: Path, word: str, rule: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_word_that_names_no_code_is_refused_in_a_line(here, word, rule, capsys):
     (here / "bytes.py").write_bytes(b"\xff\xfe")
     (here / "large.py").write_bytes(b"#" * 1_000_001)
     assert main(["run", "tap", "--method", word]) == 2

@@ -37,9 +37,7 @@ def test_a_ray_from_above_meets_each_pin_on_its_top(arrangement: str) -> None:
 
 @example(turn=5e-324, slope=-1.0, x=0.0, y=0.0)
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, -0.05), st.floats(-0.015, 0.015), st.floats(-0.012, 0.012))
-def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one(
-    turn: float, slope: float, x: float, y: float
-) -> None:
+def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one(turn, slope, x, y):
     cells, height = bed("staggered")
     direction = np.array([np.cos(turn) * np.cos(slope), np.sin(turn) * np.cos(slope), np.sin(slope)])
     origin = np.array([x, y, 0.04]) - 0.3 * direction
@@ -120,9 +118,7 @@ def test_the_ground_is_the_mean_of_the_pins_within_reach_and_the_nearest_beside_
 
 
 @pytest.mark.parametrize("turn", [LEVEL, (0.9, 0.3, -0.2, 0.25), (0.7, 0.0, 0.0, 0.7)])
-def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(
-    turn: tuple[float, ...],
-) -> None:
+def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(turn):
     finger, depth = Fingertip(), 1.2e-3
     pose = np.array([0.0, 0.0, 0.0, *turn])
     outline = finger.outline(pose[None])

@@ -121,9 +121,7 @@ def reach(low: float, high: float) -> Reach:
         (50.0, 41.5e-3, 41e-3, 42e-3, None, pytest.approx(42e-3)),
     ],
 )
-def test_the_forces_at_the_top_add_up_to_what_is_wanted(
-    wanted: float, guess: float, low: float, high: float, force: object, top: object
-) -> None:
+def test_the_forces_at_the_top_add_up_to_what_is_wanted(wanted, guess, low, high, force, top):
     height, total = find_top(wanted, guess, reach(low, high), UNDER, np.zeros(9), PULP)
     assert top is None or height == top
     assert force is None or PULP.predict_force(height - UNDER, np.zeros(9)).sum() == force
@@ -142,9 +140,7 @@ def test_relaxed_pulp_asks_for_a_higher_top() -> None:
     [(True, 55e-3, [55e-3, 53e-3, 40e-3]), (False, 30e-3, [30e-3, 32e-3, 40e-3])],
     ids=["ridge", "valley"],
 )
-def test_led_cells_stand_no_farther_from_the_top_than_they_may(
-    raised: bool, top: float, expected: list[float]
-) -> None:
+def test_led_cells_stand_no_farther_from_the_top_than_they_may(raised, top, expected):
     cells = Reach(40e-3, raised, np.array([1.0, 0.5, 0.0]), np.array([0.0, 2e-3, 20e-3]), np.empty((2, 3)))
     assert cells.form_heights(top) == pytest.approx(expected)
 
@@ -168,9 +164,7 @@ SKIRT = LeadProfile(level=7.5e-3, rise=20e-3, fall=20e-3, skirt=40e-3)
         pytest.param(SKIRT, 17.5e-3, 1.0, 0.0, 5e-3, id="a skirt ahead, for its speed"),
     ],
 )
-def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(
-    profile: LeadProfile, distance: float, ahead: float, speed: float, drop: float
-) -> None:
+def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(profile, distance, ahead, speed, drop):
     found = profile.find_drop(np.array([distance]), np.array([ahead]), speed, raised=True)
     assert found == pytest.approx([drop])
 

@@ -155,9 +155,7 @@ def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
     ("place", "radius", "held"),
     [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)],
 )
-def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(
-    place: tuple[float, float], radius: float, held: int | None
-) -> None:
+def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(place, radius, held):
     system = bed()
     control, method = order(system, *place, radius), system.controller
     assert method is not None

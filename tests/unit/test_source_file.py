@@ -121,9 +121,7 @@ def test_an_array_is_taken_with_its_first_row_at_the_lowest_y(tmp_path: Path) ->
         ("rubbish.png", b"rubbish", "must be a picture that can be read"),
     ],
 )
-def test_a_file_that_holds_no_shape_is_refused_by_name(
-    tmp_path: Path, name: str, content: bytes, said: str
-) -> None:
+def test_a_file_that_holds_no_shape_is_refused_by_name(tmp_path, name, content, said):
     path = tmp_path / f"schöner Ordner {name}"
     path.write_bytes(content)
     with pytest.raises(DigiclayError) as caught:

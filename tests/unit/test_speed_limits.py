@@ -36,9 +36,7 @@ def device(method: str = "virtual_master", **layout: object) -> Scene:
         (50.0, 2.0, 0.1, 40.0, 40.0, 2),  # beyond the range: its end
     ],
 )
-def test_the_bisection_returns_a_value_that_held(
-    limit: float, low: float, resolution: float, least: float, most: float, calls: int
-) -> None:
+def test_the_bisection_returns_a_value_that_held(limit, low, resolution, least, most, calls):
     tried: list[float] = []
     found = bisect(lambda value: bool(tried.append(value)) or value <= limit, low, 40.0, resolution)
     assert found in tried
@@ -127,9 +125,7 @@ def test_a_run_gives_every_figure_and_its_rows_between_two_times(press: Result) 
         (((1.4, 3.0),), 0),
     ],
 )
-def test_losses_of_a_phase_are_counted_from_the_record_for_every_method(
-    press: Result, without: tuple[tuple[float, float], ...], losses: int
-) -> None:
+def test_losses_of_a_phase_are_counted_from_the_record_for_every_method(press, without, losses):
     time = press.history["time"]
     force = np.ones(len(time))
     for start, end in without:

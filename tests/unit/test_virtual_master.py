@@ -52,9 +52,7 @@ def touched(*presses: tuple[float, float, float], height: float = 40.0) -> Measu
         pytest.param(master(), [(0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)], (3e-3, 0.0), id="later those near"),
     ],
 )
-def test_the_master_is_at_the_centroid_of_the_forces(
-    before: Master | None, presses: list[tuple[float, float, float]], place: tuple[float, float]
-) -> None:
+def test_the_master_is_at_the_centroid_of_the_forces(before, presses, place):
     memory, _ = control().locate(before or control().begin(), touched(*presses))
     assert (memory.x, memory.y) == pytest.approx(place, abs=1e-15)
 
@@ -99,9 +97,7 @@ PHASES: dict[str, tuple[Master, float, list[tuple[float, float, float]], Phase, 
 
 
 @pytest.mark.parametrize(("before", "floor", "presses", "phase", "losses"), PHASES.values(), ids=PHASES)
-def test_forces_set_the_phase(
-    before: Master, floor: float, presses: list[tuple[float, float, float]], phase: Phase, losses: int
-) -> None:
+def test_forces_set_the_phase(before, floor, presses, phase, losses):
     memory, _ = replace(control(), floor=floor).locate(before, touched(*presses))
     assert (memory.phase, memory.losses) == (phase, losses)
 
@@ -135,9 +131,7 @@ def settled(memory: Master, force: float, count: int = 600) -> Master:
         (master(), 5.0, 1500, 0.0),
     ],
 )
-def test_a_steady_force_takes_the_master_to_a_height(
-    before: Master, force: float, count: int, height: object
-) -> None:
+def test_a_steady_force_takes_the_master_to_a_height(before, force, count, height):
     after = settled(before, force, count).height
     assert after == height
     assert (after == before.height) == (force == 0.4)
@@ -167,9 +161,7 @@ def test_the_master_s_valve_lags_as_a_real_one() -> None:
         pytest.param(master(), [-5.0], (-1.0, 0.0), id="fast, in one period"),
     ],
 )
-def test_a_fingertip_gets_its_direction_once_it_has_gone_far_enough(
-    before: Master, path_x: list[float], toward: tuple[float, float]
-) -> None:
+def test_a_fingertip_gets_its_direction_once_it_has_gone_far_enough(before, path_x, toward):
     method, memory = control(), before
     for x in path_x:
         memory, _ = method.locate(memory, touched((x, 0, 0.4)))

@@ -51,9 +51,7 @@ CONE, BELL = Blister(), Blister(profile="gaussian")
         pytest.param(BELL, [0.0, 7e-3, 14e-3], [1.0, np.exp(-0.5), np.exp(-2.0)], id="a Gaussian"),
     ],
 )
-def test_a_profile_has_its_formula_over_any_surface(
-    blister: Blister, distance: list[float], profile: list[float]
-) -> None:
+def test_a_profile_has_its_formula_over_any_surface(blister, distance, profile):
     places, part = np.array(distance), np.array(profile)
     assert blister.evaluate_profile(places) == pytest.approx(part, rel=1e-14, abs=1e-15)
     for edge, top in ((40e-3, 55e-3), (40e-3, 30e-3)):
@@ -149,9 +147,7 @@ EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
         pytest.param(EAST, Mode.FROZEN, (-21, 0), 0.0, Mode.HOLD, id="out of the blister"),
     ],
 )
-def test_cells_freeze_behind_a_traveling_fingertip(
-    toward: tuple[float, float], before: Mode, place: tuple[float, float], force: float, after: Mode
-) -> None:
+def test_cells_freeze_behind_a_traveling_fingertip(toward, before, place, force, after):
     seen = ridge(before)
     seen.force[at(*place)] = force
     _, orders = created(master(*toward), seen)
@@ -181,9 +177,7 @@ def test_what_outgrows_a_frozen_cell_takes_it_along(height: float, target: float
 
 
 @pytest.mark.parametrize(("risen", "kept"), [(1.4e-3, False), (1.6e-3, True)])
-def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_of_its_radius(
-    risen: float, kept: bool
-) -> None:
+def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_of_its_radius(risen, kept):
     # It has not felt the finger for a period.
     searching = master(*EAST, height=55e-3)._replace(felt=55e-3 - risen, alone=1)
     target = created(searching, ridge(Mode.FROZEN))[1].target[at(-12, 0)]
