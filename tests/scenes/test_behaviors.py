@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,6 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
-from digiclay.core.model.interfaces import Sensors
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.schema import Scene
@@ -21,6 +20,7 @@ from digiclay.core.session.run_scene import Result, run
 
 TOUCHING = ("elastic", "plastic", "viscous", "push_pull", "force_display")
 BEHAVIORS = (*TOUCHING, "shape_display")
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 SESSIONS = ("elastic_press", "plastic_press", "viscous_press", "push_pull", "force_display", "shape_display")
 RESTING = {int(Mode.REST), int(Mode.HOLD)}
 REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
@@ -39,9 +39,9 @@ def scene(method: str, way: tuple[tuple[float, ...], ...] = PRESS, side: int = 1
 
 
 @cache
-def pressed(method: str, arrangement: str = "aligned") -> Result:
+def pressed(method: str) -> Result:
     """Return a press under a behavior."""
-    return run(scene(method, arrangement=arrangement))
+    return run(scene(method))
 
 
 def heights(result: Result) -> np.ndarray:
@@ -59,10 +59,9 @@ def at(result: Result, time: float) -> int:
 
 @pytest.mark.parametrize("method", ["elastic", "force_display"])
 def test_a_bed_that_springs_back_is_at_rest_after_the_fingertip_left(method: str) -> None:
-    result = pressed(method)
-    assert heights(result).min() < REST - 2e-3
-    # Rounding on top of the dead band.
-    assert np.abs(heights(result)[-1] - REST).max() <= DEAD_BAND + 1e-12
+    height = heights(pressed(method))
+    assert height.min() < REST - 2e-3
+    assert np.abs(height[-1] - REST).max() <= DEAD_BAND + 1e-12  # rounding on top
 
 
 def test_an_elastic_bed_is_felt_as_a_spring() -> None:
@@ -74,41 +73,28 @@ def test_an_elastic_bed_is_felt_as_a_spring() -> None:
     assert force == pytest.approx(20.0 * (REST - height), abs=1e-3)
 
 
-def test_a_plastic_bed_stays_at_the_deepest_press() -> None:
-    result = pressed("plastic")
-    deepest = heights(result)[: at(result, GONE)].min(axis=0)
+def test_a_plastic_bed_stays_at_the_deepest_press_and_as_it_is_under_a_shallower_one() -> None:
+    again = (*PRESS[:4], (3.2, 0, 0, 40), (3.6, 0, 0, 35.8), (3.8, 0, 0, 70), (4.8, 0, 0, 70))
+    result = run(scene("plastic", again))
+    deepest, before = heights(result)[: at(result, GONE)].min(axis=0), heights(result)[at(result, 3.0)]
     # The valve lags 3 ms: what a pin sinks in that time after its force fell below yield is no press.
     # At 12 mm/s that is 36 µm, and the dead band comes on top.
-    assert np.abs(heights(result)[-1] - deepest).max() <= 46e-6
-    assert np.ptp(heights(result)[at(result, 2.5) :], axis=0).max() == 0.0
-
-
-def test_a_second_shallower_press_leaves_a_plastic_bed_as_it_is() -> None:
-    again = (*PRESS[:4], (3.2, 0, 0, 40), (3.6, 0, 0, 37.5), (3.8, 0, 0, 70), (4.8, 0, 0, 70))
-    result = run(scene("plastic", again))
-    before = heights(result)[at(result, 3.0)]
+    assert np.abs(before - deepest).max() <= 46e-6
+    assert np.ptp(heights(result)[at(result, 2.5) : at(result, 3.0)], axis=0).max() == 0.0
+    assert result.history["total_force"][at(result, 3.0) :].max() > 0.0
     assert np.abs(heights(result)[-1] - before).max() <= DEAD_BAND
 
 
 # Viscous
 
 
-@pytest.mark.parametrize("time_constant", [0.3, 1.0])
-@pytest.mark.parametrize("diffusivity", [0.0, 10e-6])
+@pytest.mark.parametrize(("time_constant", "diffusivity"), [(0.3, 10e-6), (1.0, 0.0)])
 def test_a_viscous_dent_s_volume_recovers_with_its_time_constant(time_constant, diffusivity):
     result = run(scene("viscous", recovery_time=time_constant, diffusivity=diffusivity, side=17))
     first, last = at(result, 2.1), at(result, 2.1 + time_constant)
     dent = (REST - heights(result)).sum(axis=1)
-    assert (result.history["time"][last] - result.history["time"][first]) / np.log(
-        dent[first] / dent[last]
-    ) == pytest.approx(time_constant, rel=0.05)
-
-
-def test_a_viscous_dent_draws_cells_along_that_were_never_touched() -> None:
-    result = pressed("viscous")
-    row = at(result, 1.99)
-    untouched = result.history["force"][: row + 1].max(axis=0) == 0.0
-    assert (REST - heights(result)[row])[untouched].max() > 0.5e-3
+    taken = result.history["time"][last] - result.history["time"][first]
+    assert taken / np.log(dent[first] / dent[last]) == pytest.approx(time_constant, rel=0.05)
 
 
 def test_what_spreads_in_a_viscous_bed_is_not_lost() -> None:
@@ -145,13 +131,17 @@ def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement: str
     assert np.abs(narrow - wide).max() <= 1.1 * DEAD_BAND
 
 
-def test_a_viscous_bed_that_has_recovered_is_at_rest_and_costs_nothing() -> None:
+def test_a_viscous_bed_that_has_recovered_is_at_rest_and_costs_nothing_as_a_finished_display() -> None:
     system, way = _system(scene("viscous", (*PRESS[:4], (6.0, 0, 0, 70)), recovery_time=0.3))
-    *_, last = periods(system, [way], begin(system), 1200)
+    *_, last = periods(system, [way], begin(system), 1000)
     assert last.active.cells.size == 0
     assert np.all(last.row(system.rows.target) == REST)
     assert np.abs(last.row(0) - REST).max() <= DEAD_BAND + 1e-12
     assert set(last.mode().tolist()) == {int(Mode.REST)}
+    low = {"refresh": "approximate_gradual", "surfaces": 1, "amplitude": 3e-3}
+    system, way = _system(scene("shape_display", AWAY, 9, **low))
+    *_, last = periods(system, [way], begin(system), 600)
+    assert last.active.cells.size == 0
 
 
 # Push and pull
@@ -172,23 +162,6 @@ def test_a_pin_that_is_not_pushed_stays_at_rest_while_it_listens() -> None:
     assert np.abs(heights(result) - REST).max() < 40e-6
 
 
-def test_push_pull_runs_alike_whatever_the_force_sensors_say() -> None:
-    @dataclass(frozen=True)
-    class Blind(Sensors):
-        rows = 0
-
-        def measure(self, own: Any, truth: Any) -> Any:
-            return np.full_like(truth.force, np.nan), truth.height
-
-        def update(self, own: Any, truth: Any) -> None:
-            """Nothing to remember."""
-
-    system, way = _system(scene("push_pull"))
-    blind = replace(system, sensors=Blind())
-    ends = [list(periods(one, [way], begin(one), 600))[-1].row(0) for one in (system, blind)]
-    assert np.array_equal(*ends)
-
-
 # Force display
 
 
@@ -204,19 +177,6 @@ def test_a_resting_finger_feels_the_field(field: str) -> None:
     assert force[felt] == pytest.approx(asked[felt], abs=1e-3)
 
 
-def test_what_a_resting_finger_feels_less_than_the_field_is_what_moves_the_pins() -> None:
-    result = run(scene("force_display", field="wave"))
-    row = at(result, 1.9)
-    controller = assemble(result.scene).controller
-    force = result.history["force"][row]
-    felt = force > 0.0
-    speed = (heights(result)[row + 5] - heights(result)[row - 5]) / (10 * PERIOD)
-    missing = 5.0 * speed / (1.0 - force / controller.drive.lift)
-    # c dH/dt = F_com - F at the speed of a loaded pin. The valve's lag and the conduit's share of the
-    # pressure drop are left out: 10 % of 0.8 mN.
-    assert (controller.field - force)[felt] == pytest.approx(missing[felt], abs=0.08e-3)
-
-
 # Shape display
 
 AWAY = ((0.0, 0, 0, 90), (12.0, 0, 0, 90))
@@ -229,8 +189,9 @@ def displayed(refresh: str, shape: str = "crater", **known: Any) -> tuple[Result
     return result, assemble(result.scene).controller.heights
 
 
-@pytest.mark.parametrize("refresh", ["one_time", "gradual", "approximate_gradual"])
-@pytest.mark.parametrize("shape", ["dome", "saddle", "crater", "file"])
+@pytest.mark.parametrize(
+    ("refresh", "shape"), [("one_time", "saddle"), ("gradual", "pyramid"), ("approximate_gradual", "file")]
+)
 def test_the_display_reaches_its_shape(refresh: str, shape: str, tmp_path: Path) -> None:
     if shape == "file":
         shape = str(tmp_path / "mine.npy")
@@ -281,22 +242,9 @@ def test_a_small_step_settles_as_quickly_as_digital_clay_s_hardware() -> None:
     assert 3 * 0.05 <= end <= 3 * 0.1
 
 
-def test_a_finished_display_costs_nothing() -> None:
-    system, way = _system(scene("shape_display", AWAY, 9, refresh="approximate_gradual"))
-    *_, last = periods(system, [way], begin(system), 2000)
-    assert last.active.cells.size == 0
-
-
 def test_a_displayed_shape_holds_against_a_finger() -> None:
-    way = (
-        (0.0, 0, 0, 70),
-        (2.0, 0, 0, 70),
-        (2.5, 0, 0, 48),
-        (3.0, 0, 0, 48),
-        (3.5, 0, 0, 70),
-        (4.5, 0, 0, 70),
-    )
-    result = run(scene("shape_display", way, refresh="approximate_gradual"))
+    way = [(0, 70), (2, 70), (2.5, 48), (3, 48), (3.5, 70), (4.5, 70)]
+    result = run(scene("shape_display", tuple((t, 0, 0, z) for t, z in way), refresh="approximate_gradual"))
     wanted = assemble(result.scene).controller.heights
     assert result.history["total_force"].max() > 0.5
     assert np.abs(heights(result)[-1] - wanted).max() <= DEAD_BAND + 1e-12
@@ -305,33 +253,24 @@ def test_a_displayed_shape_holds_against_a_finger() -> None:
 # All of them
 
 
-@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
-@pytest.mark.parametrize("method", TOUCHING)
-def test_every_cell_is_in_a_resting_mode_a_second_after_the_finger_left(method, arrangement):
-    result = pressed(method, arrangement)
-    modes = result.history["mode"]
-    assert set(modes[at(result, 1.5)].tolist()) - RESTING
-    assert set(modes[at(result, GONE + 1.0)].tolist()) <= RESTING
-
-
 @pytest.mark.parametrize("method", BEHAVIORS)
 def test_no_random_session_leaves_a_cell_in_a_mode_for_ever(method: str) -> None:
     # A failing one is named by its seed. Gone for the last 1.05 s, as in the test of the two methods; the
     # display, whose refresh takes longer than the way there, goes to a low shape all rows at once.
     low = {"refresh": "approximate_gradual", "surfaces": 1, "amplitude": 3e-3}
     known = low if method == "shape_display" else {}
-    stuck = {}
-    for seed in range(8):
+    stuck, touched = {}, 0
+    for seed in range(6):
         chance = np.random.default_rng(seed)
         times = np.sort(chance.uniform(0.05, 0.9, 5)) + 0.02 * np.arange(5)
-        places = [
-            (float(t), *chance.uniform(-24, 24, 2).tolist(), float(chance.uniform(33, 48))) for t in times
-        ]
-        result = run(scene(method, (*places, (1.02, 0, 0, 90), (2.07, 0, 0, 90)), 15, **known))
+        places = [(float(t), *chance.uniform(-24, 24, 2), float(chance.uniform(33, 48))) for t in times]
+        way = (*places, (1.02, 0, 0, 90), (2.07, 0, 0, 90))
+        result = run(scene(method, way, 15, arrangement=ARRANGEMENTS[seed % 3], **known))
         modes = set(result.history["mode"][-1].tolist())
+        touched += not set(np.unique(result.history["mode"]).tolist()) <= RESTING
         if not modes <= RESTING or not np.isfinite(heights(result)).all():
             stuck[seed] = sorted(modes - RESTING)
-    assert stuck == {}
+    assert (stuck, touched >= 5) == ({}, True)
 
 
 @pytest.mark.parametrize("method", TOUCHING)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -48,21 +49,12 @@ def test_a_pin_without_load_moves_at_the_speed_asked_for(gap: str, share: float)
     assert speed == pytest.approx(wanted, abs=2e-5 * drive.up[-1])
 
 
-@pytest.mark.parametrize(("speed", "opening"), [(-1.0, -1.0), (0.0, 0.0), (1.0, 1.0)])
-def test_more_than_a_pin_can_do_opens_the_valve_fully_and_no_speed_shuts_it(speed, opening):
-    assert driven().open_for(np.array([speed])).tolist() == [opening]
-
-
-@pytest.mark.parametrize(
-    ("error", "speed"),
-    [(-9.9e-6, 0.0), (9.9e-6, 0.0), (1e-3, 50e-3)],
-    ids=["within", "the band", "1 mm in 20 ms"],
-)
-def test_a_height_beyond_the_dead_band_is_approached_with_the_settling_time(error, speed):
-    assert driven().approach(np.array([error])) == pytest.approx(speed)
-
-
-def test_reservoirs_that_cannot_raise_a_pin_give_finite_commands() -> None:
+def test_a_drive_is_limited_to_its_valve_and_approaches_a_height_in_its_settling_time() -> None:
+    # More than a pin can do opens the valve fully, no speed shuts it.
+    assert driven().open_for(np.array([-1.0, 0.0, 1.0])).tolist() == [-1.0, 0.0, 1.0]
+    # 1 mm in 20 ms; nothing within the dead band.
+    assert driven().approach(np.array([-9.9e-6, 9.9e-6, 1e-3])) == pytest.approx([0.0, 0.0, 50e-3])
+    # Reservoirs that cannot raise a pin give finite commands.
     drive = driven(supply={"high": -0.1e5, "low": -0.5e5})
     assert np.all(np.abs(drive.open_for(np.array([-0.02, 0.0, 0.02]))) <= 1.0)
 
@@ -90,15 +82,6 @@ def test_the_nearest_cells_are_neighbors_each_pair_once(arrangement: str) -> Non
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_in_a_long_period_a_cell_exchanges_half_of_what_its_neighbors_differ_by(arrangement: str) -> None:
-    plan = bed(arrangement)
-    cells, given = np.arange(plan.count), np.zeros(plan.count)
-    for ones, others, share in make_exchange(plan, 1e-5, 1e9).find_pairs(cells):
-        np.add.at(given, np.concatenate((ones, others)), share)
-    assert given[plan.count // 2] == pytest.approx(0.5, rel=1e-12)
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_values_spread_alike_along_x_and_y(arrangement: str) -> None:
     plan = bed(arrangement, 31, 31)
     rule, cells = make_exchange(plan, 10e-6, 5e-3), np.arange(plan.count)
@@ -115,56 +98,43 @@ def test_values_spread_alike_along_x_and_y(arrangement: str) -> None:
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("period", [5e-3, 1.0, 1e3])
-def test_no_exchange_overshoots_however_long_the_period(arrangement: str, period: float) -> None:
+def test_an_exchange_keeps_the_sum_and_does_not_overshoot_however_long_the_period(arrangement: str) -> None:
     plan = bed(arrangement)
-    values = np.where(np.arange(plan.count) % 2, 1.0, 0.0)
-    evened = make_exchange(plan, 10e-6, period).even_out(np.arange(plan.count), values)
-    assert evened.min() >= -1e-12  # rounding
-    assert evened.max() <= 1.0 + 1e-12
-
-
-def test_what_neighbors_exchange_adds_up_to_nothing() -> None:
-    plan = bed("hexagonal")
-    cells = np.random.default_rng(4).permutation(plan.count)[:30]
+    some = np.random.default_rng(4).permutation(plan.count)[:30]
     values = np.random.default_rng(5).normal(size=30)
-    evened = make_exchange(plan, 50e-6, 5e-3).even_out(cells, values)
+    evened = make_exchange(plan, 50e-6, 5e-3).even_out(some, values)
     assert evened.sum() == pytest.approx(values.sum(), abs=1e-13)  # rounding of 30 numbers of size 1
     assert np.abs(evened - values).max() > 0.01
-
-
-def test_a_bed_of_one_cell_has_no_neighbors() -> None:
-    rule = make_exchange(bed("aligned", 1, 1), 1e-5, 5e-3)
-    assert rule.even_out(np.zeros(1, np.intp), np.ones(1)).tolist() == [1.0]
+    cells, given = np.arange(plan.count), np.zeros(plan.count)
+    checkered = np.where(cells % 2, 1.0, 0.0)
+    for period in (5e-3, 1.0, 1e3):
+        evened = make_exchange(plan, 10e-6, period).even_out(cells, checkered)
+        assert -1e-12 <= evened.min() <= evened.max() <= 1.0 + 1e-12  # rounding
+    # In a long one a cell exchanges half of what its neighbors differ by.
+    for ones, others, share in make_exchange(plan, 1e-5, 1e9).find_pairs(cells):
+        np.add.at(given, np.concatenate((ones, others)), share)
+    assert given[plan.count // 2] == pytest.approx(0.5, rel=1e-12)
+    lonely = make_exchange(bed("aligned", 1, 1), 1e-5, 5e-3)
+    assert lonely.even_out(np.zeros(1, np.intp), np.ones(1)).tolist() == [1.0]
 
 
 # Shapes
 
 
+#: At x = 0.5, y = 0.25 of the square from -1 to 1, 0.559 from its middle.
+VALUES = {
+    "dome": 1.0 - 0.3125, "saddle": 0.1875, "wave": 0.0, "ripple": np.cos(3.0 * np.pi * 0.3125**0.5),
+    "crater": 0.930852, "pyramid": 0.5, "ramp": 0.5, "flat": 0.0,
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_named_shape_lies_between_minus_one_and_one_and_fits_a_bed_of_one_cell(shape: str) -> None:
+def test_a_named_shape_has_the_values_of_its_formula_and_fits_a_bed_of_one_cell(shape: str) -> None:
+    assert SHAPES[shape](np.array([0.5]), np.array([0.25]))[0] == pytest.approx(VALUES[shape], abs=1e-6)
     values = evaluate_shape(shape, bed("aligned", 41, 41))
     assert np.all(np.abs(values) <= 1.0 + 1e-12)
     assert shape == "flat" or np.ptp(values) > 0.9
     assert np.all(np.isfinite(evaluate_shape(shape, bed("aligned", 1, 1))))
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        # At x = 0.5, y = 0.25 of the square from -1 to 1, 0.559 from its middle.
-        ("dome", 1.0 - 0.3125),
-        ("saddle", 0.1875),
-        ("wave", 0.0),
-        ("ripple", np.cos(3.0 * np.pi * 0.3125**0.5)),
-        ("crater", 0.930852),
-        ("pyramid", 0.5),
-        ("ramp", 0.5),
-        ("flat", 0.0),
-    ],
-)
-def test_a_named_shape_has_the_values_of_its_formula(name: str, value: float) -> None:
-    assert SHAPES[name](np.array([0.5]), np.array([0.25]))[0] == pytest.approx(value, abs=1e-6)
 
 
 # Scenes
@@ -186,95 +156,41 @@ def test_a_scene_names_the_behavior_and_reads_back_equal(method: str) -> None:
 
 
 WRONG = [
-    ("elastic", {"stiffness": 0}, "control.stiffness must be above 0 N/m (got 0 N/m)."),
-    ("plastic", {"yield_force": -0.1}, "control.yield_force must be above 0 N (got -0.1 N)."),
-    (
-        "plastic",
-        {"yield_force": 1e-3},
-        "control.yield_force must be at least felt_force, 0.005 N (got 0.001 N).",
-    ),
-    (
-        "force_display",
-        {"field": "ramp", "contrast": 0.95},
-        "control.contrast must keep the field at or above control.felt_force, 0.005 N "
-        "(got 0.0025 N at its smallest).",
-    ),
-    (
-        "viscous",
-        {"recovery": 1.0},
-        "control.recovery must be a known key (got 1.0). Did you mean control.recovery_time?",
-    ),
-    (
-        "push_pull",
-        {"following_speed": 1e-3},
-        "control.following_speed must be at least listening_speed, 0.008 m/s (got 0.001 m/s).",
-    ),
-    (
-        "push_pull",
-        {"threshold": 20e-6},
-        "control.threshold must be above a listening pin's own way in a control period, 4e-05 m "
-        "(got 2e-05 m).",
-    ),
-    (
-        "force_display",
-        {"field": "ramp", "force": 0.12},
-        "control.force must keep the field below what a pin can press, 0.157 N (got 0.18 N at its largest).",
-    ),
-    (
-        "shape_display",
-        {"shape": "hat"},
-        "control.shape must be one of dome, saddle, wave, ripple, crater, pyramid, ramp, flat, "
-        "or a file .npy (got 'hat').",
-    ),
-    (
-        "shape_display",
-        {"refresh": "at_once"},
-        "control.refresh must be one of one_time, gradual, approximate_gradual (got 'at_once').",
-    ),
-    (
-        "shape_display",
-        {"amplitude": 70e-3},
-        "control.amplitude must keep the shape between 0 and the stroke, 0.1 m "
-        "(got heights from 0.04 m to 0.11 m).",
-    ),
-    (
-        "elastic",
-        {"settling_time": 5e-3},
-        "control.settling_time must be at least two control periods, 0.01 s (got 0.005 s).",
-    ),
-    (
-        "elastic",
-        {"damping": 1.0},
-        "control.damping must be at least 2.1 N s/m at this control period, or the pin would swing "
-        "(got 1 N s/m).",
-    ),
-    (
-        "shape_display",
-        {"shape": "nowhere.npy"},
-        "control.shape must be a file that can be read (got nowhere.npy: No such file or directory).",
-    ),
+    ("elastic", {"stiffness": 0}, "stiffness must be above 0 N/m (got 0 N/m)."),
+    ("plastic", {"yield_force": -0.1}, "yield_force must be above 0 N (got -0.1 N)."),
+    ("plastic", {"yield_force": 1e-3}, "yield_force must be at least felt_force, 0.005 N (got 0.001 N)."),
+    ("force_display", {"field": "ramp", "contrast": 0.95}, "0.005 N (got 0.0025 N at its smallest)."),
+    ("force_display", {"field": "ramp", "force": 0.12}, "can press, 0.157 N (got 0.18 N at its largest)."),
+    ("viscous", {"recovery": 1.0}, "Did you mean control.recovery_time?"),
+    ("push_pull", {"following_speed": 1e-3}, "at least listening_speed, 0.008 m/s (got 0.001 m/s)."),
+    ("push_pull", {"threshold": 20e-6}, "way in a control period, 4e-05 m (got 2e-05 m)."),
+    ("shape_display", {"shape": "hat"}, "must be one of dome, "),
+    ("shape_display", {"shape": "nowhere.npy"}, "(got nowhere.npy: No such file or directory)."),
+    ("shape_display", {"refresh": "at_once"}, "refresh must be one of one_time, "),
+    ("shape_display", {"amplitude": 70e-3}, "stroke, 0.1 m (got heights from 0.04 m to 0.11 m)."),
+    ("elastic", {"settling_time": 5e-3}, "settling_time must be at least two control periods, 0.01 s (got"),
+    ("elastic", {"damping": 1.0}, "damping must be at least 2.1 N s/m at this control period"),
 ]
 
 
-@pytest.mark.parametrize(("method", "given", "line"), WRONG)
-def test_a_bad_parameter_is_refused_in_one_line(method: str, given: dict[str, Any], line: str) -> None:
-    with pytest.raises(ParameterError) as caught:
+@pytest.mark.parametrize(("method", "given", "said"), WRONG)
+def test_a_bad_parameter_is_refused_in_one_line(method: str, given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ParameterError, match=re.escape(said)) as caught:
         build(method, **given)
-    assert str(caught.value) == line
+    assert str(caught.value).startswith("control.")
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
     ("array", "said"),
     [
-        (np.zeros((4, 5)), "must hold an array of the bed's 5 x 5 cells (got {}: 4 x 5)."),
-        (np.full((5, 5), 0.2), "must hold values from 0 to 0.1 m (got {}: 0.2 m)."),
-        (np.full((5, 5), np.nan), "must hold values from 0 to 0.1 m (got {}: nan m)."),
-        (np.array([["a"] * 5] * 5), "must be a file that holds one array of numbers (got {})."),
+        (np.zeros((4, 5)), "an array of the bed's 5 x 5 cells (got {}: 4 x 5)."),
+        (np.full((5, 5), 0.2), "values from 0 to 0.1 m (got {}: 0.2 m)."),
+        (np.full((5, 5), np.nan), "values from 0 to 0.1 m (got {}: nan m)."),
+        (np.array([["a"] * 5] * 5), "one array of numbers (got {})."),
     ],
 )
 def test_a_file_that_does_not_fit_the_bed_is_refused(tmp_path: Path, array: Any, said: str) -> None:
-    path = tmp_path / "mine.npy"
-    np.save(path, array)
-    with pytest.raises(ParameterError) as caught:
-        build("shape_display", shape=str(path))
-    assert str(caught.value) == "control.shape " + said.format(path)
+    np.save(tmp_path / "mine.npy", array)
+    with pytest.raises(ParameterError, match=re.escape(said.format(tmp_path / "mine.npy"))):
+        build("shape_display", shape=str(tmp_path / "mine.npy"))

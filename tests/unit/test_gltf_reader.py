@@ -6,6 +6,7 @@ import base64
 import json
 import math
 import os
+import re
 import time
 import zipfile
 from collections.abc import Callable
@@ -18,10 +19,9 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.mesh_io import mesh_limits, mesh_writer, threemf_reader
+from digiclay.core.mesh_io import mesh_limits, threemf_reader
 from digiclay.core.mesh_io.mesh_reader import read
 from digiclay.core.mesh_io.mesh_writer import CORE, HEAD, RELATIONS, TYPES
-from digiclay.core.surface.formed import Body
 
 #: A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
 PLACES = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])
@@ -60,31 +60,17 @@ def with_uri(uri: str) -> Callable[[dict[str, Any]], None]:
     return lambda tree: tree["buffers"][0].update(uri=uri)
 
 
-def test_nodes_stand_where_trimesh_puts_them(tmp_path: Path) -> None:
-    turn = trimesh.transformations.quaternion_from_euler(0.3, 0.5, -0.8)
-    scene = trimesh.Scene()
-    tetrahedron = trimesh.Trimesh(PLACES, FACES, process=False)
-    inner = trimesh.transformations.quaternion_matrix(turn)
-    inner[:3, 3] = 1.0, 2.0, 3.0
-    scene.add_geometry(tetrahedron, node_name="a", transform=inner)
-    scene.add_geometry(
-        tetrahedron, node_name="b", parent_node_name="a", transform=np.diag([2.0, 3.0, 0.5, 1.0])
-    )
-    path = tmp_path / "nodes.glb"
-    scene.export(path)
-    judge = trimesh.load_mesh(path, process=False)
-    back = read(path)
-    np.testing.assert_allclose(np.sort(back.vertices, 0), np.sort(judge.vertices, 0), rtol=0.0, atol=1e-6)
-    moved = trimesh.Trimesh(back.vertices, back.faces, process=False)
-    assert moved.volume == pytest.approx(judge.volume, rel=1e-6)
-
-
-def test_a_node_is_turned_shifted_and_stretched_as_trimesh_has_it(tmp_path: Path) -> None:
+def test_nodes_are_turned_shifted_and_stretched_as_trimesh_has_them(tmp_path: Path) -> None:
     parts = {"rotation": [0.1, -0.5, 0.7, 0.5], "scale": [1.0, 2.0, -3.0], "translation": [4.0, 5.0, 6.0]}
-    path = gltf(tmp_path, lambda tree: tree["nodes"][0].update(parts))
+    inner = np.diag([2.0, 3.0, 0.5, 1.0])
+    inner[:3, 3] = 1.0, 2.0, 3.0
+    nodes = [{"mesh": 0, "children": [1], **parts}, {"mesh": 0, "matrix": inner.T.ravel().tolist()}]
+    path = gltf(tmp_path, lambda tree: tree.update(nodes=nodes))
     back, judge = read(path), trimesh.load_mesh(path, process=False)
-    np.testing.assert_allclose(back.vertices, judge.vertices, rtol=0.0, atol=1e-6)
-    assert trimesh.Trimesh(back.vertices, back.faces, process=False).volume > 0.0
+    np.testing.assert_allclose(np.sort(back.vertices, 0), np.sort(judge.vertices, 0), rtol=0.0, atol=1e-6)
+    # The mirrored ones turned the right way out: once stretched to 6 times, once to 3 times that.
+    volume = trimesh.Trimesh(back.vertices, back.faces, process=False).volume
+    assert volume == pytest.approx(24 * 5 * 7 * 11 / 6, rel=1e-6)
 
 
 @pytest.mark.parametrize(("mode", "corners"), [(5, [0, 1, 2, 3, 0]), (6, [0, 1, 2, 3])])
@@ -110,8 +96,7 @@ def test_bytes_beside_the_gltf_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "uri",
-    ["../bytes.bin", "../../../../dev/zero", "/dev/zero", "sub/../../bytes.bin", "%2e%2e/bytes.bin",
-     "..%2fbytes.bin",
+    ["../bytes.bin", "/dev/zero", "sub/../../bytes.bin", "%2e%2e/bytes.bin", "..%2fbytes.bin",
      "file:///dev/zero", "http://localhost/bytes.bin", "https://localhost/b", "//host/b", "C:/bytes.bin",
      "..\\bytes.bin", "\\\\host\\b", "link.bin", "a\0b"],
 )  # fmt: skip
@@ -125,10 +110,13 @@ def test_bytes_from_elsewhere_are_refused(tmp_path: Path, uri: str) -> None:
         read(path)
 
 
-def test_a_pipe_or_a_device_beside_the_gltf_is_not_opened(tmp_path: Path) -> None:
+def test_a_pipe_beside_the_gltf_is_not_opened_and_endless_nesting_is_refused(tmp_path: Path) -> None:
     path = gltf(tmp_path, with_uri("pipe.bin"))
     os.mkfifo(tmp_path / "pipe.bin")
     with pytest.raises(ParameterError, match="must have its files beside it"):
+        read(path)
+    path.write_text("[" * 100_000, encoding="utf-8")
+    with pytest.raises(ParameterError, match="nested too deeply"):
         read(path)
 
 
@@ -178,16 +166,9 @@ def many_nodes(tree: dict[str, Any]) -> None:
 )  # fmt: skip
 def test_a_gltf_that_makes_no_sense_is_refused(tmp_path, change, said):
     began = time.monotonic()
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError, match=re.escape(said)):
         read(gltf(tmp_path, change))
-    assert said in str(caught.value)
     assert time.monotonic() - began < 2.0
-
-
-def test_a_gltf_nested_without_end_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "deep.gltf").write_text("[" * 100_000, encoding="utf-8")
-    with pytest.raises(ParameterError, match="nested too deeply"):
-        read(tmp_path / "deep.gltf")
 
 
 PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
@@ -218,19 +199,8 @@ def placement(*rows: tuple[float, float, float]) -> lib3mf.Transform:
     """Return a placement of lib3mf's."""
     made = lib3mf.Transform()
     for index, row in enumerate(rows):
-        for column, value in enumerate(row):
-            made.Fields[index][column] = value
+        made.Fields[index][:] = row
     return made
-
-
-@pytest.mark.parametrize("unit", ["mm", "m"])
-def test_the_3mf_that_is_written_is_read_back(tmp_path: Path, unit: str) -> None:
-    body = Body("tetrahedron", PLACES * 1e-3, FACES.astype(np.int32), closed=True)
-    mesh_writer.write([body], tmp_path / "own.3mf", unit)
-    back = read(tmp_path / "own.3mf")
-    assert back.length == {"mm": 1e-3, "m": 1.0}[unit]
-    np.testing.assert_allclose(back.vertices * back.length, PLACES * 1e-3, rtol=0.0, atol=1e-9)
-    np.testing.assert_array_equal(back.faces, FACES)
 
 
 def test_components_and_items_stand_where_lib3mf_puts_them(tmp_path: Path) -> None:
@@ -285,14 +255,10 @@ def test_a_part_that_another_one_names_is_read(tmp_path: Path) -> None:
 
 
 def test_supports_and_objects_that_are_not_built_are_left_away(tmp_path: Path) -> None:
-    resources = "".join(
-        f'<object id="{number}" type="{kind}">{MESH}</object>'
-        for number, kind in enumerate(("model", "support", "solidsupport", "model"), 1)
-    )
-    path = packed(
-        tmp_path / "some.3mf", resources, '<item objectid="1"/><item objectid="2"/><item objectid="3"/>'
-    )
-    assert len(read(path).faces) == 4
+    kinds = enumerate(("model", "support", "solidsupport", "model"), 1)
+    resources = "".join(f'<object id="{number}" type="{kind}">{MESH}</object>' for number, kind in kinds)
+    build = "".join(f'<item objectid="{number}"/>' for number in (1, 2, 3))
+    assert len(read(packed(tmp_path / "some.3mf", resources, build)).faces) == 4
 
 
 def nested(levels: int, copies: int = 1) -> str:
@@ -307,6 +273,7 @@ def nested(levels: int, copies: int = 1) -> str:
 LAUGHS = "".join(f'<!ENTITY {name} "{10 * f"&{other};"}">' for other, name in pairwise("abcdefghij"))
 ENTITIES = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{LAUGHS}]>'
 OBJECT = f'<object id="1">{MESH}</object>'
+OWN = '<components><component objectid="1"/></components>'
 ITEM = '<item objectid="1"/>'
 
 
@@ -319,10 +286,7 @@ ITEM = '<item objectid="1"/>'
         (nested(2000), '<item objectid="2000"/>', "", "components at most 64 deep"),
         # The same chain, whose lower half is measured before its upper one.
         (nested(100), '<item objectid="50"/><item objectid="100"/>', "", "components at most 64 deep"),
-        (
-            '<object id="1"><components><component objectid="1"/></components></object>',
-            ITEM, "", "components at most 64 deep, and none in itself",
-        ),
+        (OBJECT.replace(MESH, OWN), ITEM, "", "components at most 64 deep, and none in itself"),
         (OBJECT, '<item objectid="2"/>', "", "no object 2 in 3D/3dmodel.model"),
         (OBJECT.replace('v3="3"', 'v3="4"'), ITEM, "", "corners are among its vertices (got x.3mf: corner 4"),
         (OBJECT.replace('v3="3"', 'v3="-1"'), ITEM, "", "corners are among its vertices"),
@@ -331,17 +295,12 @@ ITEM = '<item objectid="1"/>'
         (OBJECT.replace('v3="3"', 'v3="1' + 30 * "0" + '"'), ITEM, "", "3MF file that can be read"),
         (OBJECT, '<item objectid="1" transform="1 0 0"/>', "", "a transform of 3 numbers"),
         (OBJECT[:-9], ITEM, "", "mismatched tag"),
-        (
-            '<object id="1"><components><component objectid="1" p:path="/3D/no.model"/></components>'
-            "</object>",
-            ITEM, "", "no item named '3D/no.model'",
-        ),
+        (OBJECT.replace(MESH, OWN.replace("/>", ' p:path="/3D/no.model"/>')), ITEM, "", "named '3D/no.mod"),
     ],
 )  # fmt: skip
 def test_what_would_break_a_reader_is_refused(tmp_path, resources, build, head, said):
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError, match=re.escape(said)) as caught:
         read(packed(tmp_path / "x.3mf", resources, build, head))
-    assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -352,11 +311,7 @@ def test_a_zip_that_unpacks_to_more_than_is_allowed_is_not_unpacked(tmp_path, mo
     monkeypatch.setattr(mesh_limits, "MOST_BYTES", 2_000_000)
     with pytest.raises(ParameterError, match=r"at most 0.002 GB unpacked .got bomb.3mf: 3D/3dmodel"):
         read(path)
-
-
-def test_a_zip_gives_no_more_than_its_directory_says(tmp_path: Path) -> None:
     # The limit is checked against the directory; a directory that lies must not get past it.
-    path = packed(tmp_path / "liar.3mf", OBJECT + 3_000_000 * " ", ITEM)
     with zipfile.ZipFile(path) as archive:
         size = archive.getinfo("3D/3dmodel.model").file_size
     path.write_bytes(path.read_bytes().replace(size.to_bytes(4, "little"), (2000).to_bytes(4, "little")))
@@ -372,20 +327,19 @@ def test_a_tag_of_many_megabytes_is_not_kept_waiting_for(tmp_path: Path, filler:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("old", "new", "said"),
     [
-        (lambda data: data[: len(data) // 2], "not a zip"),
-        (lambda data: b"", "not a zip"),
-        (lambda data: data.replace(b"3dmodel.model", b"3dmodel.other"), "3MF file that can be read"),
-        (lambda data: data.replace(b"_rels/.rels", b"_rels/.rals"), "no item named '_rels/.rels'"),
+        (r"(?s)(.{300}).*", rb"\1", "not a zip"),
+        ("(?s).*", b"", "not a zip"),
+        ("3dmodel.model", b"3dmodel.other", "3MF file that can be read"),
+        ("_rels/.rels", b"_rels/.rals", "no item named '_rels/.rels'"),
     ],
 )
-def test_a_damaged_zip_is_refused(tmp_path: Path, spoil: Callable[[bytes], bytes], said: str) -> None:
+def test_a_damaged_zip_is_refused(tmp_path: Path, old: str, new: bytes, said: str) -> None:
     path = packed(tmp_path / "x.3mf", OBJECT, ITEM)
-    path.write_bytes(spoil(path.read_bytes()))
-    with pytest.raises(ParameterError) as caught:
+    path.write_bytes(re.sub(old.encode(), new, path.read_bytes()))
+    with pytest.raises(ParameterError, match=said):
         read(path)
-    assert said in str(caught.value)
 
 
 def test_more_parts_than_allowed_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
