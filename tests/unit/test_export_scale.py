@@ -22,11 +22,6 @@ def test_a_solid_takes_no_more_memory_than_its_own_arrays_and_a_few_megabytes(fi
     assert found.peak <= bytes_a_pin * side * side / 1e6 + pieces
 
 
-def test_memory_grows_no_faster_than_the_bed():
-    small, large = (measured(side, "solid", "stl") for side in (200, 400))
-    assert large.peak < 4.4 * small.peak
-
-
 def test_the_benchmarks_bed_has_bosses_and_creases_to_be_found():
     from digiclay.core.surface.features import Finding
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import os
 import struct
 from pathlib import Path
@@ -92,9 +93,8 @@ def test_an_obj_of_many_blocks_is_read_as_one(tmp_path: Path, monkeypatch: pytes
     ],
 )
 def test_an_obj_that_makes_no_sense_is_refused(tmp_path: Path, text: str, said: str) -> None:
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError, match=re.escape(said)):
         read(obj(tmp_path, text))
-    assert said in str(caught.value)
 
 
 def test_the_materials_of_an_obj_are_not_opened(tmp_path: Path) -> None:
@@ -165,9 +165,8 @@ def test_a_byte_order_mark_changes_nothing(tmp_path: Path, kind: str) -> None:
 )  # fmt: skip
 def test_a_head_that_promises_more_than_there_is_is_refused(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError, match=re.escape(said)):
         read(tmp_path / name)
-    assert said in str(caught.value)
 
 
 def test_a_file_beyond_all_sizes_is_not_read(tmp_path: Path) -> None:
