@@ -25,9 +25,7 @@ def formed(
     return Formed.of(place, height, LEVEL, 0.0, 0)
 
 
-def features(
-    bed: Formed, finding: Finding | None = None, skin: str = "bilinear", parts: int = 1
-) -> list[Feature]:
+def features(bed, finding: Finding | None = None, skin: str = "bilinear", parts: int = 1) -> list[Feature]:
     return find(fit_skin(bed, skin, parts, 1e-3), finding)
 
 
@@ -40,16 +38,10 @@ def ridge(x, y, half: float = 12.0, height: float = 6.0, angle: float = 0.0):
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_level_bed_has_no_features(arrangement):
-    assert features(formed(lambda x, y: 0.0 * x, arrangement)) == []
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_dome_is_one_boss_with_the_area_and_volume_of_the_cap(arrangement):
     # A paraboloid 8 mm high and 12 mm in radius, of which the part above 0.5 mm counts.
-    (dome,) = features(
-        formed(lambda x, y: np.clip(8.0 * (1.0 - (x * x + y * y) / 144.0), 0.0, None), arrangement)
-    )
+    cap = lambda x, y: np.clip(8.0 * (1.0 - (x * x + y * y) / 144.0), 0.0, None)  # noqa: E731
+    (dome,) = features(formed(cap, arrangement))
     cut = 144.0 * (1.0 - 0.5 / 8.0)
     assert (dome.kind, dome.name) == ("boss", "boss_1")
     # Pins 1 mm apart see a curve of 12 mm radius as chords: 1 % is a few times their sagitta.
@@ -60,16 +52,14 @@ def test_a_dome_is_one_boss_with_the_area_and_volume_of_the_cap(arrangement):
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("angle", [0, 20, 45, 90, 130])
+@pytest.mark.parametrize("angle", [0, 20, 45, 130])
 def test_a_ridge_has_a_crest_as_long_as_its_spine(arrangement, angle):
     (boss,) = features(formed(lambda x, y: ridge(x, y, angle=np.radians(angle)), arrangement))
     assert len(boss.crests) == 1
     # Its ends may be off by two pins in all, of 24 mm, and an oblique line of pins is up to 3 % too long.
     assert boss.crest_length * 1e3 == pytest.approx(24.0, abs=2.7)
-    away = np.abs(
-        boss.crests[0][:, 1] * np.cos(np.radians(angle)) - boss.crests[0][:, 0] * np.sin(np.radians(angle))
-    )
-    assert away.max() <= 1e-3  # a pitch off the spine at most
+    away = boss.crests[0][:, :2] @ (-np.sin(np.radians(angle)), np.cos(np.radians(angle)))
+    assert np.abs(away).max() <= 1e-3  # a pitch off the spine at most
 
 
 def test_a_flat_topped_ridge_has_its_crest_in_the_middle():
@@ -88,23 +78,23 @@ def test_a_slope_along_the_crest_counts_in_its_length():
     assert abs(span[2]) > 0.4 * abs(span[0])
 
 
-def test_a_crease_is_measured_as_the_boss_it_mirrors():
-    (up,) = features(formed(lambda x, y: ridge(x, y)))
-    (down,) = features(formed(lambda x, y: -ridge(x, y)))
+def test_a_crease_is_measured_as_the_boss_it_mirrors_and_listed_in_millimeters():
+    (up,), (down,) = (features(formed(lambda x, y, way=way: way * ridge(x, y))) for way in (1.0, -1.0))
     assert (up.kind, down.kind, down.name) == ("boss", "crease", "crease_1")
-    assert down.volume == pytest.approx(up.volume, rel=1e-9)
-    assert down.extreme == pytest.approx(up.extreme, rel=1e-9)
-    assert down.crest_length == pytest.approx(up.crest_length, rel=1e-9)
+    figures = ("volume", "extreme", "crest_length")
+    assert [getattr(down, name) for name in figures] == pytest.approx([getattr(up, name) for name in figures])
+    head, row = make_table([up])
+    assert head == ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    assert (*row[:2], row[4]) == ("boss_1", "ridge", "6.00")
 
 
 def test_features_are_numbered_by_volume_bosses_first():
-    def three(x, y):
-        return ridge(x, y - 12.0, height=3.0) + ridge(x, y) - ridge(x, y + 12.0)
-
+    three = lambda x, y: ridge(x, y - 12.0, height=3.0) + ridge(x, y) - ridge(x, y + 12.0)  # noqa: E731
     found = features(formed(three))
     assert [one.name for one in found] == ["boss_1", "boss_2", "crease_1"]
     assert found[0].volume > found[1].volume
     assert summarize(found) == "2 bosses and 1 crease"
+    assert features(formed(lambda x, y: 0.0 * x)) == []
 
 
 def test_features_are_measured_from_the_surface_as_it_was():
@@ -117,43 +107,37 @@ def test_features_are_measured_from_the_surface_as_it_was():
     np.testing.assert_array_equal(other.pins, one.pins)
 
 
-@pytest.mark.parametrize(("smallest", "count"), [(1, 2), (2, 1), (6, 1), (9, 1), (10, 0)])
+@pytest.mark.parametrize(("smallest", "count"), [(1, 2), (2, 1), (9, 1), (10, 0)])
 def test_a_feature_of_too_few_pins_is_none(smallest, count):
     def bumps(x, y):
-        return 2.0 * ((np.abs(x) < 1.5) & (np.abs(y) < 1.5)) + 2.0 * (
-            (np.abs(x - 9) < 0.5) & (np.abs(y) < 0.5)
-        )
+        return 2.0 * ((np.maximum(np.abs(x), np.abs(y)) < 1.5) | (np.hypot(x - 9, y) < 0.5))
 
     assert len(features(formed(bumps), Finding(smallest=smallest))) == count
 
 
-def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature():
+def of_25(height) -> Feature:
+    """The only feature above 0.5 of a bed of 5 x 5 pins."""
     place = make_grid(Layout(rows=5, columns=5)).positions
-    height = np.full(25, 0.0)
+    (boss,) = features(Formed.of(place, height, 0.0, 0.0, 0), Finding(threshold=0.5, smallest=1))
+    return boss
+
+
+def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature():
+    height = np.zeros(25)
     height[[11, 12]] = 0.5, 1.0
-    bed = Formed.of(place, height, 0.0, 0.0, 0)
-    (boss,) = features(bed, Finding(threshold=0.5, smallest=1))
-    np.testing.assert_array_equal(boss.pins, [12])
+    np.testing.assert_array_equal(of_25(height).pins, [12])
 
 
 def test_neighbors_exactly_at_the_threshold_leave_no_triangle_without_area():
-    place = make_grid(Layout(rows=5, columns=5)).positions
     height = np.zeros(25)
     height[[6, 7, 8, 9, 11, 14, 16, 17, 18, 19]] = 0.5
     height[[12, 13]] = 2.0
-    (boss,) = features(Formed.of(place, height, 0.0, 0.0, 0), Finding(threshold=0.5, smallest=1))
+    boss = of_25(height)
     a, b, c = np.moveaxis(boss.region.position[boss.region.faces], 1, 0)
     area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     # Beside a corner of the contour stands a triangle of a thousandth of a pitch, and not of rounding.
     assert area.min() > 1e-4 * 0.5 * 9e-6
     assert len(np.unique(boss.region.position, axis=0)) == len(boss.region.position)
-
-
-def test_the_table_is_in_millimeters():
-    head, row = make_table(features(formed(lambda x, y: ridge(x, y))))
-    assert head == ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
-    assert row[:2] == ("boss_1", "ridge")
-    assert row[4] == "6.00"
 
 
 @pytest.mark.parametrize(

@@ -38,32 +38,24 @@ def listed(capsys: pytest.CaptureFixture[str], *options: str) -> list[dict]:
     return json.loads(capsys.readouterr().out)
 
 
-def test_features_are_listed_in_a_table(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_features_are_listed_in_a_table_and_none_at_the_start(run, capsys):
     assert main(["features", "run"]) == 0
     counted, head, _, row = capsys.readouterr().out.splitlines()
     assert counted == "0 bosses and 1 crease"
-    assert head.split()[:3] == ["feature", "form", "pins"]
-    assert row.split()[0] == "crease_1"
+    assert (head.split()[:3], row.split()[0]) == (["feature", "form", "pins"], "crease_1")
+    assert main(["features", "run", "--time", "0"]) == 0
+    assert capsys.readouterr().out == "0 bosses and 0 creases\n"
 
 
-def test_json_is_in_si_units_with_pins_and_crests(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (found,) = listed(capsys)
+def test_json_is_in_si_units_from_any_former_surface(run, capsys):
+    (found,), (rest,) = listed(capsys), listed(capsys, "--former", "0.1")
     with np.load(run / "history.npz") as history:
         deepest = float((history["height"][0] - history["height"][-1]).max())
     assert found["kind"] == "crease"
     assert found["depth"] == pytest.approx(deepest, rel=1e-12)
     assert 40 in found["pins"]  # the middle of 9 x 9
-
-
-def test_nothing_is_formed_at_the_start(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["features", "run", "--time", "0"]) == 0
-    assert capsys.readouterr().out == "0 bosses and 0 creases\n"
-
-
-def test_features_can_be_measured_from_a_later_surface(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (whole,), (rest,) = listed(capsys), listed(capsys, "--former", "0.1")
-    assert rest["depth"] < whole["depth"]
-    assert listed(capsys, "--former", "rest")[0]["depth"] == pytest.approx(whole["depth"], rel=1e-9)
+    assert rest["depth"] < found["depth"]
+    assert listed(capsys, "--former", "rest")[0]["depth"] == pytest.approx(deepest, rel=1e-9)
 
 
 def test_a_threshold_is_in_millimeters_or_with_a_unit(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,11 +90,10 @@ def test_a_skin_and_its_resolution_can_be_chosen(run: Path) -> None:
 
 
 @pytest.mark.parametrize("said", ["0.8", "0.8 mm", "0.8mm", "800um"])
-def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run, capsys):
+def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said: str, run: Path) -> None:
     assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--up", "z", "--quiet"]) == 0
-    heights = [
-        float(line.split()[3]) for line in (run / "surface.obj").read_text().splitlines() if line[:2] == "v "
-    ]
+    lines = (run / "surface.obj").read_text().splitlines()
+    heights = [float(line.split()[3]) for line in lines if line.startswith("v ")]
     with np.load(run / "history.npz") as history:
         lowest = float(history["height"][-1].min()) * 1e3
     assert min(heights) == pytest.approx(lowest - 0.8, abs=1e-5)  # digits of the file

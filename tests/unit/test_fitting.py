@@ -44,13 +44,6 @@ def table(cells: Fitted) -> np.ndarray:
     return np.round((cells.heights.reshape(13, 25) - REST) * 1e3, 9)
 
 
-def test_contained_a_shape_keeps_its_proportions_within_the_bed() -> None:
-    # 39 mm are the shorter side; a square box takes 13 x 13 cells.
-    raised = table(laid(box(10, 10, 5))) > 0
-    assert raised[:, 6:19].all()
-    assert raised.sum() == 13 * 13
-
-
 def test_stretched_a_shape_fills_the_bed_to_its_corners_and_no_more() -> None:
     values = np.random.default_rng(3).uniform(0.0, 1.0, (13, 25))
     cells = laid(make_height_map("x.png", values), fit="stretch")
@@ -58,33 +51,33 @@ def test_stretched_a_shape_fills_the_bed_to_its_corners_and_no_more() -> None:
     assert np.abs(shown * np.ptp(values) + values.min() - values.ravel()).max() < 1e-10
 
 
-def test_in_its_own_size_a_shape_is_as_large_as_its_file_says() -> None:
-    raised = table(laid(box(30.5, 12.5, 5), fit="actual")) > 0
-    # Pins 3 mm apart within +- 15.25 mm and +- 6.25 mm.
-    assert raised.sum() == 11 * 5
+@pytest.mark.parametrize(
+    ("size", "known", "rows", "columns"),
+    [
+        # 39 mm are the shorter side; a square box takes 13 x 13 cells.
+        pytest.param((10, 10, 5), {}, range(13), range(6, 19), id="contained it keeps its proportions"),
+        # Pins 3 mm apart within +- 15.25 mm and +- 6.25 mm.
+        pytest.param((30.5, 12.5, 5), {"fit": "actual"}, range(4, 9), range(7, 18), id="in its own size"),
+        # 5 mm wide about (9, -6) mm: one pin, and none of its neighbors 3 mm away.
+        pytest.param(
+            (10, 10, 5), {"fit": "actual", "scale": 0.5, "x": 9e-3, "y": -6e-3}, [4], [15], id="scaled, moved"
+        ),
+    ],
+)
+def test_a_fit_says_where_the_shape_lies_in_plan(size, known, rows, columns):
+    raised = table(laid(box(*size), **known)) > 0
+    assert np.argwhere(raised).tolist() == [[row, column] for row in rows for column in columns]
 
 
-def test_scale_and_shift_move_the_plan() -> None:
-    raised = table(laid(box(10, 10, 5), fit="actual", scale=0.5, x=9e-3, y=-6e-3)) > 0
-    row, column = np.nonzero(raised)
-    # 5 mm wide about (9, -6) mm: one pin, and none of its neighbors 3 mm away.
-    assert (row.tolist(), column.tolist()) == ([4], [15])
-
-
-@pytest.mark.parametrize("rise", [15e-3, 4e-3, -12e-3])
-def test_the_relief_goes_from_the_foot_over_the_rise(rise: float) -> None:
-    cells = laid(mesh(trimesh.creation.icosphere(radius=10.0)), rise=rise, foot=2e-3)
-    ends = sorted((REST + 2e-3, REST + 2e-3 + rise))
-    assert cells.heights.min() == pytest.approx(ends[0], abs=ROUNDING)
-    assert cells.heights.max() == pytest.approx(ends[1], abs=ROUNDING)
+@pytest.mark.parametrize(
+    ("known", "low", "high"),
+    [({"rise": 15e-3, "foot": 2e-3}, 42e-3, 57e-3), ({"rise": 4e-3, "foot": 2e-3}, 42e-3, 46e-3),
+     ({"rise": -12e-3, "foot": 2e-3}, 30e-3, 42e-3), ({"relief": "stroke"}, REST, STROKE)],
+)  # fmt: skip
+def test_the_relief_goes_from_the_foot_over_the_rise_or_to_the_strokes_end(known, low, high):
+    cells = laid(mesh(trimesh.creation.icosphere(radius=10.0)), **known)
+    assert (cells.heights.min(), cells.heights.max()) == pytest.approx((low, high), abs=ROUNDING)
     assert cells.too_low + cells.too_high == 0
-
-
-def test_scaled_to_the_stroke_the_highest_pin_is_at_its_end() -> None:
-    cells = laid(box(10, 10, 5), relief="stroke")
-    assert cells.heights.max() == pytest.approx(STROKE, abs=ROUNDING)
-    assert cells.heights.min() == REST
-    assert cells.too_high == 0
 
 
 @pytest.mark.parametrize(
@@ -107,7 +100,7 @@ def test_placed_a_shape_stands_where_its_coordinates_say() -> None:
     assert (row.min(), row.max(), column.min(), column.max()) == (2, 6, 13, 17)
 
 
-def test_what_leaves_the_stroke_is_clipped_and_counted() -> None:
+def test_what_leaves_the_stroke_is_clipped_and_counted_and_overhangs_are_told() -> None:
     row = np.linspace(0.0, 1.0, 25)
     cells = laid(make_height_map("ramp.png", np.tile(row, (13, 1))), fit="stretch", foot=-50e-3, rise=120e-3)
     wanted = REST - 50e-3 + 120e-3 * row
@@ -120,9 +113,6 @@ def test_what_leaves_the_stroke_is_clipped_and_counted() -> None:
         f"{cells.too_low + cells.too_high} cells clipped ({cells.too_low} at the floor, "
         f"{cells.too_high} at the stroke's end)"
     )
-
-
-def test_overhangs_are_told() -> None:
     ring = trimesh.creation.torus(10.0, 3.0)
     ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
     cells = laid(mesh(ring))
@@ -170,14 +160,10 @@ def test_what_cannot_be_laid_onto_the_bed_is_refused(what: Any, known: dict[str,
 # Heights as a text
 
 
-def test_heights_come_out_of_a_text_as_they_went_in() -> None:
-    heights = np.random.default_rng(4).uniform(0.0, STROKE, BED.count)
+def test_heights_in_a_scene_come_out_as_they_went_in_and_are_displayed_as_they_are() -> None:
+    heights = np.linspace(-1e-3, 0.11, BED.count)
     # 32 bits: half of 2^-24 of 0.1 m at most.
     assert np.abs(unpack(pack(heights), BED) - heights).max() <= 4e-9
-
-
-def test_heights_in_a_scene_are_displayed_as_they_are() -> None:
-    heights = np.linspace(-1e-3, 0.11, BED.count)
     cells = fit_given(Shape(file="Suzanne", heights=pack(heights)), BED, Actuator())
     assert np.abs(cells.heights - np.clip(heights, 0.0, STROKE)).max() <= 4e-9
     assert cells.too_low == np.count_nonzero(heights < -1e-9) > 0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import re
 import importlib.util
+import io
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -57,23 +58,17 @@ def test_every_sample_shape_has_a_note_of_its_origin() -> None:
 
 
 @pytest.mark.parametrize("name", list_shapes())
-def test_every_sample_shape_fits_a_bed_without_clipping(name: str) -> None:
+def test_every_sample_shape_fits_a_bed_without_clipping_and_every_mesh_is_closed(name: str) -> None:
     laid = fit_shape(Shape(file=name), make_grid(Layout()), Actuator())
     assert np.ptp(laid.heights) == pytest.approx(15e-3, abs=1e-12)
     assert laid.too_low + laid.too_high == 0
     assert (laid.overhanging > 0) == (name == "knot")
-
-
-@pytest.mark.parametrize(
-    "name", [n for n in list_shapes() if find_shape(n).suffix in (".stl", ".obj", ".ply")]
-)
-def test_every_sample_mesh_is_closed_and_turned_outwards(name: str) -> None:
-    mesh = trimesh.load_mesh(find_shape(name))
-    assert mesh.is_watertight
-    assert mesh.volume > 0.0
     shape = read(Shape(file=name))
-    assert isinstance(shape, ShapeMesh)
-    assert shape.closed
+    if isinstance(shape, ShapeMesh):
+        mesh = trimesh.load_mesh(find_shape(name))
+        assert mesh.is_watertight
+        assert mesh.volume > 0.0  # turned outwards
+        assert shape.closed
 
 
 # Files
@@ -98,10 +93,8 @@ def test_a_mesh_is_the_same_shape_in_every_format(tmp_path: Path, kind: str) -> 
     assert np.abs(heights(path) - heights(tmp_path / "plain.stl")).max() < 1e-7
 
 
-def test_an_array_is_taken_with_its_first_row_at_the_lowest_y(tmp_path: Path) -> None:
-    np.save(tmp_path / "steps.npy", np.repeat(np.arange(13.0), 13).reshape(13, 13))
-    rows = heights(tmp_path / "steps.npy").reshape(13, 13)
-    assert np.all(np.diff(rows[:, 0]) > 0.0)
+OBJECTS = io.BytesIO()
+np.save(OBJECTS, np.array([{}, {}], dtype=object), allow_pickle=True)
 
 
 @pytest.mark.parametrize(
@@ -118,6 +111,7 @@ def test_an_array_is_taken_with_its_first_row_at_the_lowest_y(tmp_path: Path) ->
         ("notes.txt", b"hello", "must be a mesh, a picture or an array"),
         ("empty.npy", b"", "must hold one array of numbers"),
         ("rubbish.npy", b"rubbish", "must hold one array of numbers"),
+        ("objects.npy", OBJECTS.getvalue(), "must hold one array of numbers"),  # not unpickled
         ("empty.png", b"", "must be a picture that can be read"),
         ("rubbish.png", b"rubbish", "must be a picture that can be read"),
     ],
@@ -127,28 +121,16 @@ def test_a_file_that_holds_no_shape_is_refused_by_name(tmp_path, name, content, 
     path.write_bytes(content)
     with pytest.raises(DigiclayError) as caught:
         heights(path)
-    assert said in str(caught.value)
-    assert str(path) in str(caught.value) or path.name in str(caught.value)
+    assert (said in str(caught.value), path.name in str(caught.value)) == (True, True)
     assert "\n" not in str(caught.value)
-
-
-def test_an_array_of_objects_is_not_unpickled(tmp_path: Path) -> None:
-    np.save(tmp_path / "objects.npy", np.array([{}, {}], dtype=object), allow_pickle=True)
-    with pytest.raises(DigiclayError, match="must hold one array of numbers"):
-        heights(tmp_path / "objects.npy")
 
 
 @pytest.mark.parametrize(
     ("word", "said"),
-    [
-        ("craters", "Did you mean crater?"),
-        ("nowhere.stl", "nowhere.stl: there is no such file."),
-        ("no/where", "no/where: there is no such file."),
-        ("a\0b", "neither a file nor a sample shape"),
-        (300 * "a", "neither a file nor a sample shape"),
-        (".", ".: there is no such file."),
-    ],
-)
+    [("craters", "Did you mean crater?"), ("no/where.stl", "no/where.stl: there is no such file."),
+     (".", ".: there is no such file."), ("a\0b", "neither a file nor a sample shape"),
+     (300 * "a", "neither a file nor a sample shape")],
+)  # fmt: skip
 def test_a_shape_that_is_not_there_is_told(word: str, said: str) -> None:
     with pytest.raises(DigiclayError, match=re.escape(said)):
         find_shape(word)
@@ -157,13 +139,14 @@ def test_a_shape_that_is_not_there_is_told(word: str, said: str) -> None:
 # Scene files
 
 
-def test_a_scene_finds_its_shape_beside_itself(tmp_path: Path) -> None:
+def test_a_scene_finds_its_shape_beside_itself_whose_first_row_is_at_the_lowest_y(tmp_path: Path) -> None:
     (tmp_path / "Formen").mkdir()
-    np.save(tmp_path / "Formen" / "größe 1.npy", np.eye(5))
+    np.save(tmp_path / "Formen" / "größe 1.npy", np.repeat(np.arange(13.0), 13).reshape(13, 13))
     (tmp_path / "my.toml").write_text('[shape]\nfile = "Formen/größe 1.npy"\n', encoding="utf-8")
     scene = load(tmp_path / "my.toml")
     assert scene.shape
     assert Path(scene.shape.file) == (tmp_path / "Formen" / "größe 1.npy").resolve()
+    assert np.all(np.diff(heights(scene.shape.file).reshape(13, 13), axis=0) > 0.0)
 
 
 @pytest.mark.parametrize(
