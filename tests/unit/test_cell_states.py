@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from digiclay.core.control.cell_states import (
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.control_interface import Commands, Measurement
-from digiclay.core.model.layout import Grid, Layout, make_grid
+from digiclay.core.model.layout import Layout, make_grid
 
 REST = 40e-3
 BLISTER = Blister(radius=12e-3, edge_radius=15.5e-3, flat_radius=3e-3)
@@ -29,19 +30,14 @@ BED = make_grid(Layout(rows=13, columns=13))
 MIDDLE = 6 * 13 + 6
 
 
-def seen(
-    force: dict[int, float] | None = None, mode: dict[int, Mode] | None = None, bed: Grid = BED
-) -> Measurement:
+def seen(forces: dict[int, float] | None = None, modes: dict[int, Mode] | None = None) -> Measurement:
     """Measure a bed at rest on which some cells are pressed, or in some mode."""
-    forces, modes = np.zeros(bed.count), np.full(bed.count, Mode.REST, np.int8)
-    for cell, value in (force or {}).items():
-        forces[cell] = value
-    for cell, value in (mode or {}).items():
-        modes[cell] = value
-    level = np.full(bed.count, REST)
-    cells = np.arange(bed.count)
+    force, mode = np.zeros(BED.count), np.full(BED.count, Mode.REST, np.int8)
+    for row, values in ((force, forces), (mode, modes)):
+        row[list(values or ())] = list((values or {}).values())
+    level, cells = np.full(BED.count, REST), np.arange(BED.count)
     return Measurement(
-        bed.compute_basis(cells), level, forces, level.copy(), modes, np.zeros((1, bed.count)), cells
+        BED.compute_basis(cells), level, force, level.copy(), mode, np.zeros((1, BED.count)), cells
     )
 
 
@@ -105,11 +101,12 @@ def test_only_critical_cells_count_their_periods() -> None:
     assert (measured.own[0, MIDDLE], set(np.delete(measured.own[0], MIDDLE))) == (2.0, {0.0})
 
 
-def test_giving_up_the_last_cell_counts_as_a_loss() -> None:
+def test_giving_up_the_last_cell_and_a_jump_farther_than_r_vm_count_as_losses() -> None:
     measured = seen({}, {MIDDLE: Mode.CRITICAL})
     measured.own[0] = 100.0
     memory, _ = CONTROL.command(Patch(felt=True), measured)
     assert (memory.losses, memory.felt) == (1, False)
+    assert CONTROL.locate(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))[0].losses == 1
 
 
 def test_without_any_following_cell_no_cell_is_left_in_a_blister() -> None:
@@ -164,11 +161,6 @@ def test_only_cells_beyond_the_flat_top_freeze_behind_the_finger(flat: float, mo
     assert orders.mode[MIDDLE - 1] == mode
 
 
-def test_a_finger_that_jumps_farther_than_r_vm_is_counted_as_lost() -> None:
-    memory, _ = CONTROL.locate(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))
-    assert memory.losses == 1
-
-
 @pytest.mark.parametrize("floor", [0.0, 25e-3])
 def test_the_controlled_disc_reaches_the_edge_of_the_outermost_pressed_cell(floor: float) -> None:
     # One that follows without a force is no part of the patch, with noise neither.
@@ -178,36 +170,24 @@ def test_the_controlled_disc_reaches_the_edge_of_the_outermost_pressed_cell(floo
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (
-            {"blister_trigger": 0.07},
-            "CellStates.blister_trigger must be below spring_trigger, 0.06 N (got 0.07 N).",
-        ),
-        (
-            {"critical_trigger": 0.02},
-            "CellStates.critical_trigger must be below blister_trigger, 0.015 N (got 0.02 N).",
-        ),
-    ],
-)
-def test_thresholds_in_the_wrong_order_are_refused(given: dict[str, float], said: str) -> None:
-    with pytest.raises(ParameterError) as caught:
-        CellStates(**given)
-    assert str(caught.value) == said
+    ("name", "value", "said"),
+    [("blister_trigger", 0.07, "below spring_trigger, 0.06 N (got 0.07 N)."),
+     ("critical_trigger", 0.02, "below blister_trigger, 0.015 N (got 0.02 N).")],
+)  # fmt: skip
+def test_thresholds_in_the_wrong_order_are_refused(name: str, value: float, said: str) -> None:
+    with pytest.raises(ParameterError, match=re.escape(f"CellStates.{name} must be {said}")):
+        CellStates(**{name: value})
 
 
 #: With sensors whose noise hides forces below 25 mN.
 NOISY = replace(CONTROL, floor=25e-3)
 
 
-def test_a_force_that_may_be_noise_makes_no_blister_cell_follow() -> None:
+def test_a_force_that_may_be_noise_makes_no_blister_cell_follow_and_moves_no_spring() -> None:
     measured = seen({MIDDLE: 0.1, MIDDLE + 2: 24e-3, MIDDLE - 2: 26e-3}, {MIDDLE + 2: Mode.BLISTER})
     measured.mode[[MIDDLE, MIDDLE - 2]] = Mode.FORCE_FOLLOW, Mode.BLISTER
     mode = NOISY.command(NOISY.begin(), measured)[1].mode
     assert [mode[MIDDLE + 2], mode[MIDDLE - 2]] == [Mode.BLISTER, Mode.FORCE_FOLLOW]
-
-
-def test_a_force_that_may_be_noise_moves_no_spring() -> None:
     assert NOISY.command(NOISY.begin(), seen({MIDDLE: 24e-3}))[1].command[MIDDLE] == 0.0
 
 
@@ -269,7 +249,6 @@ def test_no_cell_moves_along_an_arrow_the_figure_lacks(condition: str | None) ->
 
 
 def test_of_two_arrows_from_one_mode_the_later_wins() -> None:
-    holds = {
-        name: np.array([name in ("below_critical_trigger", "above_critical_trigger")]) for name in CONDITIONS
-    }
+    both = ("below_critical_trigger", "above_critical_trigger")
+    holds = {name: np.array([name in both]) for name in CONDITIONS}
     assert follow_arrows(np.array([Mode.CRITICAL], np.int8), BY_FORCE, holds)[0] == Mode.FORCE_FOLLOW

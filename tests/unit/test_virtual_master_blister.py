@@ -106,6 +106,13 @@ def test_cells_exactly_on_the_rim_belong_to_the_blister_on_every_side(place: tup
     assert created(master(), bed())[1].mode[at(*place)] == Mode.BLISTER
 
 
+def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_side() -> None:
+    modes = [
+        created(master(x, y), ridge())[1].mode[at(-6 * x, -6 * y)] for x, y in (EAST, WEST, (0, 1), (0, -1))
+    ]
+    assert len(set(modes)) == 1
+
+
 def test_at_rest_the_edge_height_is_the_mean_of_the_whole_ring() -> None:
     seen = bed()
     seen.height[BED.x > 0] += 2e-3
@@ -153,12 +160,6 @@ def test_cells_freeze_behind_a_traveling_fingertip(toward, before, place, force,
     _, orders = created(master(*toward), seen)
     assert orders.mode[at(*place)] == after
     assert (orders.target[at(*place)] == 44e-3) == (after in (Mode.FROZEN, Mode.HOLD))
-
-
-def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_side() -> None:
-    ways = [(1, 0), (-1, 0), (0, 1), (0, -1)]
-    modes = [created(master(x, y), ridge())[1].mode[at(-6 * x, -6 * y)] for x, y in ways]
-    assert len(set(modes)) == 1
 
 
 @pytest.mark.parametrize(
@@ -225,7 +226,4 @@ def test_a_blister_partly_off_the_bed_rises_as_well(x: float, y: float, row: int
     heights = formed(x, y)
     assert heights[row, column] > 43e-3
     assert heights.min() > 39.9e-3
-
-
-def test_a_finger_off_the_bed_changes_nothing() -> None:
-    assert np.all(formed(40.0, 0.0) == 40e-3)
+    assert np.all(formed(40.0, 0.0) == 40e-3)  # off the bed it changes nothing
