@@ -28,17 +28,11 @@ def features(history: dict[str, Any], time: float, former: float) -> list[Featur
     return find(fit_skin(make_formed(history, row, before), "bilinear", 1, 1e-3))
 
 
-def test_at_the_end_there_are_a_ridge_a_mound_and_a_valley(history):
-    found = features(history, 26.5, 0.0)
-    assert sorted((one.kind, one.form) for one in found) == [
-        ("boss", "mound"),
-        ("boss", "ridge"),
-        ("crease", "valley"),
-    ]
-
-
-def test_their_crests_are_the_ways_of_the_finger(history):
-    found = {one.form: one for one in features(history, 26.5, 0.0)}
+def test_at_the_end_there_are_a_ridge_a_mound_and_a_valley_along_the_ways_of_the_finger(history):
+    at_end = features(history, 26.5, 0.0)
+    wanted = [("boss", "mound"), ("boss", "ridge"), ("crease", "valley")]
+    assert sorted((one.kind, one.form) for one in at_end) == wanted
+    found = {one.form: one for one in at_end}
     # The finger went from x = -21 to 21 mm, at y = -21 mm for the ridge, y = 21 mm for the valley.
     for form, y in (("ridge", -21e-3), ("valley", 21e-3)):
         (line,) = found[form].crests

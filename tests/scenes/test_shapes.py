@@ -62,12 +62,25 @@ def test_every_method_takes_over_a_shape_that_stands(method: str) -> None:
     rises = np.diff(history["height"][: round(SHOWN / PERIOD)], axis=0)
     assert rises.max() <= assemble(scene(method)).fastest * PERIOD * (1.0 + 1e-9)
     assert not history["force"][: round(SHOWN / PERIOD)].any()
+    # Before it stands its cells are on their way.
+    assert np.any(history["mode"][5] == Mode.BLISTER)
+    assert not np.any(history["mode"][round(SHOWN / PERIOD)] == Mode.BLISTER)
+    # The finger is felt on it: the top of the dome is at 50 mm, a bed at rest is not reached at 46 mm.
+    assert history["total_force"].max() > 0.1
+    losses = {"virtual_master": 1, "plastic": None}  # the hand-over counts the finger's
+    assert formed(method).metrics["losses"] == losses.get(method, formed(method).metrics["losses"])
 
 
-@pytest.mark.parametrize("method", EDITING)
-def test_the_finger_is_felt_on_the_shape(method: str) -> None:
-    # The top of the dome is at 50 mm; a bed at rest would not be reached by a finger at 46 mm.
-    assert formed(method).history["total_force"].max() > 0.1
+@pytest.mark.parametrize(
+    "control",
+    ["absent", {"method": "shape_display", "refresh": "approximate_gradual"}, {"method": "elastic"}],
+)
+def test_without_a_method_the_shape_stands_or_as_the_display_shows_it_and_costs_nothing(control):
+    made = scene(None, control=control)
+    system, way = assemble(made), made.section("trajectory").trajectory()
+    *_, last = periods(system, [way], begin(system), round(SHOWN / PERIOD))
+    assert np.abs(last.row(0) - wanted()).max() <= DEAD_BAND + 1e-12
+    assert last.active.cells.size == 0
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "plastic", "push_pull"])
@@ -89,35 +102,10 @@ def test_a_bed_that_recovers_goes_back_to_the_shape_and_not_to_rest(method: str)
     assert np.abs(height[-1] - wanted()).max() <= left
 
 
-def test_before_the_shape_stands_its_cells_are_on_their_way() -> None:
-    mode = formed("plastic").history["mode"]
-    assert np.any(mode[5] == Mode.BLISTER)
-    assert not np.any(mode[round(SHOWN / PERIOD)] == Mode.BLISTER)
-
-
-def test_without_a_method_the_shape_stands() -> None:
-    last = run(scene(None)).history["height"][-1]
-    assert np.abs(last - wanted()).max() <= DEAD_BAND + 1e-12
-
-
-def test_the_method_shape_display_shows_the_scenes_shape_in_its_own_way() -> None:
-    made = scene("shape_display", control={"method": "shape_display", "refresh": "approximate_gradual"})
-    shown = run(made).history["height"][round(SHOWN / PERIOD)]
-    assert np.abs(shown - wanted()).max() <= DEAD_BAND + 1e-12
-
-
-def test_a_shape_that_stands_costs_nothing() -> None:
-    made = scene("virtual_master")
-    system, way = assemble(made), made.section("trajectory").trajectory()
-    *_, last = periods(system, [way], begin(system), round(SHOWN / PERIOD))
-    assert last.active.cells.size == 0
-
-
 def test_a_session_without_a_shape_is_what_it_was_before() -> None:
     # The same bed, displayed flat: a shape that is no shape changes no number.
-    plain = resolve({"layout": {"rows": 15, "columns": 15}})
-    level = resolve({"layout": {"rows": 15, "columns": 15}, "shape": {"file": "dome", "rise": 0.0}})
-    one, other = run(plain).history, run(level).history
+    bed = {"layout": {"rows": 15, "columns": 15}, "simulation": {"duration": 1.5}}
+    one, other = (run(resolve(bed | shape)).history for shape in ({}, {"shape": SHAPE | {"rise": 0.0}}))
     assert np.array_equal(one["height"], other["height"])
     assert one["total_force"].max() > 0.1
 
@@ -134,11 +122,6 @@ def test_a_state_is_kept_and_taken_up_bit_for_bit(method: str, moment: float) ->
     (other,) = deque(periods(system, [way], again, 40), maxlen=1)
     assert np.array_equal(one.row(0), other.row(0))
     assert snapshot.dump(system, one) == snapshot.dump(system, other)
-
-
-def test_a_hand_over_counts_the_finger_s_losses() -> None:
-    assert formed("virtual_master").metrics["losses"] == 1
-    assert formed("plastic").metrics["losses"] is None
 
 
 #: Sample sessions of this project, with what is left when they end: lowest, highest, mm above rest.

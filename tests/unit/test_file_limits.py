@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import tracemalloc
 import zipfile
 from collections.abc import Callable
@@ -47,37 +48,35 @@ def refused(work: Callable[[], Any]) -> str:
 
 # Scene files
 
+BOMB = ".".join(20_000 * ["a"])
+
 
 @pytest.mark.parametrize(
     "bomb",
-    [
-        ".".join(20_000 * ["a"]) + " = 1",
-        "[" + ".".join(20_000 * ["a"]) + "]",
-        "x = { " + " . ".join(20_000 * ['"a"']) + " = 1 }",
-        'x = """a\nb"""\n' + ".".join(20_000 * ["'a'"]) + " = 1",
-    ],
-)
+    [f"{BOMB} = 1", f"[{BOMB}]", "x = { " + " . ".join(20_000 * ['"a"']) + " = 1 }",
+     'x = """a\nb"""\n' + ".".join(20_000 * ["'a'"]) + " = 1"],
+)  # fmt: skip
 def test_a_key_of_20_000_names_is_refused_with_its_line(tmp_path: Path, bomb: str) -> None:
     path = tmp_path / "bomb.toml"
     path.write_text(f"# fine so far\n{bomb}\n", encoding="utf-8")
     said = refused(lambda: load(path))
     line = 2 + bomb.count("\n")
     assert f"bomb.toml, line {line}: a key must have at most 16 names" in said
+    setting = Setting("fluid.density", "{ " + BOMB + " = 1 }")
+    assert "fluid.density must be a number" in refused(lambda: load(find("slow_press"), [setting]))
+
+
+NAMES = "a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t"
 
 
 @pytest.mark.parametrize(
     "harmless",
-    [
-        'description = "a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t"',
-        "description = '''\\na.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t'''",
-        "# a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t",
-        "[shape]\nheights = '" + 5000 * "a" + "'",
-        'description = "\\"a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t"',
-    ],
-)
-def test_what_stands_in_a_text_is_no_key(tmp_path: Path, harmless: str) -> None:
+    [f'description = "{NAMES}"', f"description = '''\\n{NAMES}'''", f"# {NAMES}",
+     "[shape]\nheights = '" + 5000 * "a" + "'", f'description = "\\"{NAMES}"', "\ufeffname = 'marked'"],
+)  # fmt: skip
+def test_what_stands_in_a_text_is_no_key_nor_is_a_byte_order_mark(tmp_path: Path, harmless: str) -> None:
     (tmp_path / "my.toml").write_text(harmless, encoding="utf-8")
-    assert read_table(tmp_path / "my.toml").keys() <= {"description", "shape"}
+    assert read_table(tmp_path / "my.toml").keys() <= {"description", "name", "shape"}
 
 
 @pytest.mark.parametrize("quote", ['"\\', "'''a", '"""\\"', '"""a', "'a"])
@@ -87,22 +86,10 @@ def test_a_text_without_an_end_is_not_gone_over_again_and_again(tmp_path: Path, 
     assert refused(lambda: read_table(tmp_path / "my.toml"))
 
 
-def test_an_option_with_a_key_of_20_000_names_is_refused() -> None:
-    bomb = "{ " + ".".join(20_000 * ["a"]) + " = 1 }"
-    assert "fluid.density must be a number" in refused(
-        lambda: load(find("slow_press"), [Setting("fluid.density", bomb)])
-    )
-
-
 def test_a_scene_file_beyond_all_sizes_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "hole.toml").open("wb") as file:
         file.truncate(LARGEST + 1)  # takes no room on the disk
     assert "hole.toml must have at most 128 MB (got 128 MB)." in refused(lambda: load(tmp_path / "hole.toml"))
-
-
-def test_a_byte_order_mark_is_no_part_of_a_scene(tmp_path: Path) -> None:
-    (tmp_path / "my.toml").write_text("name = 'marked'\n", encoding="utf-8-sig")
-    assert load(tmp_path / "my.toml").name == "marked"
 
 
 # Histories
@@ -118,13 +105,6 @@ def history(folder: Path, **arrays: np.ndarray) -> Path:
 
 
 SMALL = {"radius": 2e-3, "edge_radius": 2.5e-3, "flat_radius": 1e-3}
-
-
-def test_a_history_as_its_scene_leaves_it_is_read(tmp_path: Path) -> None:
-    run = read_run(history(tmp_path), "height", "force")
-    assert {name: array.shape for name, array in run.history.items()} == {
-        "time": (11,), "height": (11, 4), "force": (11, 4),
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -180,22 +160,17 @@ def grown(path: Path, name: str, by: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda data: data[: len(data) // 2],
-        lambda data: b"",
-        lambda data: data.replace(b"'descr': '<f8'", b"'descr': '|O8'"),
-        lambda data: data.replace(b"NUMPY", b"NIMPY"),
-        lambda data: data.replace(b"(11, 4)", b"(99, 4)"),
-        lambda data: data.replace(b"(11, 4)", b"(-1, 4)"),
-        lambda data: data.replace(b"(11, 4)", b"((((4))"),
-    ],
-)
-def test_a_damaged_history_is_refused(tmp_path: Path, spoil: Callable[[bytes], bytes]) -> None:
+    ("old", "new"),
+    [(b"(?s)(.{700}).*", rb"\1"), (b"(?s).*", b""), (b"'descr': '<f8'", b"'descr': '|O8'"),
+     (b"NUMPY", b"NIMPY"),
+     (rb"\(11, 4\)", b"(99, 4)"), (rb"\(11, 4\)", b"(-1, 4)"), (rb"\(11, 4\)", b"((((4))")],
+)  # fmt: skip
+def test_a_damaged_history_is_refused(tmp_path: Path, old: bytes, new: bytes) -> None:
     folder = history(tmp_path)
+    assert read_run(folder, "height", "force").history["force"].shape == (11, 4)
     with np.load(folder / "history.npz") as arrays:
         np.savez(folder / "plain.npz", **arrays)
-    (folder / "history.npz").write_bytes(spoil((folder / "plain.npz").read_bytes()))
+    (folder / "history.npz").write_bytes(re.sub(old, new, (folder / "plain.npz").read_bytes()))
     assert "cannot be read as a run's history" in refused(lambda: read_run(folder, "height"))
 
 
@@ -221,9 +196,8 @@ def test_a_take_that_unpacks_to_more_than_it_is_is_refused() -> None:
 
 def test_a_take_with_a_scene_that_is_a_bomb_is_refused() -> None:
     data = io.BytesIO()
-    bomb = (".".join(20_000 * ["a"]) + " = 1").encode()
     with np.load(io.BytesIO(take())) as arrays:
-        np.savez(data, **{**arrays, "scene": np.frombuffer(bomb, np.uint8)})
+        np.savez(data, **{**arrays, "scene": np.frombuffer(f"{BOMB} = 1".encode(), np.uint8)})
     assert "a key must have at most 16 names" in refused(lambda: from_bytes(data.getvalue()))
 
 

@@ -49,9 +49,9 @@ def follow(
 
 @pytest.mark.parametrize(
     ("size", "speed", "turn"),
-    [(1.0, 0.0, 0.0), (1.0, 20e-3, 0.0), (1.0, 10e-3, 0.6), (1.0, 10e-3, 0.5 * math.pi), (1.0, 10e-3, 2.5),
-     (0.75, 5e-3, 0.0), (1.3, 5e-3, 0.0)],
-    ids=["at rest", "dragged", "turned", "across", "turned far", "smaller than known", "larger"],
+    [(1.0, 0.0, 0.0), (1.0, 20e-3, 0.0), (1.0, 10e-3, 0.5 * math.pi), (1.0, 10e-3, 2.5), (0.75, 5e-3, 0.6),
+     (1.3, 5e-3, 0.0)],
+    ids=["at rest", "dragged", "across", "turned far", "smaller than known, turned", "larger"],
 )  # fmt: skip
 def test_a_fingertip_is_found(size: float, speed: float, turn: float) -> None:
     tip = Fingertip(10e-3 * size, 8e-3 * size, 8e-3 * size)
@@ -61,9 +61,8 @@ def test_a_fingertip_is_found(size: float, speed: float, turn: float) -> None:
     assert (x, y, z) == pytest.approx(place, abs=20e-6 if speed else 1e-6)
     assert (vx, vy, vz) == pytest.approx((speed, 0.0, 0.0), abs=0.2e-3)
     assert scale == pytest.approx(math.log(size), abs=5e-3)
-    assert (along, askew) == pytest.approx(
-        (LONG * math.cos(2.0 * turn), LONG * math.sin(2.0 * turn)), abs=5e-3
-    )
+    turned = LONG * math.cos(2.0 * turn), LONG * math.sin(2.0 * turn)
+    assert (along, askew) == pytest.approx(turned, abs=5e-3)
 
 
 def test_a_first_contact_is_uncertain_by_millimeters_and_a_first_underside_is_weighed_with_it() -> None:
@@ -79,14 +78,9 @@ def test_a_first_contact_is_uncertain_by_millimeters_and_a_first_underside_is_we
 
 @pytest.mark.parametrize("known", [Fingertip(15e-3), Fingertip(width=4.8e-3), Fingertip(8e-3)])
 def test_a_fingertip_known_too_long_too_narrow_or_round_is_found(known: Fingertip) -> None:
-    found = follow(filter_of(known), Fingertip(), speed=5e-3, turn=0.6)
-    curvatures = np.linalg.eigvalsh(
-        np.exp(-found.mean[6])
-        * known.height
-        * 0.5
-        * (known.length**-2 + known.width**-2)
-        * np.array([[1.0 - found.mean[7], -found.mean[8]], [-found.mean[8], 1.0 + found.mean[7]]])
-    )
+    *_, size, along, askew = follow(filter_of(known), Fingertip(), speed=5e-3, turn=0.6).mean
+    mean = np.exp(-size) * known.height * 0.5 * (known.length**-2 + known.width**-2)
+    curvatures = np.linalg.eigvalsh(mean * np.array([[1.0 - along, -askew], [-askew, 1.0 + along]]))
     # Of the lowest point: 8 mm over the squares of 10 and 8 mm. Farther off the known one is another body.
     assert curvatures == pytest.approx([80.0, 125.0], rel=0.1)
 
@@ -134,7 +128,5 @@ def test_the_inverse_is_that_of_numpy_also_where_pivots_vanish(order: tuple[int,
     # But for one number a row too small to divide by.
     tiny = matrix * 1e-13 - np.eye(6)[list(order)]
     assert invert_six(tiny) == pytest.approx(np.linalg.inv(tiny), rel=1e-9, abs=1e-15)
-
-
-def test_a_singular_covariance_as_of_a_crafted_snapshot_has_no_inverse() -> None:
+    # A singular covariance, as of a crafted snapshot, has none.
     assert np.isnan(invert_six(np.zeros((6, 6)))).any()

@@ -36,6 +36,10 @@ def test_commands_that_act_for_more_than_a_period_are_all_allowed_for() -> None:
     servo = servo_of(cell_of(valve_lag=None), 12e-3)
     assert servo.left == pytest.approx((5e-3, 5e-3, 2e-3))
     assert servo.span == pytest.approx(2.0 * PERIOD - 2e-3)
+    # Earlier ones are put behind the newest.
+    speeds, still = np.array([[1e-3], [2e-3], [3e-3]]), np.zeros(1)
+    servo.serve(np.array([2e-3 * servo.span]), servo.find_limits(still), still, speeds)
+    assert speeds[:, 0] == pytest.approx([2e-3, 1e-3, 2e-3])
 
 
 @pytest.mark.parametrize("orifice", [0.5e-3, 1.0e-3])
@@ -53,24 +57,11 @@ def test_the_opening_gives_the_speed_asked_for_under_load(orifice: float, force:
     assert speeds[0] == pytest.approx(asked)
 
 
-def test_a_pin_pressed_harder_than_can_be_lifted_is_not_opened_upwards() -> None:
+def test_an_overloaded_pin_is_not_opened_upwards_nor_one_within_the_dead_band() -> None:
     servo = servo_of(cell_of())
-    load = np.array([servo.lift * 1.1])
-    assert servo.serve(np.array([1e-3]), servo.find_limits(load), load, np.zeros((servo.rows, 1))) == 0.0
-
-
-def test_within_the_dead_band_the_valve_stays_shut() -> None:
-    servo = servo_of(cell_of())
-    limits = servo.find_limits(np.zeros(2))
-    command = servo.serve(np.array([0.9, -0.9]) * BAND, limits, np.zeros(2), np.zeros((servo.rows, 2)))
-    assert command.tolist() == [0.0, 0.0]
-
-
-def test_earlier_commands_are_put_behind_the_newest() -> None:
-    servo = servo_of(cell_of(valve_lag=None), 12e-3)
-    speeds, still = np.array([[1e-3], [2e-3], [3e-3]]), np.zeros(1)
-    servo.serve(np.array([2e-3 * servo.span]), servo.find_limits(still), still, speeds)
-    assert speeds[:, 0] == pytest.approx([2e-3, 1e-3, 2e-3])
+    speeds, load = np.zeros((servo.rows, 3)), np.array([servo.lift * 1.1, 0.0, 0.0])
+    errors = np.array([1e-3, 0.9 * BAND, -0.9 * BAND])
+    assert servo.serve(errors, servo.find_limits(load), load, speeds).tolist() == [0.0] * 3
 
 
 @pytest.mark.parametrize("dead_time", [0.0, 1e-3, 7e-3, 20e-3])

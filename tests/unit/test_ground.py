@@ -62,11 +62,8 @@ RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e
 )
 def test_a_cell_rises_from_its_own_ground(measured, place, height):
     assert command(master(height=50e-3), measured).target[at(*place)] == pytest.approx(height, abs=1e-9)
-
-
-def test_the_papers_ground_cuts_a_ridge_at_the_rim() -> None:
-    target = command(master(height=50e-3), seen(RIDGE, Mode.HOLD), "edge").target
-    assert target[at(0, 15)] < 42e-3
+    # The paper's ground cuts a ridge at the rim.
+    assert command(master(height=50e-3), seen(RIDGE, Mode.HOLD), "edge").target[at(0, 15)] < 42e-3
 
 
 @pytest.mark.parametrize("mode", [Mode.REST, Mode.HOLD, Mode.EDGE])
@@ -115,7 +112,7 @@ def pressed(x: float, top: float, mode: Mode = Mode.BLISTER, ground: Floats = SL
     return command(master(*EAST, height=top), touch(seen(ground, mode, own=ground), x))
 
 
-def test_a_blister_that_sinks_into_a_slope_raises_none_and_lowers_none_too_far() -> None:
+def test_a_blister_that_sinks_into_a_slope_raises_no_cell_and_one_that_rises_is_level() -> None:
     measured = seen(SLOPE, Mode.BLISTER, own=SLOPE)
     measured.force[at(0.0, 0.0)] = 0.4
     change = command(master(height=36e-3), measured).target - SLOPE
@@ -123,12 +120,8 @@ def test_a_blister_that_sinks_into_a_slope_raises_none_and_lowers_none_too_far()
     assert change.max() <= 1e-5
     # Below the finger by 4 mm.
     assert change.min() == pytest.approx(-4e-3, abs=1e-5)
-
-
-def test_a_blister_that_rises_on_a_slope_is_level() -> None:
     target = pressed(0.0, 44e-3).target
-    assert target[at(3, 0)] == pytest.approx(44e-3, abs=1e-9)
-    assert target[at(-3, 0)] == pytest.approx(44e-3, abs=1e-9)
+    assert target[[at(3, 0), at(-3, 0)]] == pytest.approx(44e-3, abs=1e-9)
 
 
 #: By so little even ground rises: 0.03 mm a millimeter.
@@ -151,29 +144,26 @@ def test_on_uneven_ground_that_a_blister_sinks_into_cells_freeze_sooner_and_are_
     assert pressed(0.0, top, Mode.FROZEN, ground).mode[at(6, 0)] == ahead
 
 
-def test_what_a_blister_that_climbs_a_slope_has_pressed_stays_behind_it() -> None:
-    measured = touch(seen(SLOPE - 3e-3, Mode.FROZEN, own=SLOPE), 6.0)
-    found = command(master(*EAST, x=1e-3, height=38e-3), measured)
-    # Those far behind, where the slope is below the top, and the one 1 mm behind, within what freezes.
-    for x in (-9.0, -6.0, 0.0):
-        assert found.mode[at(x, 0)] == Mode.FROZEN
-        assert found.target[at(x, 0)] == SLOPE[at(x, 0)] - 3e-3
+@pytest.mark.parametrize(
+    ("change", "x", "height", "touched", "cells"),
+    [
+        # Those far behind, where the slope is below the top, and the one 1 mm behind, within what freezes.
+        pytest.param(-3e-3, 1e-3, 38e-3, 6.0, (-9.0, -6.0, 0.0), id="pressed by one that climbs"),
+        pytest.param(3e-3, 0.0, 36e-3, 0.0, (6.0,), id="raised, and ahead again"),
+    ],
+)
+def test_what_a_blister_has_formed_on_a_slope_stays_frozen(change, x, height, touched, cells):
+    measured = touch(seen(SLOPE + change, Mode.FROZEN, own=SLOPE), touched)
+    found, there = command(master(*EAST, x=x, height=height), measured), [at(x, 0) for x in cells]
+    assert set(found.mode[there]) == {Mode.FROZEN}
+    np.testing.assert_array_equal(found.target[there], SLOPE[there] + change)
 
 
 def test_what_a_blister_has_raised_stays_when_it_begins_to_sink() -> None:
     # It comes up out of a valley of 4 mm, whose bottom it has raised to its top.
-    ground = 40e-3 - np.where(BED.x < 0.0, 4e-3, 0.0)
-    level = np.full(BED.count, 39.3e-3)
+    ground, level = 40e-3 - np.where(BED.x < 0.0, 4e-3, 0.0), np.full(BED.count, 39.3e-3)
     found = command(master(*EAST, height=39.3e-3), touch(seen(level, Mode.BLISTER, own=ground), 1.5, 4.5))
-    for x in (-3.0, 0.0, 3.0):
-        assert found.target[at(x, 0)] == pytest.approx(39.3e-3, abs=1e-5)
-
-
-def test_what_a_blister_has_raised_is_not_freed_when_it_lies_ahead_again() -> None:
-    raised = seen(SLOPE + 3e-3, Mode.FROZEN, own=SLOPE)
-    found = command(master(*EAST, height=36e-3), touch(raised, 0.0))
-    assert found.mode[at(6, 0)] == Mode.FROZEN
-    assert found.target[at(6, 0)] == SLOPE[at(6, 0)] + 3e-3
+    assert found.target[[at(x, 0) for x in (-3, 0, 3)]] == pytest.approx(39.3e-3, abs=1e-5)
 
 
 def test_the_stacked_runs_of_a_batch_have_profiles_of_their_own() -> None:

@@ -49,9 +49,7 @@ NOISY = [(0, 0, 0.1), (6, 0, 9e-3), (-3, 0, 0.1)]
 @pytest.mark.parametrize(
     ("before", "floor", "presses", "place"),
     [
-        pytest.param(
-            None, 0.0, [(0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)], (0.75e-3, 1.5e-3), id="the centroid"
-        ),
+        pytest.param(None, 0.0, [(0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)], (0.75e-3, 1.5e-3), id="centroid"),
         pytest.param(None, 0.0, [(-20, 0, 0.1), (20, 0, 0.3)], (10e-3, 0.0), id="at first of all cells"),
         pytest.param(master(), 0.0, [(0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)], (3e-3, 0.0), id="later near"),
         pytest.param(master(), 10e-3, NOISY, (-1.5e-3, 0.0), id="noise draws it not aside"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -107,9 +108,8 @@ def test_cells_exactly_on_the_rim_belong_to_the_blister_on_every_side(place: tup
 
 
 def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_side() -> None:
-    modes = [
-        created(master(x, y), ridge())[1].mode[at(-6 * x, -6 * y)] for x, y in (EAST, WEST, (0, 1), (0, -1))
-    ]
+    ways = EAST, WEST, (0, 1), (0, -1)
+    modes = [created(master(x, y), ridge())[1].mode[at(-6 * x, -6 * y)] for x, y in ways]
     assert len(set(modes)) == 1
 
 
@@ -207,6 +207,7 @@ def test_a_cell_rests_until_it_is_formed_and_without_a_fingertip_goes_to_its_tar
 PRESS_AND_LIFT = [(0, 46.0), (0.4, 35.5), (0.6, 35.5), (1.4, 43.0)]
 
 
+@cache
 def formed(x: float, y: float, profile: str = "cone") -> np.ndarray:
     """Return the final heights (15, 15) after a press at (x, y), mm, and a slow lift."""
     system = make_system(Layout(15, 15), control=VirtualMaster(), blister=Blister(profile=profile))
