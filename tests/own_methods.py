@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+from digiclay.cli import main
 from digiclay.core.control.methods import list_added, remove_method
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
@@ -55,3 +57,11 @@ def small(method: str, *settings: str) -> Scene:
     said = ("layout.rows=11", "layout.columns=11", "simulation.duration=0.2", *settings)
     changes = [Setting(*one.split("=", 1)) for one in said]
     return load(find("tap"), [Setting("control.method", method), *changes])
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Return the line with which the command refuses."""
+    assert main(list(arguments)) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1, said
+    return said

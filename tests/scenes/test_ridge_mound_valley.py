@@ -1,11 +1,15 @@
-"""The paper's session forms what its name says, and never loses the finger while it does."""
+"""The paper's session forms what its name says, never loses the finger, and its features are found."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.scene_source import find as sample
+from digiclay.core.scene.scene_source import load
 from digiclay.core.session.run_scene import Result, run
+from digiclay.core.surface.features import Feature, find
+from digiclay.core.surface.formed import make_formed
+from digiclay.core.surface.skins import fit_skin
 from numpy.typing import NDArray
 
 MM = 1e-3
@@ -14,57 +18,70 @@ MM = 1e-3
 @pytest.fixture(scope="module")
 def session() -> Result:
     """Return the session, run once."""
-    return run(load(find("ridge_mound_valley")))
-
-
-def array(session: Result, name: str) -> NDArray[np.float64]:
-    """Return an array of the session's history."""
-    assert session.history is not None
-    return session.history[name]
+    return run(load(sample("ridge_mound_valley")))
 
 
 def profile(session: Result, y: float) -> NDArray[np.float64]:
     """Return the final heights of the row of cells at y, from left to right, over the rest height, m."""
-    row = np.abs(array(session, "position")[:, 1] - y) < 0.1 * MM
-    return array(session, "height")[-1, row] - session.scene.actuator.rest_height
+    row = np.abs(session.history["position"][:, 1] - y) < 0.1 * MM
+    return session.history["height"][-1, row] - session.scene.actuator.rest_height
 
 
-def test_the_finger_touches_twice_and_is_never_lost_in_between(session: Result) -> None:
-    touching = array(session, "total_force") > 0.0
-    changes = array(session, "time")[1:][np.diff(touching)]
+def features(session: Result, time: float, former: float = 0.0) -> dict[str, Feature]:
+    """Return what was formed between two times, s, by its form."""
+    row, before = (int(np.argmin(np.abs(session.history["time"] - moment))) for moment in (time, former))
+    found = find(fit_skin(make_formed(dict(session.history), row, before), "bilinear", 1, 1e-3))
+    assert len(found) == len({one.form for one in found})
+    return {one.form: one for one in found}
+
+
+def test_the_finger_touches_twice_is_never_lost_in_between_and_felt_near_the_set_point(session):
+    touching = session.history["total_force"] > 0.0
+    changes = session.history["time"][1:][np.diff(touching)]
     # Down near the start, up after the mound; down for the valley, up at its end.
     assert np.allclose(changes, [0.4, 13.3, 15.7, 25.5], atol=0.1)
-
-
-def test_the_ridge_is_15_mm_high_and_has_no_holes(session: Result) -> None:
-    # From where the blister was lifted to where the mound's flank begins; 1 mm for the finger's give.
-    ridge = profile(session, -21 * MM)[5:16]
-    assert np.allclose(ridge, 15 * MM, atol=1 * MM)
-
-
-def test_the_mound_rises_10_mm_above_the_ridge(session: Result) -> None:
-    heights = profile(session, -21 * MM)
-    # The master goes on for the 50 ms it takes to miss the finger, at up to 24 mm/s: 1.2 mm.
-    assert heights.max() - np.median(heights[5:16]) == pytest.approx(10 * MM, abs=1.2 * MM)
-
-
-def test_the_valley_lies_below_the_surface_from_side_to_side(session: Result) -> None:
-    valley = profile(session, 21 * MM)[5:20]
-    assert valley.max() < -6 * MM
-
-
-def test_the_middle_of_the_bed_is_left_as_it_was(session: Result) -> None:
-    # 21 mm to either path: outside both blisters (15 mm).
-    assert np.abs(profile(session, 0.0)).max() == 0.0
-
-
-def test_the_force_stays_near_its_set_point_while_shaping(session: Result) -> None:
     # A rise of 6 mm/s takes a force 0.1 N below the set point (K_f = 5 1/N); the rest is less.
     assert session.metrics["rfd_shaping"] < 0.1
 
 
-def test_a_lift_off_leaves_no_lump(session: Result) -> None:
-    heights = array(session, "height").reshape(-1, 25, 25)
+def test_the_ridge_is_15_mm_high_without_holes_and_the_mound_10_mm_above_it(session):
+    heights = profile(session, -21 * MM)
+    # From where the blister was lifted to where the mound's flank begins; 1 mm for the finger's give.
+    assert np.allclose(heights[5:16], 15 * MM, atol=1 * MM)
+    # The master goes on for the 50 ms it takes to miss the finger, at up to 24 mm/s: 1.2 mm.
+    assert heights.max() - np.median(heights[5:16]) == pytest.approx(10 * MM, abs=1.2 * MM)
+
+
+def test_the_valley_lies_below_the_surface_from_side_to_side_without_a_lump_at_its_end(session):
+    assert profile(session, 21 * MM)[5:20].max() < -6 * MM
+    # 21 mm to either path: outside both blisters (15 mm).
+    assert np.abs(profile(session, 0.0)).max() == 0.0
+    heights = session.history["height"].reshape(-1, 25, 25)
     # The finger leaves the valley's end at 25.5 s; pins end where it was last felt, but for a servo's lag.
-    before = heights[int(25.49 / 5e-3), 19, 19]
-    assert abs(heights[-1, 19, 19] - before) < 0.5 * MM
+    assert abs(heights[-1, 19, 19] - heights[int(25.49 / 5e-3), 19, 19]) < 0.5 * MM
+
+
+def test_at_the_end_there_are_a_ridge_a_mound_and_a_valley_along_the_ways_of_the_finger(session):
+    found = features(session, 26.5)
+    kinds = {form: one.kind for form, one in found.items()}
+    assert kinds == {"mound": "boss", "ridge": "boss", "valley": "crease"}
+    # The finger went from x = -21 to 21 mm, at y = -21 mm for the ridge, y = 21 mm for the valley.
+    for form, y in (("ridge", -21e-3), ("valley", 21e-3)):
+        (line,) = found[form].crests
+        assert np.abs(line[:, 1] - y).max() <= 3e-3  # a pitch
+        assert np.ptp(line[:, 0]) == pytest.approx(42e-3, abs=4e-3)  # a pitch, and the pulp's yield
+
+
+def test_the_mound_stands_where_the_finger_was_lifted_and_the_ridge_is_as_high_as_before(session):
+    found, before, grown = features(session, 26.5), features(session, 10.3), features(session, 14.0, 10.3)
+    assert (before.keys(), grown.keys()) == ({"ridge"}, {"mound"})
+    for mound in (found["mound"], grown["mound"]):
+        assert np.linalg.norm(mound.region.position.mean(axis=0) - (21e-3, -21e-3)) < 6e-3
+    assert found["mound"].extreme > 24e-3
+    assert grown["mound"].extreme == pytest.approx(10e-3, abs=3e-3)
+    assert before["ridge"].extreme == pytest.approx(15e-3, abs=2e-3)  # drawn up by 15 mm
+    # Its crest goes on under the mound, as high as it was: 15 mm, and the pulp over it.
+    ((crest,), (crest_before,)) = found["ridge"].crests, before["ridge"].crests
+    assert np.median(crest[:, 2]) == pytest.approx(np.median(crest_before[:, 2]), abs=0.5e-3)
+    assert np.ptp(crest[:, 2]) < 3e-3
+    assert np.ptp(crest_before[:, 2]) < 2e-3

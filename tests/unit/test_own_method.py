@@ -24,7 +24,7 @@ from digiclay.core.session.run_scene import run
 from digiclay.plugins import method_loader
 from digiclay.plugins.method_loader import load_method, name_method
 
-from tests.own_methods import HEAD, PAD, forgotten, small, write_method
+from tests.own_methods import HEAD, PAD, forgotten, refused, small, write_method
 from tests.timeouts import TIMEOUT
 
 
@@ -148,29 +148,17 @@ def test_nothing_a_method_is_shown_leads_to_the_bed(here: Path) -> None:
         np.testing.assert_array_equal(cheat.history[key], values, key)
 
 
-@pytest.mark.parametrize(
-    ("attribute", "name"),
-    [("Mine", "mine"), ("SoftPad", "soft_pad"), ("PIDControl2", "pid_control2"), ("mine", "mine")],
-)
-def test_the_name_in_scene_files_is_that_of_the_class(attribute: str, name: str) -> None:
-    assert name_method(attribute) == name
-
-
-def test_a_batch_gives_what_the_runs_give_alone(here: Path) -> None:
+def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(here: Path) -> None:
     write_method(here)
+    assert name_method("PIDControl2") == "pid_control2"
     name = load_method("pad.py:SoftPad")
     scenes = [small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)]
     found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
     for number, scene in enumerate(scenes):
         np.testing.assert_allclose(found[number], run(scene).history["height"], rtol=0, atol=1e-12)
     assert np.abs(found[0] - found[2]).max() > 1e-5
-
-
-def test_a_shape_is_displayed_before_it_takes_over(here: Path) -> None:
-    write_method(here)
-    scene = small(load_method("pad.py:SoftPad"), "shape.file=saddle", "simulation.duration=0.4")
-    height = run(scene).history["height"]
-    assert np.ptp(height[-1]) > 1e-3
+    shown = run(small(name, "shape.file=saddle", "simulation.duration=0.4")).history["height"]
+    assert np.ptp(shown[-1]) > 1e-3
 
 
 # A job series: the code lies beside each job, a command loads it.
@@ -207,9 +195,7 @@ def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(job
     assert sorted(path.name for path in JOB.iterdir()) == ["job.toml", "method.py", "scene.toml"]
     assert not (JOB.with_name("tap-elastic-small") / "method.py").exists()
     assert (JOB / "method.py").read_text(encoding="utf-8") == PAD
-    assert main(["job", str(JOB), "--quiet"]) == 2
-    said = capsys.readouterr().err
-    assert (said.count("\n"), "--method path/to/mine.py:Mine" in said) == (1, True)
+    assert "--method path/to/mine.py:Mine" in refused(capsys, "job", str(JOB), "--quiet")
     assert judge_run(JOB, RUN) is RunState.ABSENT
     own = ["--method", "method.py:SoftPad", "--quiet"]
     assert main(["job", str(JOB), *own]) == 0
@@ -237,8 +223,7 @@ def test_a_series_runs_with_it_in_processes_and_farms_are_told_its_code(jobs: Pa
 
 
 def test_a_series_with_a_method_that_cannot_be_loaded_leaves_nothing(jobs, capsys):
-    assert main(["batch", "jobs.toml", "--method", "pad.py:Pad"]) == 2
-    said = capsys.readouterr().err
+    said = refused(capsys, "batch", "jobs.toml", "--method", "pad.py:Pad")
     assert said == "--method: pad.py:Pad: the file must have the class Pad (it has pad.py:SoftPad).\n"
     assert sorted(path.name for path in jobs.iterdir()) == ["jobs.toml", "pad.py"]
 
@@ -282,9 +267,7 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
 )
 def test_a_name_that_cannot_be_is_refused_in_a_line(here, arguments, said, capsys):
     (here / "mine.py").write_text("", encoding="utf-8")
-    assert main(["new-method", *arguments]) == 2
-    err = capsys.readouterr().err
-    assert (err.count("\n"), said in err) == (1, True), err
+    assert said in refused(capsys, "new-method", *arguments)
     assert [(path.name, path.stat().st_size) for path in here.iterdir()] == [("mine.py", 0)]
 
 

@@ -13,7 +13,7 @@ from digiclay.core.control.own_method import Pace
 from digiclay.core.session.run_scene import run
 from digiclay.plugins.method_loader import load_method
 
-from tests.own_methods import HEAD, PAD, forgotten, small, write_method
+from tests.own_methods import HEAD, PAD, forgotten, refused, small, write_method
 
 
 @pytest.fixture(autouse=True)
@@ -41,9 +41,19 @@ def bad(body: str, fields: str = "") -> str:
     return f"{HEAD}\n@dataclass(frozen=True)\nclass Bad(OwnMethod):\n{inner}\n"
 
 
+def commanding(line: str) -> str:
+    """Return the code of a method whose command is a line."""
+    return bad(f"def command(self, memory, cells, device):\n    {line}")
+
+
 def ordering(orders: str) -> str:
     """Return the code of a method with certain orders."""
-    return bad(f"def command(self, memory, cells, device):\n    return memory, {orders}")
+    return commanding(f"return memory, {orders}")
+
+
+def building(line: str) -> str:
+    """Return the code of a method whose build is a line."""
+    return bad(f"def build(self, device):\n    {line}")
 
 
 def keeping(first: str, later: str) -> str:
@@ -54,13 +64,15 @@ def keeping(first: str, later: str) -> str:
     )
 
 
+#: A function `command` of no use, before the mistake.
+NONE = "command = lambda *_: None\n"
+
+
 def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_method(here)
     for word in ("soft_pad", "pad.py:SoftPad"):
         (here / "my.toml").write_text(f'[control]\nmethod = "{word}"\n', encoding="utf-8")
-        assert main(["run", "my.toml"]) == 2
-        said = capsys.readouterr().err
-        assert said.count("\n") == 1
+        said = refused(capsys, "run", "my.toml")
         assert "my.toml: control.method must be one of virtual_master" in said
         assert "--method path/to/mine.py:Mine" in said
         assert list_added() == {}
@@ -79,10 +91,7 @@ def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFi
         ("class SoftPad: pass", "the class must derive from OwnMethod"),
         (PAD.replace("@dataclass(frozen=True)", ""), "must be decorated with @dataclass(frozen=True)"),
         (PAD.replace("def command", "def comand"), "must have a function command(self, "),
-        (
-            PAD.replace('unit="m"', 'unit="inch"'),
-            "pad.py: SoftPad.step must have one of the units m, s, Pa, ",
-        ),
+        (PAD.replace('unit="m"', 'unit="inch"'), "SoftPad.step must have one of the units m, s, Pa, "),
         (PAD.replace("quantity(50e-6", "quantity([1]"), "mutable default"),
         (PAD.replace("quantity(50e-6", "quantity(None"), "the default of step must be a bool, int, float"),
         (PAD.replace("quantity(50e-6", "quantity(-1.0"), "the default of step must be above 0 m (got -1 m)"),
@@ -96,9 +105,7 @@ def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFi
 )
 def test_a_class_that_is_no_method_is_refused_in_a_line(here, text, rule, capsys):
     write_method(here, text)
-    assert main(["run", "tap", "--method", "pad.py:SoftPad"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
+    said = refused(capsys, "run", "tap", "--method", "pad.py:SoftPad")
     assert said.startswith("--method: pad.py")
     assert rule in said
     assert [path.name for path in here.iterdir()] == ["pad.py"]
@@ -120,11 +127,8 @@ def test_a_class_that_is_no_method_is_refused_in_a_line(here, text, rule, capsys
 def test_a_word_that_names_no_code_is_refused_in_a_line(here, word, rule, capsys):
     (here / "bytes.py").write_bytes(b"\xff\xfe")
     (here / "large.py").write_bytes(b"#" * 1_000_001)
-    assert main(["run", "tap", "--method", word]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert said.startswith("--method: ")
-    assert rule in said
+    said = refused(capsys, "run", "tap", "--method", word)
+    assert (said.startswith("--method: "), rule in said) == (True, True), said
 
 
 @pytest.mark.parametrize(
@@ -138,48 +142,29 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(here, word, rule, capsys
         (ordering("Orders(mode=np.full(cells.height.size, 8))"), "codes of Mode, from 0 to 7 (got 8)"),
         (ordering("Orders(rows=cells.height)"), "rows of the shape (0, "),
         (ordering("cells.height"), "must return Orders as its second result (got ndarray)"),
-        (bad("def command(self, memory, cells, device):\n    pass"),
-            "command must return two results, memory and orders (got NoneType)."),
+        (commanding("pass"), "command must return two results, memory and orders (got NoneType)."),
         (ordering("__import__('sys').exit(3)"), "command must not raise (got SystemExit in line 11: 3)."),
-        (
-            bad("def build(self, device):\n    raise SystemExit(3)"),
-            "build must not raise (got SystemExit in line 11: 3).",
-        ),
-        (
-            bad("command = lambda *_: None\nset_point = property(lambda self: exit(3))"),
-            "the class must not raise (got SystemExit: 3).",
-        ),
-        (bad("command = lambda *_: None\nset_point = 3"), "set_point must be a SetPoint or None (got int)."),
-        (
-            bad("def check(self):\n    raise SystemExit(3)\ncommand = lambda *_: None"),
-            "the class must pass its own check (got SystemExit: 3).",
-        ),
+        (building("raise SystemExit(3)"), "build must not raise (got SystemExit in line 11: 3)."),
+        (bad(f"{NONE}set_point = property(lambda self: exit(3))"), "must not raise (got SystemExit: 3)"),
+        (bad(f"{NONE}set_point = 3"), "set_point must be a SetPoint or None (got int)."),
+        (bad(f"{NONE}def check(self):\n    exit(3)"), "must pass its own check (got SystemExit: 3)."),
         (ordering("1 / 0"), "command must not raise (got ZeroDivisionError in line 11: division by zero)"),
         (ordering("cells.force.sort() or Orders()"), "got ValueError in line 11: sort array is read-only"),
-        (bad("def begin(self, device):\n    return []\ncommand = lambda *_: None"), "begin must return a"),
-        (
-            bad("def locate(self, memory, touched, device):\n    return 3\ncommand = lambda *given: None"),
-            "locate must return two results, memory and a disc, or None (got int).",
-        ),
-        (
-            bad("def locate(self, memory, c, device):\n    return memory, (0, 0)\ncommand = lambda *_: None"),
-            "locate must return the disc of the shape (3,)",
-        ),
+        (bad(f"{NONE}begin = lambda self, device: []"), "begin must return a"),
+        (bad(f"{NONE}locate = lambda *_: 3"), "two results, memory and a disc, or None (got int)."),
+        (bad(f"{NONE}locate = lambda self, memory, *_: (memory, (0, 0))"), "the disc of the shape (3,)"),
         (keeping("0.0", "cells.force"), "must keep the kinds of its memory, here float (got ndarray)."),
         (keeping("0.0", "float('nan')"), "command must return a memory without NaN."),
         (keeping("(0.0, 1)", "(float('nan'), 1)"), "command must return a memory without NaN."),
         (keeping("(0.0, 1)", "(0.0, 1.5)"), "must keep the kinds of its memory, here int (got float)."),
         (keeping("True", "1"), "command must keep the kinds of its memory, here bool (got int)."),
+        (keeping("np.zeros(3)", "np.zeros((3, 3))"), "array of 1 dimensions and float64 (got 2 and"),
         (
-            keeping("np.zeros(3)", "np.zeros((3, 3))"),
-            "command must keep the memory's array of 1 dimensions and float64 (got 2 and float64).",
-        ),
-        (
-            bad("def command(self, memory, cells, device):\n    raise DigiclayError('no finger')").replace(
+            commanding("raise DigiclayError('no finger')").replace(
                 "import numpy", "from digiclay.core.base.errors import DigiclayError\nimport numpy"),
             "command must not raise (got DigiclayError in line 12: no finger).",
         ),
-        (bad("def build(self, device):\n    return 3"), "build must return a controller with begin (got"),
+        (building("return 3"), "build must return a controller with begin (got"),
     ],
 )  # fmt: skip
 def test_a_mistake_while_it_runs_is_a_line_with_file_and_rule(text: str, rule: str) -> None:
