@@ -104,7 +104,7 @@ def test_a_fingertip_is_followed_at(way: Drag | Lift, speed: float, orifice: flo
 
 
 def test_without_a_skirt_a_quick_drag_from_rest_is_blocked() -> None:
-    found, _ = track(device(control={"method": "hybrid", "skirt_speed": 0.0}), Drag(height=6e-3), 40e-3)
+    found, _ = track(device(control={"method": "hybrid", "skirt_speed": 0.0}), Drag(), 40e-3)
     assert found.rfd > 0.1
 
 
