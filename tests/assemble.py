@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -207,22 +207,13 @@ def sample(name: str, *settings: str) -> Scene:
     return load(find(name), [Setting(*setting.split("=")) for setting in settings])
 
 
-def moved(known: Scene, x: float, z: float) -> Scene:
-    """Return a scene whose finger takes the same way elsewhere, m."""
+def moved(known: Scene, x: float, z: float, lasting: float | None = None) -> Scene:
+    """Return a scene whose finger takes the same way elsewhere, m, and that lasts so long, s."""
     points = tuple(
         replace(point, position=(point.position[0] + x, point.position[1], point.position[2] + z))
         for point in known.section("trajectory").waypoints
     )
-    return known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
-
-
-def begun_apart(known: Scene, durations: Sequence[float]) -> list[Scene]:
-    """Return scenes whose ways begin a millimeter apart along x, and that last so long, s."""
-    way = known.section("trajectory")
-    (x, y, z), scenes = way.waypoints[0].position, []
-    for number, duration in enumerate(durations):
-        first = replace(way.waypoints[0], position=(x + 1e-3 * number, y, z))
-        lasting = replace(known.simulation, duration=duration)
-        own = replace(way, waypoints=(first, *way.waypoints[1:]))
-        scenes.append(known.with_sections(trajectory=own, simulation=lasting))
-    return scenes
+    simulation = replace(known.simulation, duration=lasting or known.simulation.duration)
+    return known.with_sections(
+        trajectory=replace(known.section("trajectory"), waypoints=points), simulation=simulation
+    )

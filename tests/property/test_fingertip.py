@@ -19,6 +19,7 @@ unit = st.floats(-1.0, 1.0)
 turns = st.tuples(unit, unit, unit, unit).filter(lambda q: np.hypot.reduce(q) > 0.1)
 spots = st.tuples(st.floats(-30e-3, 30e-3), st.floats(-30e-3, 30e-3), st.floats(0.0, 60e-3))
 peaks = st.floats(0.0, 0.1)
+Spot = tuple[float, ...]
 
 
 def pose(spot: tuple[float, ...], turn: tuple[float, ...]) -> NDArray[np.float64]:
@@ -28,12 +29,7 @@ def pose(spot: tuple[float, ...], turn: tuple[float, ...]) -> NDArray[np.float64
 
 @given(fingers, spots, turns, peaks, st.floats(0.0, 6.3), st.floats(1.0, 3.0))
 def test_beyond_its_reach_the_underside_is_above_the_peak(
-    finger: Fingertip,
-    spot: tuple[float, ...],
-    turn: tuple[float, ...],
-    peak: float,
-    angle: float,
-    farther: float,
+    finger: Fingertip, spot: Spot, turn: tuple[float, ...], peak: float, angle: float, farther: float
 ) -> None:
     outline = finger.outline(pose(spot, turn)[None])
     disc = compute_reach((0.0, 0.0, 0.0, *compute_reaches(outline)[0].tolist()), peak)
@@ -56,25 +52,11 @@ def test_no_point_of_the_underside_is_below_the_position(
     assert under(outline, np.array([x]), np.array([y]))[0, 0] >= spot[2] - 1e-12
 
 
-@given(fingers, spots, turns, spots, st.floats(0.0, 10e-3))
-def test_the_window_has_every_cell_the_finger_could_touch_on_its_way(
-    finger: Fingertip, spot: tuple[float, ...], turn: tuple[float, ...], toward: tuple[float, ...], way: float
+@given(fingers, spots, turns, spots, spots)
+def test_the_window_has_every_cell_the_finger_could_touch_within_a_period(
+    finger: Fingertip, start: Spot, turn: tuple[float, ...], middle: Spot, end: Spot
 ) -> None:
-    # A control period's straight way of up to 10 mm, 2 m/s, in three poses.
-    direction = np.array(toward) / max(np.linalg.norm(toward), 1e-3)
-    poses = np.array([pose(tuple(np.array(spot) + part * way * direction), turn) for part in (0.0, 0.5, 1.0)])
-    outline, peak = finger.outline(poses), 40e-3
-    disc = compute_reach(trace_finger(finger, poses[None]).at(0).window, peak)
-    cells = BED.disc(*disc) if disc else np.empty(0, int)
-    touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
-    assert np.isin(touchable, cells).all()
-
-
-@given(fingers, spots, turns, spots)
-def test_a_dip_within_the_period_is_seen_as_well(
-    finger: Fingertip, spot: tuple[float, ...], turn: tuple[float, ...], dip: tuple[float, ...]
-) -> None:
-    poses = np.array([pose(at, turn) for at in (spot, dip, spot)])
+    poses = np.array([pose(spot, turn) for spot in (start, middle, end)])
     outline, peak = finger.outline(poses), 40e-3
     disc = compute_reach(trace_finger(finger, poses[None]).at(0).window, peak)
     cells = BED.disc(*disc) if disc else np.empty(0, int)

@@ -17,7 +17,7 @@ RUN = """
 import sys
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
-settings = [Setting(name, "absent") for name in sys.argv[1:]]
+settings = [Setting(*one.split("=")) for one in sys.argv[1:]]
 result = run(load(find("tap"), settings))
 assert result.periods == 100
 core = "digiclay.core."
@@ -26,10 +26,10 @@ print(" ".join(name.removeprefix(core) for name in sys.modules if name.startswit
 
 
 @cache
-def imported(*absent: str) -> set[str]:
-    """Run a short session without some parts; return the core's modules it imported."""
+def imported(*settings: str) -> set[str]:
+    """Run a short session with some settings; return the core's modules it imported."""
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", RUN, *absent],
+        [sys.executable, "-W", "error", "-c", RUN, *settings],
         cwd=ADDON, capture_output=True, text=True, check=False, timeout=TIMEOUT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -37,26 +37,21 @@ def imported(*absent: str) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("part", "modules"),
+    ("without", "with_", "modules"),
     [
-        ("conduit", {"model.conduit"}),
-        ("valve_lag", {"model.lag"}),
-        ("relaxation", {"model.relaxation"}),
-        ("fingertip", {"model.relaxation"}),
-        ("control", {"control.virtual_master", "control.blister", "control.servo"}),
+        (("conduit=absent",), (), {"model.conduit"}),
+        (("fingertip=absent",), (), {"model.relaxation"}),
+        (
+            [f"{part}=absent" for part in ("valve_lag", "delay", "relaxation", "control", "recorder")], (),
+            {"model.lag", "model.relaxation", "control.virtual_master", "control.blister", "control.servo"},
+        ),
+        ((), ("simulation.stepper=heun",), {"steppers.explicit"}),
+        ((), ("sensors.delay=1",), {"model.sensors"}),
+        (("sensors.delay=1",), ("sensors.observer=valve",), {"model.observer"}),
     ],
-)
-def test_a_part_left_out_is_not_imported(part: str, modules: set[str]) -> None:
-    assert imported() & modules == modules, "the check could not fail"
-    assert imported(part) & modules == set()
-
-
-def test_a_stepper_that_is_not_asked_for_is_not_imported() -> None:
-    assert "steppers.explicit" not in imported()
-
-
-def test_all_parts_can_be_left_out_together() -> None:
-    everything = ("conduit", "valve_lag", "delay", "fingertip", "relaxation", "control", "recorder")
-    modules = {"model.conduit", "model.lag", "model.relaxation", "control.virtual_master"}
-    assert imported() & modules == modules, "the check could not fail"
-    assert imported(*everything) & modules == set()
+)  # fmt: skip
+def test_what_a_scene_does_without_is_not_imported(
+    without: tuple[str, ...], with_: tuple[str, ...], modules: set[str]
+) -> None:
+    assert imported(*with_) & modules == modules, "the check could not fail"
+    assert imported(*without) & modules == set()

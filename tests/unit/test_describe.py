@@ -32,28 +32,20 @@ def numbers(text: str) -> list[float]:
 UNLIKE = ("supply.high=0.4 bar", "supply.low=-0.6 bar", "layout.rows=12", "layout.columns=10")
 
 
-def test_the_free_speeds_are_those_of_a_pin_with_its_valve_wide_open(
+def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide_open(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    said = numbers(described(capsys, *UNLIKE)["free speed"])
-    moved = []
+    said, moved = described(capsys, *UNLIKE), []
     for command in (1.0, -1.0):
         one = one_cell(supply=Supply(0.4e5, -0.6e5), control=scripted(lambda time, x, y, k=command: k))
         height = record(one, AWAY, 60).height[:, 0]
         # The valve is open after five of its time constants; then the pin goes at one speed.
         moved.append(1e3 * abs(height[60] - height[20]) / (40 * one.period))
     # Three digits are written.
-    assert said == pytest.approx(moved, rel=5e-3)
-    assert said[1] == pytest.approx(1.5 * said[0], rel=1e-2)
-
-
-def test_the_hold_force_is_pressure_times_area_and_the_bed_is_refilled_at_the_free_speed(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    said = described(capsys, *UNLIKE)
+    up, down = numbers(said["free speed"])
+    assert [up, down] == pytest.approx(moved, rel=5e-3)
     forces = [pressure * Actuator().area for pressure in (0.4e5, 0.6e5)]
     assert numbers(said["hold force"]) == pytest.approx(forces, rel=5e-3)
-    up, down = numbers(said["free speed"])
     filled, emptied, volume = numbers(said["refill"])
     # 100 mm of stroke; three digits each.
     assert [filled * up, emptied * down] == pytest.approx([100.0, 100.0], rel=1e-2)
