@@ -190,7 +190,7 @@ def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base: type, name
             1,
             "Pad(ExponentialLaw, ",
             "Pad(",
-            "contact.pad must derive from Parameters and ExponentialLaw, and have",
+            "contact.pad must derive from Parameters and ExponentialLaw, and",
         ),
         (1, "def exponent", "def stiffening", "got Pad without exponent"),
     ],
@@ -204,7 +204,7 @@ def test_a_law_that_lacks_what_a_law_has_is_refused_in_a_line(
     assert said in run_python(copy, "-c", f"{make}try: resolve({{}})\nexcept ParameterError as e: print(e)")
 
 
-#: What runs in the copy: an arrangement under several methods, and what refuses it.
+#: What runs in the copy: each arrangement under several methods, and what refuses it.
 BEDS = """
 import sys
 import numpy as np
@@ -220,41 +220,40 @@ def attempt(make):
     except DigiclayError as error:
         return str(error)
 
-said = ("layout.rows=11", "layout.columns=11", "simulation.duration=0.3", f"layout.arrangement={sys.argv[1]}")
-scene = load(find("tap"), [Setting(*one.split("=")) for one in said])
-viscous = load(find("tap"), [Setting(*one.split("=")) for one in (*said, "control.method=viscous")])
-done = run(scene)
-formed = make_formed(done.history, -1)
-print(done.figures["max_total_force"] > 0.0, scene.fingers[0].contact.share)
-print(attempt(lambda: len(run(viscous).history["time"])))
-print(attempt(lambda: formed.neighbors.shape[1]))
-print(attempt(lambda: np.bincount(make_parts(formed).pin).max()))
-print(attempt(lambda: scene.layout.find_neighbors(corners=False)[60].tolist()))
+def scene(arrangement, *settings):
+    bed = ("layout.rows=11", "layout.columns=11", f"layout.arrangement={arrangement}")
+    settings = (*bed, "simulation.duration=0.3", *settings)
+    return load(find("tap"), [Setting(*one.split("=")) for one in settings])
+
+for name in sys.argv[1:]:
+    known, viscous = scene(name), scene(name, "control.method=viscous")
+    done = run(known)
+    formed = make_formed(done.history, -1)
+    print(done.figures["max_total_force"] > 0.0, known.fingers[0].contact.share, sep="|", end="|")
+    print(attempt(lambda: len(run(viscous).history["time"])), end="|")
+    print(attempt(lambda: formed.neighbors.shape[1]), end="|")
+    print(attempt(lambda: np.bincount(make_parts(formed).pin).max()), end="|")
+    print(attempt(lambda: known.layout.find_neighbors(corners=False)[60].tolist()))
 """
 REFUSED = (
     "layout.arrangement must have its rows in line or shifted by half a pitch, where neighbors are needed "
     "(got a shift of 0.3 pitches)."
 )
+#: Rows of the list of arrangements, and what is found of them.
+NEW = {
+    "wide": ('Arrangement(1.5, 0.0, "Wide rows")', ["0.34", "61", "8", "4", "[61, 71, 59, 49]"]),
+    "close": (
+        'Arrangement(0.7, 0.5, "Close rows", share=0.25)',
+        ["0.25", "61", "6", "6", "[61, 72, 71, 59, 49, 50]"],
+    ),
+    "odd": ('Arrangement(1.0, 0.3, "No lattice")', ["0.34", *[REFUSED] * 4]),
+}
 
 
-@pytest.mark.parametrize(
-    ("row", "share", "found"),
-    [
-        ('Arrangement(1.5, 0.0, "Wide rows")', 0.34, ["61", "8", "4", "[61, 71, 59, 49]"]),
-        (
-            'Arrangement(0.7, 0.5, "Close rows", share=0.25)',
-            0.25,
-            ["61", "6", "6", "[61, 72, 71, 59, 49, 50]"],
-        ),
-        ('Arrangement(1.0, 0.3, "No lattice")', 0.34, [REFUSED] * 4),
-    ],
-)
-def test_a_new_arrangement_is_one_row_and_what_needs_neighbors_refuses_one_without(
-    copy: Path, row: str, share: float, found: list[str]
-) -> None:
+def test_a_new_arrangement_is_one_row_and_what_needs_neighbors_refuses_one_without(copy: Path) -> None:
     layout = copy / "addon" / "digiclay" / "core" / "model" / "layout.py"
-    text = layout.read_text(encoding="utf-8")
-    layout.write_text(
-        text.replace("ARRANGEMENTS = {\n", f'ARRANGEMENTS = {{\n    "new": {row},\n'), encoding="utf-8"
-    )
-    assert run_python(copy, "-c", BEDS, "new").splitlines() == [f"True {share}", *found]
+    rows = "".join(f'    "{name}": {row},\n' for name, (row, _) in NEW.items())
+    head, tail = layout.read_text(encoding="utf-8").split("ARRANGEMENTS = {\n")
+    layout.write_text(f"{head}ARRANGEMENTS = {{\n{rows}{tail}", encoding="utf-8")
+    said = [line.split("|") for line in run_python(copy, "-c", BEDS, *NEW).splitlines()]
+    assert said == [["True", *found] for _, found in NEW.values()]

@@ -43,27 +43,22 @@ def session(method: str, noise: float, seed: int = 0) -> Result:
     return run(scene(method, **sensors))
 
 
-@pytest.mark.parametrize("noise", [0, 1, 2, 5])
+@pytest.mark.parametrize("noise", [0, 5])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
 def test_the_finger_is_lost_at_lift_off_alone_whatever_the_noise(method: str, noise: int) -> None:
     assert session(method, noise).metrics["losses"] == 1
 
 
-def test_noise_does_not_bias_the_force_that_is_held() -> None:
-    quiet, noisy = (session("virtual_master", noise).metrics for noise in (0, 5))
+def test_noise_does_not_bias_the_force_that_is_held_and_is_no_finger_over_the_bed() -> None:
+    quiet, noisy = (session("virtual_master", noise) for noise in (0, 5))
     # Force that only what is above the floor adds up to is 40 mN off at 5 mN of noise.
-    assert noisy["rfd"] == pytest.approx(quiet["rfd"], abs=5e-3)
-
-
-def test_a_finger_that_hangs_over_the_bed_is_not_felt_in_the_noise() -> None:
-    modes = session("virtual_master", 5).history["mode"]
-    assert not np.isin(modes[-60:], (Mode.SPRING, Mode.FORCE_FOLLOW)).any()
+    assert noisy.metrics["rfd"] == pytest.approx(quiet.metrics["rfd"], abs=5e-3)
+    assert not np.isin(noisy.history["mode"][-60:], (Mode.SPRING, Mode.FORCE_FOLLOW)).any()
 
 
 @pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display"])
 def test_noise_is_no_touch(method: str) -> None:
     history = run(scene(method, PRESS, 11, force_noise=4e-3)).history
-    assert history is not None
     untouched = history["force"].max(axis=0) == 0.0
     touched_modes = (Mode.SPRING, Mode.FORCE_FOLLOW)
     assert not np.isin(history["mode"][:, untouched], touched_modes).any()
@@ -71,7 +66,6 @@ def test_noise_is_no_touch(method: str) -> None:
 
 def test_pins_that_listen_are_not_touched_by_the_noise_of_their_heights() -> None:
     history = run(scene("push_pull", [(0.0, 0, 0, 46), (1.0, 0, 0, 46)], 7, height_noise=50e-6)).history
-    assert history is not None
     assert not (history["mode"] == Mode.FORCE_FOLLOW).any()
 
 

@@ -38,14 +38,15 @@ def opening(dead_time: float, time: float) -> float:
     return value if time > last - 1e-12 else math.nan
 
 
-@pytest.mark.parametrize("step", [0.5e-3, 1e-3, 5e-3])
 @pytest.mark.parametrize("dead_time", DEAD_TIMES)
-def test_the_opening_follows_the_command_the_dead_time_later(dead_time: float, step: float) -> None:
-    system = one_cell(dead_time=dead_time, step=step, control=SCRIPT)
-    run = record(system, AWAY, len(COMMANDS))
-    analytic = [opening(dead_time, t) if t > dead_time else 0.0 for t in run.time]
-    # Rounding of some hundred exponentials; a dead time rounded to the step would be off by 0.1.
-    assert run.rows[:, system.cell.lag_rows.start, 0] == pytest.approx(analytic, abs=1e-12)
+def test_the_opening_follows_the_command_the_dead_time_later(dead_time: float) -> None:
+    for step in (0.5e-3, 5e-3):
+        system = one_cell(dead_time=dead_time, step=step, control=SCRIPT)
+        run = record(system, AWAY, len(COMMANDS))
+        analytic = [opening(dead_time, t) if t > dead_time else 0.0 for t in run.time]
+        # Rounding of some hundred exponentials; a dead time rounded to the step would be off by 0.1.
+        assert run.rows[:, system.cell.lag_rows.start, 0] == pytest.approx(analytic, abs=1e-12)
+        assert np.all(run.height[run.time <= dead_time] == 40e-3)  # nothing moves before
 
 
 @pytest.mark.parametrize(("stepper", "step"), [("bernoulli", 1e-3), ("runge_kutta_4", 0.25e-3)])
@@ -74,12 +75,6 @@ def test_a_step_that_holds_the_arrival_of_a_command_is_as_exact_as_short_ones(de
     long, short = (record(bed, AWAY, len(COMMANDS)).height[-1, 0] for bed in beds)
     # 10 nm; 2 µm without Gauss points on either side of the kink that the opening has there.
     assert long == pytest.approx(short, abs=0.05e-6)
-
-
-def test_nothing_moves_before_the_dead_time_is_over() -> None:
-    run = record(one_cell(dead_time=10e-3, control=scripted(lambda t, x, y: 1.0)), AWAY, 3)
-    assert run.height[:3].tolist() == [[40e-3]] * 3
-    assert run.height[3, 0] > 40e-3
 
 
 @pytest.mark.parametrize("dead_time", [*DEAD_TIMES, 15e-3])
@@ -131,11 +126,8 @@ def test_the_response_is_the_analytic_exponential_at_any_time(time: float, cut: 
         expected = command + (expected - command) * math.exp(-lasted / 2e-3)
     response = ValveLag().response(queue, [time])
     assert (response @ np.array([START, *commands]))[0] == pytest.approx(expected, abs=1e-15)  # rounding
-    # What is in all, opening and commands, comes out again.
+    # What is in all, opening and commands, comes out again; commands that are not due yet do not matter.
     assert response.sum() == pytest.approx(1.0, abs=1e-15)
-
-
-def test_commands_that_are_not_due_yet_do_not_matter() -> None:
     assert not ValveLag().response(split_delay(Delay(11.3e-3), PERIOD), [0.0, 2e-3, 5e-3])[:, 3:].any()
 
 
@@ -146,12 +138,10 @@ def test_the_rate_is_the_derivative_of_the_exact_opening() -> None:
     assert (moved - START) / 1e-9 == pytest.approx(rate, rel=1e-5, abs=1e-5)
 
 
-def test_a_valve_that_is_almost_shut_is_shut_and_lets_nothing_noticeable_through() -> None:
+def test_a_valve_that_is_almost_shut_is_shut() -> None:
     own = np.array([[0.9 * SHUT, -0.9 * SHUT, 1.1 * SHUT, -1.1 * SHUT]])
     ValveLag().settle(own)
     assert own[0].astype(bool).tolist() == [False, False, True, True]
-    # Flow goes with the square of the opening: in a session, less than the width of an atom's nucleus.
-    assert 24e-3 * SHUT**2 * 26.0 < 1e-15
 
 
 def test_without_lag_the_opening_is_the_command_and_jumps_at_the_cut() -> None:

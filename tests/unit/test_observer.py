@@ -101,11 +101,13 @@ PRESSED = slice(30, 68)  # the finger has caught up with the pin, which falls fr
 @pytest.mark.parametrize("sections", LINES)
 def test_the_force_on_a_pressed_moving_pin_is_found_to_three_millinewtons(sections: dict[str, Any]) -> None:
     true, read = watched(scene(**sections), down_and_up)
+    # At the default step too: the mean of a period is read whatever it is cut into.
+    _, coarse = watched(scene(**sections, simulation={}), down_and_up)
     known = well_open(down_and_up)
     assert np.ptp(true[known]) > 0.05, "hardly a force to be found"
     # The finger loads the pin by some 0.1 N in 100 ms: within a period the force changes by up to 10 mN,
     # and a mean weighted with the conductance lies off the middle by a part of that.
-    assert np.abs(read - half_way(true))[known].max() < 3e-3
+    assert np.abs(np.array([read, coarse]) - half_way(true))[:, known].max() < 3e-3
 
 
 def test_the_force_is_found_where_the_flow_is_turbulent() -> None:
@@ -115,22 +117,10 @@ def test_the_force_is_found_where_the_flow_is_turbulent() -> None:
     assert true[PRESSED].min() > 0.02, "the finger hardly presses"
     # The force's change within a period, as above; the flow's regime is settled to 0.1 mN.
     assert np.abs(read - half_way(true))[PRESSED].max() < 3e-3
-
-
-@pytest.mark.parametrize("sections", LINES)
-def test_at_the_default_step_the_exact_force_is_found_to_three_millinewtons(sections: dict[str, Any]) -> None:
-    exact, _ = watched(scene(**sections, simulation={"physics_step": 5e-4}), down_and_up)
-    _, read = watched(scene(**sections, simulation={}), down_and_up)
-    # As with steps of 1 ms: the mean of a period is read whatever it is cut into.
-    assert np.abs(read - half_way(exact))[well_open(down_and_up)].max() < 3e-3
-
-
-def test_at_the_default_step_a_reading_is_nearer_to_the_exact_force_than_the_run_itself() -> None:
-    exact, _ = watched(scene(FALL, **NARROW, simulation={"physics_step": 5e-4}), pulled_down, 75)
-    own, read = watched(scene(FALL, **NARROW, simulation={}), pulled_down, 75)
-    # 18 mN off at the ends of the steps, 5 mN in the means that are read: the valve's law is kept over
-    # the whole step, the force at its end is what the heights left of it.
-    assert np.abs(read - half_way(exact))[PRESSED].max() < 0.5 * np.abs(own - exact)[PRESSED].max()
+    # At the default step 18 mN off at the ends of the steps, 5 mN in the means that are read: the valve's law
+    # is kept over the whole step, the force at its end is what the heights left of it.
+    own, coarse = watched(scene(FALL, **NARROW, simulation={}), pulled_down, 75)
+    assert np.abs(coarse - half_way(true))[PRESSED].max() < 0.5 * np.abs(own - true)[PRESSED].max()
 
 
 @pytest.mark.parametrize(
@@ -138,12 +128,12 @@ def test_at_the_default_step_a_reading_is_nearer_to_the_exact_force_than_the_run
     # The simulation averages the flow over 1 ms steps, the observer over the period: 18 µN between them.
     [({}, 5e-5), ({"height_noise": 1e-6}, 0.0), ({"height_step": 5e-6}, 0.0)],
 )
-def test_an_unloaded_pin_reads_no_force(inexact: dict[str, float], most: float) -> None:
-    assert watched(scene(AWAY, sensors={"observer": "valve", **inexact}), down_and_up)[1].max() <= most
-
-
-def test_a_force_is_never_below_zero() -> None:
-    _, read = watched(scene(sensors={"observer": "valve", "height_noise": 1e-6}), down_and_up)
+def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(
+    inexact: dict[str, float], most: float
+) -> None:
+    sensors = {"observer": "valve", **inexact}
+    assert watched(scene(AWAY, sensors=sensors), down_and_up)[1].max() <= most
+    read = watched(scene(sensors=sensors), down_and_up)[1]
     assert read.min() == 0.0 < read.max()
 
 
@@ -173,30 +163,28 @@ def test_the_first_period_already_tells_the_force() -> None:
 def loading(flow: float, opening: float) -> float:
     """Return the force that a rise more or less by a height in a period makes at an opening, N."""
     cell = assemble(scene()).cell
-    return (
-        cell.actuator.area**2 * flow / (PERIOD * float(cell.flow.laminar_conductance(np.array([opening]))[0]))
-    )
+    conductance = float(cell.flow.laminar_conductance(np.array([opening]))[0])
+    return cell.actuator.area**2 * flow / (PERIOD * conductance)
 
 
-def test_a_coarse_height_costs_no_more_than_a_step_of_flow() -> None:
-    exact = watched(scene(), down_and_up)[1]
-    coarse = watched(scene(sensors={"observer": "valve", "height_step": 1e-6}), down_and_up)[1]
+def test_a_coarse_height_costs_no_more_than_a_step_of_flow_and_late_readings_are_those_of_before() -> None:
+    def read(**inexact: float) -> Floats:
+        return watched(scene(sensors={"observer": "valve", **inexact}), down_and_up)[1]
+
+    exact, known = read(), well_open(down_and_up, least=0.4)
     # Two heights, each half a step off, in one period.
-    error = np.abs(coarse - exact)[well_open(down_and_up, least=0.4)]
+    error = np.abs(read(height_step=1e-6) - exact)[known]
     assert 0.05 * loading(1e-6, 0.4) < error.max() <= loading(1e-6, 0.4)
+    np.testing.assert_array_equal(read(delay=3)[3:], exact[:-3])
 
 
 def test_noise_of_the_heights_is_noise_of_two_readings() -> None:
-    exact = watched(scene(), lambda period: 0.4)[1]
-    noisy = watched(scene(sensors={"observer": "valve", "height_noise": 1e-7}), lambda period: 0.4)[1]
+    exact, noisy = (
+        watched(scene(sensors={"observer": "valve", "height_noise": noise}), lambda period: 0.4)[1]
+        for noise in (0.0, 1e-7)
+    )
     # Some hundred readings: their standard deviation is known to 7 %, and neighbors share a height.
     assert abs(np.std((noisy - exact)[10:]) / (math.sqrt(2.0) * loading(1e-7, 0.4)) - 1.0) < 0.3
-
-
-def test_late_readings_are_the_estimates_of_before() -> None:
-    prompt = watched(scene(), down_and_up)[1]
-    late = watched(scene(sensors={"observer": "valve", "delay": 3}), down_and_up)[1]
-    np.testing.assert_array_equal(late[3:], prompt[:-3])
 
 
 @pytest.mark.parametrize("gap", [(13,), (13, 14, 15, 16, 17)])
@@ -222,6 +210,5 @@ def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_
 def test_a_bed_at_rest_does_not_feel_the_finger() -> None:
     # Its valves are shut, and stay shut: there is nothing to tell the force from.
     history = run(resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})).history
-    assert history is not None
     assert history["total_force"].max() > 1.0
     assert np.ptp(history["height"]) == 0.0

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.model.actuator import Supply
 from digiclay.core.model.conduit import Conduit, OrificeAndConduit, connect_in_series
 from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.valve import Fluid, Orifice, Valve, make_orifice
@@ -30,11 +29,6 @@ def critical(valve: Valve, fluid: Fluid, opening: Any) -> Any:
     """Return ΔP_crit of equation 6, as corrected, from its exact constant 32e12/81."""
     top = 32e12 / 81.0 * fluid.density * fluid.viscosity**2 * valve.stroke**2
     return top / (math.pi**2 * opening**2 * valve.orifice_diameter**4)
-
-
-def coefficient(valve: Valve, fluid: Fluid, flow: np.ndarray, drop: np.ndarray) -> np.ndarray:
-    """Return C_q by its definition, equation 3."""
-    return 4.0 * flow / (math.pi * valve.orifice_diameter**2) * np.sqrt(fluid.density / (2.0 * drop))
 
 
 def test_the_default_valve_stays_laminar_between_the_reservoirs_and_a_wide_one_does_not() -> None:
@@ -127,22 +121,15 @@ def test_a_conduit_without_length_changes_nothing_and_behind_a_wide_valve_it_is_
     assert wide.flow(np.ones(3), drop) * wide.resistance == pytest.approx(drop, rel=1e-6)
 
 
-def test_the_sign_of_the_opening_picks_the_reservoir() -> None:
-    openings = np.array([1e-12, 1.0, -1e-12, -1.0])
-    assert Supply().pressure(openings).tolist() == [0.5e5, 0.5e5, -0.5e5, -0.5e5]
-
-
-def speed_under(force: float, opening: float) -> float:
-    """Return how fast a cell moves whose finger presses with `force`, m/s."""
-    cell = one_cell(valve_lag=None, relaxation=None).cell
-    contact = cell.touch.contact
-    depth = np.log1p(force / contact.share * contact.exponent / contact.stiffness) / contact.exponent
-    y, under = np.array([[50e-3]]), np.array([50e-3 - depth])
-    return float(compute_rates(cell, y, under, np.array([opening]))[0, 0])
-
-
 def test_the_drop_between_reservoir_and_load_moves_the_pin() -> None:
-    lift = 0.5e5 * np.pi * 1e-6  # P_s A_a = 0.157 N
+    cell = one_cell(valve_lag=None, relaxation=None).cell
+    contact, lift = cell.touch.contact, 0.5e5 * np.pi * 1e-6  # P_s A_a = 0.157 N
+
+    def speed_under(force: float, opening: float) -> float:
+        depth = np.log1p(force / contact.share * contact.exponent / contact.stiffness) / contact.exponent
+        y, under = np.array([[50e-3]]), np.array([50e-3 - depth])
+        return float(compute_rates(cell, y, under, np.array([opening]))[0, 0])
+
     assert speed_under(1.5 * lift, 1.0) < 0.0
     # Twice the balance force turns ΔP = P_s - F/A_a into its opposite; the laminar flow with it. Rounding.
     assert speed_under(2.0 * lift, 1.0) == pytest.approx(-speed_under(0.0, 1.0), rel=1e-9)
