@@ -207,6 +207,14 @@ def sample(name: str, *settings: str) -> Scene:
     return load(find(name), [Setting(*setting.split("=")) for setting in settings])
 
 
+def beginning(name: str, lasting: float, stepper: str, step: float, *settings: str) -> Scene:
+    """Return at most the first seconds of a sample scene, with a stepper and a physics step, s."""
+    stepped = (f"simulation.stepper={stepper}", f"simulation.physics_step={step}")
+    scene = sample(name, *stepped, *settings)
+    duration = min(scene.simulation.duration, lasting)
+    return replace(scene, simulation=replace(scene.simulation, duration=duration))
+
+
 def moved(known: Scene, x: float, z: float, lasting: float | None = None) -> Scene:
     """Return a scene whose finger takes the same way elsewhere, m, and that lasts so long, s."""
     points = tuple(
