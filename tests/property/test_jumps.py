@@ -28,9 +28,11 @@ from tests.assemble import Motion, Record, make_system, one_cell, path, record, 
 Floats = NDArray[np.float64]
 
 PERIODS = (1e-3, 5e-3, 20e-3, 50e-3)
+STEPPERS = st.sampled_from(["bernoulli", "richardson"])
 #: Millimeters from where the finger stood: a little, the width of the bed, far beyond it.
 far = st.one_of(st.integers(-5, 5), st.integers(-100, 100), st.sampled_from([-1000, 0, 1000])).map(float)
 deep = st.one_of(st.integers(-8, 4), st.integers(-100, 100), st.sampled_from([-1000, 1000])).map(float)
+straight = st.just(0.0)
 #: Milliseconds until the next place, and the place.
 jumps = st.lists(st.tuples(st.sampled_from([1, 5, 20, 50]), far, far, deep), min_size=3, max_size=6)
 turns = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
@@ -114,17 +116,13 @@ def assert_withstands(
 
 
 @settings(max_examples=50)
-@given(jumps, turns, beds, parts, st.sampled_from(PERIODS), st.sampled_from(["bernoulli", "richardson"]))
+@given(jumps, turns, beds, parts, st.sampled_from(PERIODS), STEPPERS)
 @example(SIDEWAYS, LEVEL, Layout(13, 13), {}, 5e-3, "bernoulli")
 @example(DOWN, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
 def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
-    spots: list[Spot],
-    turn: tuple[float, ...],
-    bed: Layout,
-    changes: dict[str, object],
-    period: float,
+    spots: list[Spot], turn: tuple[float, ...], bed: Layout, changes: dict[str, object], period: float,
     stepper: str,
-) -> None:
+) -> None:  # fmt: skip
     assert_withstands(bed, spots, turn, period, stepper, **changes)
 
 
@@ -137,7 +135,7 @@ def test_the_adaptive_stepper_withstands_jumps(
 
 
 @settings(max_examples=10)
-@given(st.lists(jumps, min_size=2, max_size=3), st.sampled_from(["bernoulli", "richardson"]))
+@given(st.lists(jumps, min_size=2, max_size=3), STEPPERS)
 @example([SIDEWAYS, DOWN], "bernoulli")
 def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> None:
     # Each run with a pulp of its own; all valves of the last one shut.
@@ -157,13 +155,9 @@ def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> No
 
 @settings(max_examples=30)
 @given(
-    st.lists(
-        st.tuples(st.sampled_from([1, 5, 20]), st.just(0.0), st.just(0.0), deep), min_size=3, max_size=5
-    ),
-    st.floats(-1.0, 1.0),
-    st.integers(0, 8),
-    st.sampled_from([1.6e-6, 1.6e-9]),
-)
+    st.lists(st.tuples(st.sampled_from([1, 5, 20]), straight, straight, deep), min_size=3, max_size=5),
+    st.floats(-1.0, 1.0), st.integers(0, 8), st.sampled_from([1.6e-6, 1.6e-9]),
+)  # fmt: skip
 def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
     spots: list[Spot], opening: float, smaller: int, viscosity: float
 ) -> None:
@@ -176,9 +170,8 @@ def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
     finger, cell = way(spots), system.cell
     run = jumped(system, finger)
     for i, start in enumerate(run.time[:-1]):
-        low = under(
-            cell.touch.fingertip.outline(finger.poses(start + system.instants)), system.grid.x, system.grid.y
-        )
+        outline = cell.touch.fingertip.outline(finger.poses(start + system.instants))
+        low = under(outline, system.grid.x, system.grid.y)
         k = np.array([opening])
         free = cell.flow.flow(k, cell.supply.pressure(k))[0] * 5e-3 / cell.actuator.area
         deepest = run.height[i] + max(free, 0.0) - low.min()
@@ -194,11 +187,7 @@ above = st.tuples(st.sampled_from([1, 5, 20, 50]), far, far, st.integers(1, 20).
 
 
 @settings(max_examples=25)
-@given(
-    st.lists(above, min_size=2, max_size=4),
-    st.sampled_from(PERIODS),
-    st.sampled_from(["bernoulli", "richardson"]),
-)
+@given(st.lists(above, min_size=2, max_size=4), st.sampled_from(PERIODS), STEPPERS)
 @example([(5, 0.0, 0.0, 6.0), (5, -30.0, 0.0, 4.0)], 5e-3, "bernoulli")
 def test_a_finger_that_passes_above_all_pins_leaves_nothing_behind(
     spots: list[Spot], period: float, stepper: str

@@ -69,15 +69,9 @@ def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: Frame) -> None:
     assert next(iter(told.items())) == ("flags", [2**40, frame.flags]) == ("flags", [2**40, read.flags])
     assert said["flags"] == [flag.name.lower() for flag in Flag if frame.flags & flag]
     state = told["state"]
-    for found in (
-        (read.period, read.number, read.time, read.total_force, *read.pose),
-        (
-            *(said[name] for name in ("period", "number", "time", "total_force")),
-            *said["position"],
-            *said["orientation"],
-        ),
-        tuple(state),
-    ):
+    scalars = [said[name] for name in ("period", "number", "time", "total_force")]
+    plain = (*scalars, *said["position"], *said["orientation"])
+    for found in ((read.period, read.number, read.time, read.total_force, *read.pose), plain, tuple(state)):
         assert found == (2**40, 2**32 - 1, 12.5, 0.75, *frame.pose)
     np.testing.assert_array_equal(read.heights, frame.heights)
     np.testing.assert_array_equal(read.forces, frame.forces)
@@ -85,35 +79,27 @@ def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: Frame) -> None:
     np.testing.assert_array_equal(np.frombuffer(told["forces"][1], ">f4"), frame.forces)
 
 
-@given(st.one_of(st.binary(max_size=100), st.binary(max_size=80).map(lambda end: b"DC\1\2" + end)))
-def test_any_bytes_are_a_request_or_refused_in_one_line(data: bytes) -> None:
-    said = [refusal(read, data) for read in (read_binary, read_osc, unpack_frame)]
-    assert not any("\n" in one for one in said)
-
-
-scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
+leaves = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
 anything: Any = st.recursive(
-    scalars, lambda some: st.lists(some, max_size=8) | st.dictionaries(st.text(max_size=5), some, max_size=3)
+    leaves, lambda some: st.lists(some, max_size=8) | st.dictionaries(st.text(max_size=5), some, max_size=3)
 )
 keys = st.sampled_from(["type", "version", "position", "orientation", "number", "x"])
 
 
-@given(st.one_of(st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)))
-def test_any_text_is_a_request_or_refused_in_one_line(text: str) -> None:
-    assert "\n" not in refusal(read_json, text)
+@given(
+    st.one_of(st.binary(max_size=100), st.binary(max_size=80).map(lambda end: b"DC\1\2" + end)),
+    st.one_of(st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)),
+)
+def test_any_bytes_text_or_address_is_a_request_or_refused_in_one_line(data: bytes, text: str) -> None:
+    said = [refusal(read, data) for read in (read_binary, read_osc, unpack_frame)]
+    said += [refusal(read_json, text)]
+    said += [refusal(check_rate, address) for address in (text, f"/?{text}", f"/?rate={text}")]
+    assert not any("\n" in one for one in said)
 
 
-@given(st.text(max_size=20))
-def test_any_address_is_read_or_refused_in_one_line(query: str) -> None:
-    for address in (query, f"/?{query}", f"/?rate={query}"):
-        try:
-            wishes = read_wishes(address)
-        except DigiclayError as error:
-            said = str(error)
-        else:
-            said = ""
-            assert 0.0 <= wishes.rate <= 1000.0
-        assert "\n" not in said
+def check_rate(address: str) -> None:
+    """Check the rate that an address asks for."""
+    assert 0.0 <= read_wishes(address).rate <= 1000.0
 
 
 @pytest.mark.skipif("sys.platform == 'win32'", reason="the example is for Linux and macOS")

@@ -14,7 +14,7 @@ from digiclay.core.model.valve import Fluid, Valve
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tests.assemble import Record, make_system, one_cell, record, scripted, under, whole
+from tests.assemble import make_system, one_cell, record, scripted, under, whole
 
 COUNT = 80
 CELLS = Layout(7, 7, arrangement="staggered")
@@ -44,11 +44,6 @@ def bed(stepper: str = "bernoulli", **parts: object) -> System:
     return make_system(CELLS, stepper=stepper, step=0.25e-3 if stepper != "bernoulli" else 1e-3, **parts)
 
 
-def shaped(spots: list[tuple[float, float, float]], **parts: object) -> Record:
-    """Return a session under Method I."""
-    return record(bed(control=VirtualMaster(), **parts), finger(spots), COUNT)
-
-
 @settings(max_examples=16)
 @given(points, turns, st.floats(0.0, 100.0), steppers)
 @example([(0.0, 0.0, 45.0), (0.0, 0.0, 36.0), (9.0, 3.0, 38.0)], (0.0, 0.0, 0.0), 40.0, "runge_kutta_4")
@@ -72,21 +67,6 @@ def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are
     assert near.max(initial=0.0) <= max(run.last.active.peak, run.last.peak)
 
 
-@settings(max_examples=12)
-@given(points)
-def test_a_bed_without_control_does_not_move(spots: list[tuple[float, float, float]]) -> None:
-    run = record(bed(), finger(spots), COUNT)
-    assert np.all(run.height == 40e-3)
-
-
-@settings(max_examples=10)
-@given(points)
-def test_the_same_session_twice_is_the_same_bit_for_bit(spots: list[tuple[float, float, float]]) -> None:
-    first, second = shaped(spots), shaped(spots)
-    assert np.array_equal(first.rows, second.rows)
-    assert first.memory == second.memory
-
-
 @settings(max_examples=10)
 @given(points, st.integers(0, COUNT - 1))
 def test_a_step_leaves_the_state_it_was_given_as_it_was(
@@ -106,13 +86,15 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was(
 
 @settings(max_examples=10)
 @given(points, st.integers(1, COUNT - 1))
-def test_a_session_interrupted_and_gone_on_with_is_the_whole_session(
+def test_a_session_twice_or_interrupted_is_the_same_session_bit_for_bit(
     spots: list[tuple[float, float, float]], when: int
 ) -> None:
     system, path = bed(control=VirtualMaster()), finger(spots)
-    whole = record(system, path, COUNT)
-    rest = record(system, path, COUNT - when, record(system, path, when).last)
+    whole, first = record(system, path, COUNT), record(system, path, when)
+    assert np.array_equal(first.rows, whole.rows[: when + 1])  # the same twice, bit for bit
+    rest = record(system, path, COUNT - when, first.last)
     assert np.array_equal(rest.rows, whole.rows[when:])
+    assert rest.memory == whole.memory[when:]
 
 
 commands = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)

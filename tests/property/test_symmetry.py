@@ -27,14 +27,8 @@ WAYPOINTS = np.array(
 COUNT = 260
 
 
-def mirrored_x(points: Floats) -> Floats:
-    """Return waypoints seen in a mirror across x."""
-    return points * np.array([1, -1, 1, 1, 1, 1, -1, -1])
-
-
-def mirrored_y(points: Floats) -> Floats:
-    """Return waypoints seen in a mirror across y."""
-    return points * np.array([1, 1, -1, 1, 1, -1, 1, -1])
+#: What a mirror across x, or across y, makes of a waypoint.
+MIRRORED_X, MIRRORED_Y = np.array([1, -1, 1, 1, 1, 1, -1, -1]), np.array([1, 1, -1, 1, 1, -1, 1, -1])
 
 
 def turned(points: Floats) -> Floats:
@@ -46,18 +40,19 @@ def turned(points: Floats) -> Floats:
     return np.column_stack([t, -y, x, z, *turn])
 
 
-def turned_over(points: Floats) -> Floats:
-    """Return waypoints turned by 180 degrees about z."""
-    return turned(turned(points))
-
-
 #: Name: arrangement, shape of the bed, what is done to the path, and to rows and columns of cells.
 CASES: dict[str, tuple[str, tuple[int, int], Callable[[Floats], Floats], Callable[[Floats], Floats]]] = {
-    "mirrored": ("aligned", (9, 12), mirrored_x, lambda h: h[:, :, ::-1]),
+    "mirrored": ("aligned", (9, 12), lambda p: p * MIRRORED_X, lambda h: h[:, :, ::-1]),
+    "mirrored, odd": ("aligned", (11, 11), lambda p: p * MIRRORED_X, lambda h: h[:, :, ::-1]),
     "rotated by 90": ("aligned", (11, 11), turned, lambda h: h.transpose(0, 2, 1)[:, :, ::-1]),
-    "rotated by 180": ("aligned", (9, 12), turned_over, lambda h: h[:, ::-1, ::-1]),
-    "hexagonal, mirrored": ("hexagonal", (11, 12), mirrored_y, lambda h: h[:, ::-1, :]),
-    "staggered, rotated by 180": ("staggered", (10, 12), turned_over, lambda h: h[:, ::-1, ::-1]),
+    "rotated by 180": ("aligned", (9, 12), lambda p: turned(turned(p)), lambda h: h[:, ::-1, ::-1]),
+    "hexagonal, mirrored": ("hexagonal", (11, 12), lambda p: p * MIRRORED_Y, lambda h: h[:, ::-1, :]),
+    "staggered, rotated by 180": (
+        "staggered",
+        (10, 12),
+        lambda p: turned(turned(p)),
+        lambda h: h[:, ::-1, ::-1],
+    ),
 }
 
 
@@ -71,20 +66,19 @@ def formed(arrangement: str, shape: tuple[int, int], points: Floats, profile: st
 
 
 @pytest.mark.parametrize("profile", ["cone", "gaussian"])
-@pytest.mark.parametrize("case", CASES)
-def test_a_moved_scene_gives_the_moved_result(case: str, profile: str) -> None:
+@pytest.mark.parametrize(
+    ("case", "points"),
+    [
+        *((case, WAYPOINTS) for case in CASES if case != "mirrored, odd"),
+        # A press on a cell in the middle: cells lie exactly on the circles of the control here.
+        ("mirrored, odd", WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0]),
+    ],
+)
+def test_a_moved_scene_gives_the_moved_result(case: str, points: Floats, profile: str) -> None:
     arrangement, shape, points_moved, cells_moved = CASES[case]
-    height, force = formed(arrangement, shape, WAYPOINTS, profile)
-    moved_height, moved_force = formed(arrangement, shape, points_moved(WAYPOINTS), profile)
-    assert np.ptp(height[-1]) > 2e-3
+    height, force = formed(arrangement, shape, points, profile)
+    moved_height, moved_force = formed(arrangement, shape, points_moved(points), profile)
+    assert np.ptp(height[-1]) > 1e-3
     # Rounding of positions, 1e-17 m, through 260 periods of a closed loop; forces grow e-fold in 0.5 mm.
     assert np.abs(moved_height - cells_moved(height)).max() < 1e-12
     assert np.abs(moved_force - cells_moved(force)).max() < 1e-10
-
-
-@pytest.mark.parametrize("profile", ["cone", "gaussian"])
-def test_a_press_on_a_cell_forms_the_same_on_the_left_and_on_the_right(profile: str) -> None:
-    points = WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0]
-    height, _ = formed("aligned", (11, 11), points, profile)
-    # Rounding, as above. Cells lie exactly on the circles of the control here.
-    assert np.abs(height - height[:, :, ::-1]).max() < 1e-12
