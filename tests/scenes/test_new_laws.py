@@ -96,7 +96,6 @@ from digiclay.core.session.run_scene import run
 from digiclay.settings.groups import GROUPS
 
 def scene(*settings):
-    settings = (*settings, "simulation.duration=0.3")
     return load(find("tap"), [Setting(*one.split("=")) for one in settings])
 
 def height(scene):

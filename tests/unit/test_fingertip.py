@@ -51,6 +51,9 @@ def test_the_underside_is_where_a_vertical_ray_meets_the_ellipsoid(axes: np.ndar
             x, y = within(outline, square, RANDOM.uniform(0, 2 * np.pi, 3))
             rays = [cut(pose, axes, *point) for point in zip(x, y, strict=True)]
             assert under(outline[None], x, y)[0] == pytest.approx(rays, abs=1e-14)  # rounding of 0.1 m
+    # Opposite quaternions are the same finger.
+    assert np.array_equal(finger.outline(poses), finger.outline(poses * [1, 1, 1, -1, -1, -1, -1]))
+    assert np.isfinite(under(finger.outline(poses), np.array([1.0, -100.0]), np.array([0.0, 100.0]))).all()
 
 
 def test_the_position_is_the_lowest_point_of_the_underside() -> None:
@@ -61,19 +64,6 @@ def test_the_position_is_the_lowest_point_of_the_underside() -> None:
         assert under(outline[None], pose[:1], pose[1:2])[0, 0] == pytest.approx(pose[2], abs=1e-15)
     center = Fingertip().outline(np.array([[1e-3, 2e-3, 50e-3, *LEVEL]]))[0, :3]
     assert center == pytest.approx([1e-3, 2e-3, 58e-3], abs=1e-17)
-
-
-def test_a_finger_turned_about_the_vertical_swaps_length_and_width() -> None:
-    half = np.sqrt(0.5)
-    outlines = Fingertip().outline(np.array([[0, 0, 0, *LEVEL], [0, 0, 0, half, 0, 0, half]]))
-    along, across = np.array([7e-3]), np.array([0.0])
-    level, turned = under(outlines[:1], along, across), under(outlines[1:], across, along)
-    assert level[0] == pytest.approx(turned[0], abs=1e-17)  # rounding of sqrt(1/2)
-
-
-def test_opposite_quaternions_are_the_same_finger() -> None:
-    poses = random_poses(5)
-    assert np.array_equal(Fingertip().outline(poses), Fingertip().outline(poses * [1, 1, 1, -1, -1, -1, -1]))
 
 
 def test_height_and_slope_are_continuous_at_the_join_and_beyond_it_the_underside_rises_on() -> None:
@@ -90,8 +80,3 @@ def test_height_and_slope_are_continuous_at_the_join_and_beyond_it_the_underside
         dx, dy = x - outline[0], y - outline[1]
         rays = [under(outline[None], outline[0] + s * dx, outline[1] + s * dy)[0] for s in (1.5, 2, 3, 5)]
         assert np.diff(rays, axis=0).min() > 0.0
-
-
-def test_the_underside_is_finite_far_away() -> None:
-    outlines = Fingertip().outline(random_poses(5))
-    assert np.isfinite(under(outlines, np.array([1.0, -100.0]), np.array([0.0, 100.0]))).all()

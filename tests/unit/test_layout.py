@@ -29,17 +29,6 @@ def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, i
     assert positions.min(axis=0) + positions.max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-16)
 
 
-def test_inner_cells_of_a_hexagonal_bed_have_six_neighbors_a_pitch_away() -> None:
-    positions = make_grid(Layout(5, 5, 3e-3, "hexagonal")).positions
-    away = np.linalg.norm(positions - positions[12], axis=1)
-    assert np.isclose(away, 3e-3, rtol=1e-12).sum() == 6
-
-
-def test_the_default_bed_is_72_mm_wide() -> None:
-    bed = make_grid(Layout())
-    assert (bed.count, bed.x.max(), bed.y.max()) == (625, pytest.approx(36e-3), pytest.approx(36e-3))
-
-
 @pytest.mark.parametrize(
     ("disc", "cells"),
     [

@@ -28,57 +28,40 @@ def path(times: Any, positions: Any = None, turns: Any = None, interpolation: st
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("part", "given", "said"),
     [
-        (lambda: Fingertip(width=0.0), "Fingertip.width must be above 0 m (got 0 m)."),
-        (lambda: Layout(rows=0), "Layout.rows must be at least 1 (got 0)."),
+        (Fingertip, {"width": 0.0}, "width must be above 0 m (got 0 m)."),
+        (Layout, {"rows": 0}, "rows must be at least 1 (got 0)."),
+        (Layout, {"rows": 10_000, "columns": 10_000}, "rows * columns must have at most 20 million"),
+        (Actuator, {"rest_height": 0.2}, "rest_height must be at most the stroke, 0.1 m (got 0.2"),
+        (Contact, {"exponent": 0.0}, "exponent must be above 0 1/m (got 0 1/m)."),
+        (Delay, {"dead_time": -1e-3}, "dead_time must be at least 0 s (got -0.001 s)."),
+        (Valve, {"orifice_diameter": -3e-4}, "orifice_diameter must be above 0 m (got -0.0003 m)."),
+        (Valve, {"gap": "slit"}, "gap must be one of stroke, opening (got 'slit')."),
+        (Supply, {"high": -6e4}, "high must be above Supply.low (got -60000 Pa, low -50000 Pa)."),
+        (Supply, {"high": -5e4}, "high must be above Supply.low (got -50000 Pa"),
+        (Relaxation, {"weights": (0.0,) * 4}, "weights must not all be 0"),
+        (Relaxation, {"times": (0.0, 0.07, 1.4)}, "times must be at least 1e-09 s (got 0 s)."),
+        (Relaxation, {"weights": (1.0,)}, "weights must have one value more than times, 4 (got 1)."),
+        (Relaxation, {"weights": (1.0,) * 3}, "weights must have one value more than times, 4 (got 3)."),
+        (Relaxation, {"weights": (1.0,) * 5}, "weights must have one value more than times, 4 (got 5)."),
+        (Sensing, {"observer": "valve", "force_noise": 1e-3}, "force_noise must be 0 N with observer"),
+        (Sensing, {"observer": "valve", "force_step": 1e-3}, "force_step must be 0 N with observer"),
+        (path, {"times": [0.0, 1.0, 1.0]}, "times must increase from waypoint to waypoint (got "),
+        (path, {"times": [0.0, 1.0, 1.0 + 1e-12]}, "times must increase from waypoint to waypoint by"),
+        (path, {"times": []}, "waypoints must have at least one waypoint"),
         (
-            lambda: Layout(rows=10_000, columns=10_000),
-            "Layout.rows * columns must have at most 20 million",
+            path, {"times": [0.0, 1.0], "positions": [[0, 0, 0], [0, np.nan, 0]]},
+            "positions must be finite numbers (got nan at waypoint 2).",
         ),
+        (path, {"times": [0.0], "turns": np.zeros((1, 4))}, "orientations must have a length above 0"),
         (
-            lambda: Actuator(rest_height=0.2),
-            "Actuator.rest_height must be at most the stroke, 0.1 m (got 0.2",
-        ),
-        (lambda: Contact(exponent=0.0), "Contact.exponent must be above 0 1/m (got 0 1/m)."),
-        (lambda: Delay(-1e-3), "Delay.dead_time must be at least 0 s (got -0.001 s)."),
-        (lambda: Valve(orifice_diameter=-3e-4), "Valve.orifice_diameter must be above 0 m (got -0.0003 m)."),
-        (lambda: Valve(gap="slit"), "Valve.gap must be one of stroke, opening (got 'slit')."),
-        (lambda: Supply(high=-6e4), "Supply.high must be above Supply.low (got -60000 Pa, low -50000 Pa)."),
-        (lambda: Supply(high=-5e4), "Supply.high must be above Supply.low (got -50000 Pa"),
-        (lambda: Relaxation(weights=(0.0,) * 4), "Relaxation.weights must not all be 0"),
-        (lambda: Relaxation(times=(0.0, 0.07, 1.4)), "Relaxation.times must be at least 1e-09 s (got 0 s)."),
-        *(
-            (
-                lambda count=count: Relaxation(weights=(1.0,) * count),
-                f"Relaxation.weights must have one value more than times, 4 (got {count}).",
-            )
-            for count in (1, 3, 5)
-        ),
-        *(
-            (
-                lambda name=name: Sensing(observer="valve", **{name: 1e-3}),
-                f"Sensing.{name} must be 0 N with observer = 'valve'",
-            )
-            for name in ("force_noise", "force_step")
-        ),
-        (lambda: path([0.0, 1.0, 1.0]), "Trajectory.times must increase from waypoint to waypoint (got "),
-        (
-            lambda: path([0.0, 1.0, 1.0 + 1e-12]),
-            "Trajectory.times must increase from waypoint to waypoint by",
-        ),
-        (lambda: path([]), "Trajectory.waypoints must have at least one waypoint"),
-        (
-            lambda: path([0.0, 1.0], [[0, 0, 0], [0, np.nan, 0]]),
-            "Trajectory.positions must be finite numbers (got nan at waypoint 2).",
-        ),
-        (lambda: path([0.0], turns=np.zeros((1, 4))), "Trajectory.orientations must have a length above 0"),
-        (
-            lambda: path([0.0], interpolation="cubic"),
-            "Trajectory.interpolation must be one of smooth, linear (got 'cubic').",
+            path, {"times": [0.0], "interpolation": "cubic"},
+            "interpolation must be one of smooth, linear (got 'cubic').",
         ),
     ],
-)
-def test_what_no_part_can_have_is_refused_with_the_rule(make: Any, said: str) -> None:
-    with pytest.raises(ParameterError, match="^" + re.escape(said)):
-        make()
+)  # fmt: skip
+def test_what_no_part_can_have_is_refused_with_the_rule(part: Any, given: dict[str, Any], said: str) -> None:
+    name = "Trajectory" if part is path else part.__name__
+    with pytest.raises(ParameterError, match="^" + re.escape(f"{name}.{said}")):
+        part(**given)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.engine.state import Rows, State, make_initial_state
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.state import Rows
 from digiclay.core.model.layout import Layout
 
-from tests.assemble import AWAY, make_system, one_cell, path, record
+from tests.assemble import make_system, one_cell, path, record
 
 
 @pytest.mark.parametrize("owners", [(1, 1), (5, 2), (4, 7), (5, 2, 3, 1)])
@@ -23,29 +23,13 @@ def test_every_row_has_one_owner(owners: tuple[int, ...]) -> None:
     assert rows.command == all_rows[rows.commands][-1]
 
 
-def test_at_rest_every_pin_is_at_its_target_every_valve_shut_and_nothing_moves() -> None:
-    rows = Rows(5, 2)
-    state = make_initial_state(rows, 4, 40e-3, None)
-    assert np.all(state.rows[[0, rows.target]] == 40e-3)
-    assert not np.delete(state.rows, [0, rows.target], axis=0).any()
-    assert (state.active.cells.size, state.mode().tolist()) == (0, [Mode.REST] * 4)
-
-
-@pytest.fixture(scope="module")
-def pressed() -> State:
-    """Return a state with active cells."""
+def test_a_copy_a_row_and_the_modes_share_no_array_with_a_state_that_has_active_cells() -> None:
     system = make_system(Layout(9, 9), control=VirtualMaster())
-    return record(system, path((0, 0, 0, 41), (0.2, 0, 0, 37)), 40).last
-
-
-def test_a_copy_shares_no_array_that_a_step_changes(pressed: State) -> None:
+    pressed = record(system, path((0, 0, 0, 41), (0.2, 0, 0, 37)), 40).last
     copy = pressed.copy()
     pairs = [(getattr(pressed, name), getattr(copy, name)) for name in ("rows", "modes", "aged")]
     pairs += [(getattr(pressed.active, name), getattr(copy.active, name)) for name in ("block", "mode")]
     assert [np.shares_memory(*pair) for pair in pairs] == [False] * 5
-
-
-def test_a_row_and_the_modes_are_new_arrays_with_the_active_cells_own_values(pressed: State) -> None:
     cells = pressed.active.cells
     assert cells.size
     assert np.array_equal(pressed.row(0)[cells], pressed.active.block[0])
@@ -60,11 +44,12 @@ def test_a_row_and_the_modes_are_new_arrays_with_the_active_cells_own_values(pre
 )
 def test_a_part_that_is_left_out_owns_no_row(absent: tuple[str, ...], rows: int) -> None:
     system = one_cell(dead_time=0.0, **dict.fromkeys(filter(None, absent)))
-    assert begin(system).rows.shape[0] == rows + 3  # command, target, force
-
-
-def test_as_many_periods_are_simulated_as_asked() -> None:
-    assert [state.period for state in periods(one_cell(), [AWAY], begin(one_cell()), 600)][-1] == 600
+    start = begin(system)
+    assert start.rows.shape[0] == rows + 3  # command, target, force
+    # At rest every pin is at its target, and every valve is shut.
+    assert (start.rows[[0, system.rows.target]] == 40e-3).all()
+    assert not np.delete(start.rows, [0, system.rows.target], axis=0).any()
+    assert (start.active.cells.size, start.mode().tolist()) == (0, [Mode.REST])
 
 
 @pytest.mark.parametrize(

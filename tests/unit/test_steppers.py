@@ -46,10 +46,13 @@ def put(
     return driven[0], force
 
 
-def test_a_cell_thrown_off_is_given_up_and_the_others_are_moved_on_to_the_end() -> None:
+def test_a_cell_thrown_off_is_given_up_the_others_are_moved_on_and_the_force_is_that_of_the_end() -> None:
     alone = {"step": 1e-3, "fingertip": None, "contact": None}
     height, _ = put(Setter(None, (10.0, 1e-3)), [], [0.04, 0.04], **alone)
     np.testing.assert_allclose(height, [np.inf, 0.045], rtol=1e-12)
+    # 1 mm deep at the end of the period: f_d b/m (e^(m x) - 1), and no contact at the start.
+    _, force = put(Setter(39e-3), [[41e-3], [38e-3]], [40e-3], step=5e-3)
+    assert force[0] == pytest.approx(0.34 * 250.0 / 2000.0 * np.expm1(2.0), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -67,12 +70,6 @@ def test_a_pin_is_given_up_where_neither_finger_nor_valve_can_take_it(
     height: float, under: float, start: float, left: float
 ) -> None:
     assert put(Setter(height), [[41e-3], [under]], [start], step=5e-3)[0] == left
-
-
-def test_the_force_is_that_of_the_finger_at_the_end_of_the_period() -> None:
-    _, force = put(Setter(39e-3), [[41e-3], [38e-3]], [40e-3], step=5e-3)
-    # 1 mm deep at the end: f_d b/m (e^(m x) - 1), and no contact at the start.
-    assert force[0] == pytest.approx(0.34 * 250.0 / 2000.0 * np.expm1(2.0), rel=1e-9)
 
 
 CELL = make_system().cell

@@ -28,6 +28,9 @@ def test_the_path_passes_its_waypoints_and_stays_between_them(path: Trajectory) 
         assert np.all(poses[:, :3] >= ends.min(axis=0) - 1e-16)  # rounding
         assert np.all(poses[:, :3] <= ends.max(axis=0) + 1e-16)
         assert np.linalg.norm(poses[:, 3:], axis=1) == pytest.approx(1.0, abs=1e-15)
+    if path is LINEAR:
+        middle = path.poses(0.5 * (TIMES[1:] + TIMES[:-1]))[:, :3]
+        assert middle == pytest.approx(0.5 * (POSITIONS[1:] + POSITIONS[:-1]), abs=1e-16)
     before_and_after = path.poses(np.array([-5.0, 1e9]))
     assert before_and_after[:, :3] == pytest.approx(POSITIONS[[0, -1]], abs=1e-17)
 
@@ -56,11 +59,6 @@ def test_the_smooth_path_of_few_waypoints(
     assert poses[:, 2] == pytest.approx(wanted, abs=1e-15)
 
 
-def test_the_linear_path_is_straight() -> None:
-    middle = 0.5 * (TIMES[1:] + TIMES[:-1])
-    assert LINEAR.poses(middle)[:, :3] == pytest.approx(0.5 * (POSITIONS[1:] + POSITIONS[:-1]), abs=1e-16)
-
-
 def test_the_finger_turns_along_the_shortest_arc_at_constant_rate() -> None:
     # SciPy's slerp goes the short way about as well.
     times = np.linspace(TIMES[0], TIMES[-1], 300)
@@ -69,13 +67,10 @@ def test_the_finger_turns_along_the_shortest_arc_at_constant_rate() -> None:
     assert (slerp.inv() * ours).magnitude().max() < 1e-7  # arccos near 1 keeps half of the digits
 
 
-def test_quaternions_of_any_length_and_sign_are_orientations() -> None:
+def test_quaternions_of_any_length_and_sign_are_orientations_and_a_way_between_poses_ends_there() -> None:
     turns = np.array([TURNS[0], -2.0 * TURNS[0]])
     poses = Trajectory(np.array([0.0, 1.0]), np.zeros((2, 3)), turns).poses(np.linspace(0, 1, 20))
     assert np.abs(poses[:, 3:] @ TURNS[0]) == pytest.approx(1.0, abs=1e-15)
-
-
-def test_the_way_between_two_poses_starts_and_ends_there() -> None:
     ends = np.column_stack([POSITIONS, TURNS])[:2]
     ways = interpolate_poses(ends[:, None], np.array([0.0, 1.0]))[0, :, 0]
     assert ways[:, :3] == pytest.approx(ends[:, :3], abs=1e-17)
