@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +27,7 @@ from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Finger, Scene, Simulation
+from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, replay
 from numpy.typing import NDArray
@@ -205,6 +206,14 @@ STACKABLE = {
 def sample(name: str, *settings: str) -> Scene:
     """Return a sample scene with some settings, ``key=value``."""
     return load(find(name), [Setting(*setting.split("=")) for setting in settings])
+
+
+def followed(method: str, way: Sequence[tuple[float, ...]], cells: int = 15, **sections: Any) -> Scene:
+    """Return a scene of a square bed whose fingertip goes through places (time in s, then x, y, z in mm)."""
+    points = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in way]
+    layout = {"rows": cells, "columns": cells, **sections.pop("layout", {})}
+    trajectory = {"waypoints": points, **sections.pop("trajectory", {})}
+    return resolve({"layout": layout, "control": {"method": method}, "trajectory": trajectory, **sections})
 
 
 def beginning(name: str, lasting: float, stepper: str, step: float, *settings: str) -> Scene:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pythonosc.osc_message import OscMessage
 
@@ -86,6 +86,7 @@ anything: Any = st.recursive(
 keys = st.sampled_from(["type", "version", "position", "orientation", "number", "x"])
 
 
+@settings(max_examples=50)
 @given(
     st.one_of(st.binary(max_size=100), st.binary(max_size=80).map(lambda end: b"DC\1\2" + end)),
     st.one_of(st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)),

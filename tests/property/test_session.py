@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.assemble import make_system, one_cell, record, scripted, under, whole
 
-COUNT = 80
+COUNT = 60
 CELLS = Layout(7, 7, arrangement="staggered")
 
 #: Millimeters, to the tenth.
@@ -26,7 +26,8 @@ points = st.lists(
     st.tuples(xy, xy, st.integers(320, 600).map(lambda tenths: tenths / 10)), min_size=3, max_size=6
 )
 turns = st.tuples(*[st.floats(-0.4, 0.4)] * 3)
-steppers = st.sampled_from(["bernoulli", "runge_kutta_4"])
+#: Seldom the slow one.
+steppers = st.sampled_from(["bernoulli", "bernoulli", "bernoulli", "runge_kutta_4"])
 
 
 def finger(spots: list[tuple[float, float, float]]) -> Trajectory:
@@ -44,7 +45,7 @@ def bed(stepper: str = "bernoulli", **parts: object) -> System:
     return make_system(CELLS, stepper=stepper, step=0.25e-3 if stepper != "bernoulli" else 1e-3, **parts)
 
 
-@settings(max_examples=16)
+@settings(max_examples=10)
 @given(points, turns, st.floats(0.0, 100.0), steppers)
 @example([(0.0, 0.0, 45.0), (0.0, 0.0, 36.0), (9.0, 3.0, 38.0)], (0.0, 0.0, 0.0), 40.0, "runge_kutta_4")
 def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are_openings(

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
-from digiclay.core.scene.schema import Scene
-from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result, run
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tests.assemble import followed
 
 #: Press, lift a blister, drag it level, let go, and hang beside the ridge without touching it.
 WAY = [
@@ -25,22 +21,10 @@ WAY = [
 PRESS = [(0.0, 0, 0, 43), (0.4, 0, 0, 38.5), (0.6, 0, 0, 38.5), (0.8, 0, 0, 46), (1.0, 0, 0, 46)]
 
 
-def scene(method: str, way: list[Any] = WAY, cells: int = 15, **sensors: float) -> Scene:
-    """Return a short session of a method with noisy sensors."""
-    points = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in way]
-    table: dict[str, Any] = {
-        "layout": {"rows": cells, "columns": cells},
-        "control": {"method": method},
-        "trajectory": {"waypoints": points},
-    }
-    return resolve({**table, **({"sensors": sensors} if sensors else {})})
-
-
 @cache
 def session(method: str, noise: float, seed: int = 0) -> Result:
     """Run the session under so many millinewtons of noise."""
-    sensors = {"force_noise": noise * 1e-3, "seed": seed} if noise else {}
-    return run(scene(method, **sensors))
+    return run(followed(method, WAY, sensors={"force_noise": noise * 1e-3, "seed": seed}))
 
 
 @pytest.mark.parametrize("noise", [0, 5])
@@ -58,14 +42,15 @@ def test_noise_does_not_bias_the_force_that_is_held_and_is_no_finger_over_the_be
 
 @pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display"])
 def test_noise_is_no_touch(method: str) -> None:
-    history = run(scene(method, PRESS, 11, force_noise=4e-3)).history
+    history = run(followed(method, PRESS, 11, sensors={"force_noise": 4e-3})).history
     untouched = history["force"].max(axis=0) == 0.0
     touched_modes = (Mode.SPRING, Mode.FORCE_FOLLOW)
     assert not np.isin(history["mode"][:, untouched], touched_modes).any()
 
 
 def test_pins_that_listen_are_not_touched_by_the_noise_of_their_heights() -> None:
-    history = run(scene("push_pull", [(0.0, 0, 0, 46), (1.0, 0, 0, 46)], 7, height_noise=50e-6)).history
+    above = [(0.0, 0, 0, 46), (1.0, 0, 0, 46)]
+    history = run(followed("push_pull", above, 7, sensors={"height_noise": 50e-6})).history
     assert not (history["mode"] == Mode.FORCE_FOLLOW).any()
 
 
@@ -75,5 +60,5 @@ def test_pins_that_listen_are_not_touched_by_the_noise_of_their_heights() -> Non
 )
 def test_noise_that_hides_what_is_asked_for_is_refused_in_one_line(method: str, noise: float) -> None:
     with pytest.raises(ParameterError, match=r"^sensors\.force_noise must .*control\.\w+ = [\d.]+ N") as told:
-        run(scene(method, force_noise=noise * 1e-3))
+        run(followed(method, WAY, sensors={"force_noise": noise * 1e-3}))
     assert "\n" not in str(told.value)

@@ -133,6 +133,9 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
             id="valve and fluid",
         ),
         pytest.param({"fluid.viscosity": ("1.6e-9", "2e-9")}, id="the flow is turbulent"),
+        pytest.param(
+            {"sensors.height_step": ("5e-6", "20e-6"), "sensors.force_step": ("5e-6", "20e-6")}, id="sensors"
+        ),
         pytest.param({"simulation.control_period": ("4e-3", "5e-3")}, id="period"),
     ],
 )  # fmt: skip
@@ -305,12 +308,6 @@ def test_readings_that_are_rounded_late_or_estimated_are_those_of_the_run_alone(
     settings = [f"control.method={method}", *(f"sensors.{one}" for one in sensors), "simulation.duration=0.6"]
     known = noisy("slow_press", *settings) if noise else [sample("slow_press", *settings)] * 3
     assert_all_as_alone([moved(one, 0.7e-3 * i, -1e-3 * i) for i, one in enumerate(known)])
-
-
-def test_runs_with_sensors_of_their_own_come_to_what_they_come_to_alone() -> None:
-    steps = ("5e-6", "10e-6", "20e-6")
-    scenes = [sample("tap", f"sensors.height_step={step}", f"sensors.force_step={step}") for step in steps]
-    assert_all_as_alone(scenes)
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states", "viscous"])

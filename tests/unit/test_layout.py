@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.model.layout import Layout, encloses, join_discs, make_grid, widen_disc
+from digiclay.core.model.layout import Layout, encloses, join_discs, make_grid
 
 #: Distance of rows and shift of odd ones, in pitches.
 ARRANGEMENTS = {"aligned": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (math.sqrt(3) / 2, 0.5)}
@@ -27,22 +27,6 @@ def test_the_cells_stand_row_by_row_a_pitch_apart(arrangement: str) -> None:
 def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, int]) -> None:
     positions = make_grid(Layout(*shape, 3e-3, arrangement)).positions
     assert positions.min(axis=0) + positions.max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-16)
-
-
-@pytest.mark.parametrize(
-    ("disc", "cells"),
-    [
-        ((0.0, 0.0, 3e-3), [7, 11, 12, 13, 17]),  # those exactly on the rim too
-        ((1.0, 0.0, 0.1), []),  # beside the bed
-        ((-6e-3, -6e-3, 3e-3), [0, 1, 5]),  # partly beside it
-    ],
-)
-def test_a_disc_has_the_cells_there_are(disc: tuple[float, float, float], cells: list[int]) -> None:
-    bed = make_grid(Layout(5, 5))
-    assert bed.disc(*disc).tolist() == cells
-    # Of a batch a run may have none; wider by rounding, for the cells on the rim.
-    together = bed.covered(widen_disc(join_discs([None, disc]), 1e-12))
-    assert [np.flatnonzero(run).tolist() for run in together.T] == [[], cells]
 
 
 SMALL, LARGE, ASIDE = (1e-3, 0.0, 2e-3), (0.0, 0.0, 3e-3), (2e-3, 0.0, 2e-3)
