@@ -122,14 +122,3 @@ def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: di
     assert system.cell.actuator.area * way == pytest.approx(
         volume, abs=1e-3 * system.cell.actuator.area * system.fastest * system.period
     )
-
-
-@settings(max_examples=10)
-@given(points, steppers)
-def test_a_locked_cell_does_not_move_however_it_is_pressed(
-    spots: list[tuple[float, float, float]], stepper: str
-) -> None:
-    system = bed(stepper=stepper, control=scripted(lambda t, x, y: np.where(x < 0.0, 0.0, 0.5)))
-    run = record(system, finger(spots), COUNT)
-    assert np.all(run.height[:, system.grid.x < 0.0] == 40e-3)
-    assert np.any(run.height[-1, system.grid.x >= 0.0] != 40e-3)

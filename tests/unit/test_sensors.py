@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import SceneError
-from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
 from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, Sensing, draw_normals
@@ -19,7 +18,7 @@ from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.run_scene import run
 from numpy.typing import NDArray
 
-from tests.assemble import sample
+from tests.assemble import record, sample
 
 Floats = NDArray[np.float64]
 
@@ -100,23 +99,15 @@ def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_r
     assert np.unique(force).size > 3
 
 
-@pytest.mark.parametrize(
-    ("noise", "step", "floor"), [(2e-3, 0.0, 10e-3), (2e-3, 3e-3, 11.5e-3), (0.0, 3e-3, 0.0)]
-)
-def test_the_floor_is_five_standard_deviations_and_half_a_step(
-    noise: float, step: float, floor: float
-) -> None:
-    assert Sensing(force_noise=noise, force_step=step).force_floor == pytest.approx(floor, abs=1e-12)
-
-
 @pytest.mark.parametrize("step", [0.0, 1.0, 4.0, 7.5])
-def test_no_force_reads_below_the_floor(step: float) -> None:
-    known = Sensing(force_noise=1.0, force_step=step)
+def test_no_force_reads_above_the_floor_of_five_standard_deviations_and_half_a_step(step: float) -> None:
+    floor = Sensing(force_noise=1.0, force_step=step).force_floor
+    assert (floor, Sensing(force_step=step).force_floor) == (pytest.approx(5.0 + step / 2, abs=1e-12), 0.0)
     sensors = Quantized(Noisy(PerfectSensors(), 1.0, 0.0, 5), step, 0.0)
     nothing = (truth(period, [0.0] * CELLS, [0.04] * CELLS) for period in range(PERIODS))
     read = max(float(sensors.measure(np.empty((0, CELLS)), seen)[0].max()) for seen in nothing)
     # 200 000 readings: one in 3.5 million would be above.
-    assert read < known.force_floor
+    assert read < floor
 
 
 def readings(sensors: Sensors, truths: Sequence[Truth], skipped: Sequence[int] = ()) -> Floats:
@@ -125,7 +116,9 @@ def readings(sensors: Sensors, truths: Sequence[Truth], skipped: Sequence[int] =
     for seen in truths:
         if seen.period and seen.period not in skipped:
             sensors.update(own, seen)
+        before = own.copy()
         read.append([float(one[0]) for one in sensors.measure(own, seen)])
+        np.testing.assert_array_equal(own, before)
     return np.array(read)
 
 
@@ -152,34 +145,16 @@ def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(
     np.testing.assert_array_equal(readings(sensors, truths, gap), readings(sensors, truths))
 
 
-def test_measuring_changes_nothing() -> None:
-    sensors = Delayed(PerfectSensors(), 2, 40e-3)
-    own = np.arange(float(sensors.rows))[:, None]
-    before = own.copy()
-    sensors.measure(own, RAMP[5])
-    np.testing.assert_array_equal(own, before)
-
-
 ALL = ("sensors.force_noise=0.5 mN", "sensors.height_noise=5 um", "sensors.delay=1")
 
 
-def test_the_seed_makes_the_session() -> None:
-    one = heights(*ALL)
-    np.testing.assert_array_equal(heights(*ALL), one)
-    assert np.abs(one - heights(*ALL, "sensors.seed=1")).max() > 1e-6
-
-
-def test_a_session_taken_up_again_in_the_middle_ends_the_same() -> None:
-    noisy = sample("slow_press", *ALL)
-    system, path = assemble(noisy), noisy.section("trajectory").trajectory()
-    whole, halfway = begin(system), None
-    for whole in periods(system, [path], whole, 400):  # noqa: B020
-        if whole.period == 207:
-            halfway = whole.copy()
-    assert halfway is not None
-    for again in periods(system, [path], halfway, 400 - 207):
-        end = again
-    np.testing.assert_array_equal(end.row(0), whole.row(0))
+def test_the_seed_makes_the_session_also_one_taken_up_again_in_the_middle() -> None:
+    noisy, other = (sample("slow_press", *ALL, f"sensors.seed={seed}") for seed in (0, 1))
+    path = noisy.section("trajectory").trajectory()
+    first, second = (record(assemble(one), path, 200) for one in (noisy, other))
+    assert np.abs(first.height - second.height).max() > 1e-6
+    rest = record(assemble(noisy), path, 93, record(assemble(noisy), path, 107).last)
+    np.testing.assert_array_equal(rest.height, first.height[107:])
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
@@ -196,11 +171,11 @@ def test_coarse_height_sensors_change_the_session_and_perfect_ones_do_not() -> N
     np.testing.assert_array_equal(heights("sensors.delay=0"), plain)
 
 
-@pytest.mark.parametrize(("setting", "rows"), [("seed=1", 0), ("force_noise=1 mN", 0), ("delay=2", 9)])
-def test_only_a_delay_costs_state_rows(setting: str, rows: int) -> None:
-    assert assemble(sample("slow_press", f"sensors.{setting}")).sensors.rows == rows
+def test_only_a_delay_costs_state_rows() -> None:
     plain = sample("slow_press")
     assert (plain.sensors, assemble(plain).rows.sensors) == (None, 0)
+    sensed = (sample("slow_press", f"sensors.{one}") for one in ("seed=1", "force_noise=1 mN", "delay=2"))
+    assert [assemble(one).sensors.rows for one in sensed] == [0, 0, 9]
 
 
 @pytest.mark.parametrize("settings", [(), ALL, ("sensors.observer=valve",)])

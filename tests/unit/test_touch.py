@@ -5,42 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.engine.simulation import begin, step
-from digiclay.core.model.contact import Contact
-from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_reach
+from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.model.null_parts import Unrelaxed
-from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.touch import MOST, Touch, compute_force, join_paths, trace_finger
+from digiclay.core.model.touch import MOST, trace_finger
 
 from tests.assemble import make_system, path, record
-
-ELASTIC, RELAXING = (Touch(Fingertip(), Contact(), pulp) for pulp in (Unrelaxed(), Relaxation()))
-
-
-@pytest.mark.parametrize(
-    ("touch", "height", "filters", "force"),
-    [
-        # The share of the tension less what relaxed, 0.62 0.3 + 0.20 0.2 + 0.10 0.1.
-        (RELAXING, 49e-3, [0.3, 0.2, 0.1], 0.34 * (0.125 * np.expm1(2.0) - 0.236)),
-        (RELAXING, 48.1e-3, [3.0, 2.0, 1.0], 0.0),  # the pulp does not stick
-        (ELASTIC, 47e-3, [], 0.0),  # across a gap
-    ],
-)
-def test_force_is_the_share_of_tension_less_what_relaxed(
-    touch: Touch, height: float, filters: list[float], force: float
-) -> None:
-    found = compute_force(touch, np.array([height]), np.array([48e-3]), np.array(filters).reshape(-1, 1))
-    assert found == pytest.approx(force, rel=1e-13, abs=0.0)  # rounding
-
-
-@pytest.mark.parametrize(("x", "z", "most"), [(0, 60, 0), (200, 30, 0), (0, 38, 149)])
-def test_a_level_finger_may_touch_the_cells_below_it_alone(x: float, z: float, most: int) -> None:
-    # Above the highest pin and beside the bed none; on a pin that one, and not the whole bed.
-    pose = np.array([x * 1e-3, 0.0, z * 1e-3, *LEVEL])
-    disc = compute_reach(trace_finger(Fingertip(), np.tile(pose, (1, 2, 1))).at(0).window, 40e-3)
-    cells = make_grid(Layout()).disc(*disc) if disc else np.empty(0, int)
-    assert (312 in cells) == (most > 0)
-    assert cells.size <= most
 
 
 def dragged(periods: int) -> np.ndarray:
@@ -62,17 +31,6 @@ def test_undersides_of_several_periods_at_a_time_are_those_of_each_to_the_last_b
     # Other places in mid way have their own undersides.
     other = bed.compute_basis(np.arange(50))
     assert np.array_equal(whole.at(40).under(other), alone[40].at(40).under(other))
-
-
-def test_undersides_of_a_batch_are_those_of_its_runs() -> None:
-    poses, bed = dragged(8), make_grid(Layout())
-    paths = [trace_finger(Fingertip(), poses + shift, 5) for shift in (0.0, 1e-3)]
-    places = np.stack([bed.compute_basis(np.arange(first, first + 50)) for first in (100, 300)], axis=-1)
-    for several, runs in ((paths, (0, 1)), (paths[:1], (0, 0))):
-        found = join_paths(several).at(7).under(places)
-        for axis, run in enumerate(runs):
-            alone = paths[run].at(7).under(np.ascontiguousarray(places[..., axis]))
-            np.testing.assert_allclose(found[..., axis], alone, rtol=0.0, atol=1e-15)  # sums in another order
 
 
 def test_a_finger_over_a_large_bed_is_computed_for_few_periods_at_a_time() -> None:
