@@ -23,6 +23,12 @@ STEPPERS = pytest.mark.parametrize(("stepper", "step"), [("bernoulli", 1e-3), ("
 BALANCE = 0.5e5 * math.pi * 1e-6
 
 
+def test_pressure_is_force_over_area_and_speed_is_flow_over_area_but_for_flow_into_a_stop() -> None:
+    assert Actuator().pressure(np.array([BALANCE])) == pytest.approx(0.5e5, rel=1e-15)
+    flow, height = np.array([1, 1, -1, -1, 1]) * math.pi * 1e-8, np.array([50e-3, 100e-3, 0.0, 100e-3, 0.0])
+    assert Actuator().rate(flow, height) == pytest.approx([10e-3, 0.0, 0.0, -10e-3, 10e-3], rel=1e-14)
+
+
 @pytest.mark.parametrize(
     ("parts", "rise", "fall", "digits"),
     [

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from digiclay.core.engine.system import make_segments
-from digiclay.core.model.delay import Delay, split_delay
+from digiclay.core.model.delay import Delay, Queue, split_delay
 from digiclay.core.model.lag import SHUT, ValveLag
 from digiclay.core.model.null_parts import InstantValve
 from digiclay.core.steppers.explicit import RungeKutta4
@@ -81,6 +81,8 @@ def test_commands_kept_and_the_cut_make_up_the_dead_time_and_steps_fill_the_peri
     whole = queue.length - (2 if queue.cut else 1)
     assert whole * PERIOD + queue.cut == pytest.approx(dead_time, abs=1e-15)  # rounding
     assert (queue.cut == 0.0) == (round(dead_time / PERIOD, 9) % 1.0 == 0.0)
+    # The next command is seen from the instant of its arrival on, where a step ends.
+    assert [queue.seen(time) for time in (0.0, 0.999 * queue.cut, queue.cut)] == [0, 0, int(queue.cut > 0.0)]
     parts, instants = make_segments(stepper, queue.cut, PERIOD, 5)
     ends = [part.start + part.length for part in parts]
     assert [part.start for part in parts] == pytest.approx([0.0, *ends[:-1]], abs=1e-18)
@@ -103,6 +105,14 @@ def test_a_dead_time_within_a_step_cuts_it_where_it_must(
 ) -> None:
     system = one_cell(stepper=stepper, period=PERIOD, step=PERIOD, dead_time=PERIOD / 5, valve_lag=lag)
     assert len(system.plan.segments) == count
+
+
+def test_the_rate_is_the_derivative_of_the_exact_opening() -> None:
+    start = np.array([0.0, 1.0, -0.7, 0.3])
+    moved = ValveLag().response(Queue(), [1e-9]) @ np.array([start, COMMAND])
+    # A difference over 1 ns: truncation 1e-9/τ_v, 5e-7; rounding 1e-16/1e-9 against rates of 500 1/s.
+    rate = ValveLag().rate(start[None], COMMAND)
+    assert (moved - start) / 1e-9 == pytest.approx(rate, rel=1e-5, abs=1e-5)
 
 
 def test_a_valve_that_is_almost_shut_is_shut() -> None:
