@@ -95,7 +95,7 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
     settings = [f"control.method={method}", "simulation.duration=1.5"]
     devices = ((f"valve.stroke={25 + 5 * i}e-6", f"actuator.rest_height={40 - 0.2 * i}e-3") for i in range(2))
     known = [sample(STACKABLE[method], *settings, *device) for device in devices]
-    scenes = [moved(one, 0.7e-3 * i, -0.2e-3 * i, 1.1 - 0.1 * i) for i, one in enumerate(known)]
+    scenes = [moved(one, 0.7e-3 * i, -0.2e-3 * i, 0.9 + 0.2 * i) for i, one in enumerate(known)]
     assert_all_as_alone(scenes, errors=True)
 
 
