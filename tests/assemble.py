@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.travel import Heading
@@ -31,8 +32,6 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, replay
 from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
 
 
 def path(*waypoints: tuple[float, float, float, float], interpolation: str = "smooth") -> Trajectory:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.exchange import make_exchange
 from digiclay.core.engine.simulation import begin
@@ -10,9 +11,6 @@ from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Grid
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
 
 
 def make_spike_and_ridge(grid: Grid) -> Floats:

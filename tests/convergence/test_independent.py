@@ -13,16 +13,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.system import System
 from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from tests.assemble import Record, record, sample
-
-Floats = NDArray[np.float64]
 
 #: A valve open less than this lets through 1e-14 of its full flow: 1 nm in the whole session.
 SHUT = 1e-7

@@ -12,16 +12,14 @@ from itertools import product
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.valve import Fluid, Valve
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from tests.assemble import Motion, one_cell, record, scripted
-
-Floats = NDArray[np.float64]
 
 PERIOD, COUNT = 20e-3, 5
 #: Steppers of a fixed step, by name.

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
@@ -20,12 +21,9 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from benchmarks.stiff import strict
 from tests.assemble import Motion, Record, make_system, one_cell, path, record, sample, scripted, under
-
-Floats = NDArray[np.float64]
 
 PERIODS = (1e-3, 5e-3, 20e-3, 50e-3)
 STEPPERS = st.sampled_from(["bernoulli", "richardson"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.control.exchange import make_exchange
 from digiclay.core.control.smoothing import order_periods
 from digiclay.core.model.control_interface import Measurement
@@ -13,9 +14,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
 CELL: Cell = assemble(resolve({})).cell
 STROKE = CELL.actuator.stroke
 layouts = st.builds(

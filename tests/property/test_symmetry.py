@@ -6,15 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import Trajectory
-from numpy.typing import NDArray
 
 from tests.assemble import make_system, record
-
-Floats = NDArray[np.float64]
 
 #: Press, lift, drag, lift off: off the cells' axes, tilted. Time, x, y, z in mm, then the quaternion.
 WAYPOINTS = np.array(

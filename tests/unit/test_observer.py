@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
@@ -20,8 +21,6 @@ from digiclay.core.session.run_scene import run
 from numpy.typing import NDArray
 
 from tests.assemble import scripted
-
-Floats = NDArray[np.float64]
 
 #: Control period, s.
 PERIOD = 5e-3

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import SceneError
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
@@ -16,11 +17,8 @@ from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, S
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.run_scene import run
-from numpy.typing import NDArray
 
 from tests.assemble import record, sample
-
-Floats = NDArray[np.float64]
 
 CELLS = 500
 PERIODS = 400

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Grid, Layout, make_grid
 from digiclay.strokes.stroke import Brush, Stroke, draw, start
 from digiclay.strokes.sweep import LIMIT, find_spike, measure_excess_heights
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
 BED = make_grid(Layout(11, 11))
 FLAT = np.full(BED.count, 40e-3)
 #: A pin beside the path of `stroke`, and one on it.
