@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -86,6 +87,13 @@ def jumped(system: System, finger: Trajectory) -> Record:
         return record(system, finger, min(150, round(finger.times[-1] / system.period) + 2))
 
 
+def stacked(scenes: Sequence[Scene], row: str) -> list[Floats]:
+    """Return a row of the histories of scenes run in a stack, with every warning an error."""
+    with strict():
+        found = {number: result.history[row].copy() for number, result in run_together(scenes)}
+    return [found[number] for number in range(len(scenes))]
+
+
 def assert_within_reach(system: System, finger: Trajectory, height: Floats) -> None:
     """Check heights, (t, n), a control period apart: within the stroke, and within `Speeds.reach`."""
     assert height.min() >= 0.0
@@ -141,14 +149,10 @@ def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> No
         sample("tap", f"simulation.stepper={stepper}", f"contact.stiffness={250 + 50 * i}") for i in range(3)
     )
     scenes = [taken(one, waypoints(spots)) for one, spots in zip(stiff, several, strict=False)]
-    with strict():
-        found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
-        shut = [replace(one, control=None, blister=None) for one in scenes]
-        still = {number: result.history["height"].copy() for number, result in run_together(shut)}
-    for number, scene in enumerate(scenes):
-        system, finger = assemble(scene), scene.section("trajectory").trajectory()
-        assert_within_reach(system, finger, found[number])
-        assert np.all(still[number] == 40e-3)
+    shut = [replace(one, control=None, blister=None) for one in scenes]
+    for scene, height, still in zip(scenes, stacked(scenes, "height"), stacked(shut, "height"), strict=True):
+        assert_within_reach(assemble(scene), scene.section("trajectory").trajectory(), height)
+        assert np.all(still == 40e-3)
 
 
 @settings(max_examples=30)
@@ -204,15 +208,10 @@ def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x:
     soft, stiff = (sample("tap", f"contact.stiffness={stiffness}") for stiffness in (250, 300))
     known = [replace(one, control=None, blister=None) for one in (soft, stiff)]
     passed, began = ([taken(one, waypoints(places)) for one in known] for places in (spots + press, press))
-    with strict():
-        after, alone = (
-            {number: result.history["force"].copy() for number, result in run_together(scenes)}
-            for scenes in (passed, began)
-        )
-    for number, force in alone.items():
+    for after, force in zip(stacked(passed, "force"), stacked(began, "force"), strict=True):
         assert force[-1].max() > 0.1
         # The times at which they press are rounded otherwise.
-        np.testing.assert_allclose(after[number][-len(force) :], force, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(after[-len(force) :], force, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(("opening", "swing"), [(-0.5, 0.2), (0.5, 0.2), (1.0, 0.2), (1.0, 1.0)])

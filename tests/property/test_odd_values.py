@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-from types import ModuleType
-
 import pytest
 from digiclay.core.base.errors import DigiclayError, SceneError
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 
-FILE = Path(__file__).parents[2] / "tools" / "fuzz.py"
-
-
-@pytest.fixture(scope="module")
-def fuzz() -> ModuleType:
-    """The program that makes odd cases."""
-    spec = importlib.util.spec_from_file_location("fuzz", FILE)
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from tools import fuzz
 
 
 @pytest.mark.parametrize(("kind", "count"), [("scenes", 120), ("states", 250), ("takes", 150), ("runs", 150)])
-def test_what_is_odd_is_taken_or_refused(fuzz: ModuleType, kind: str, count: int) -> None:
+def test_what_is_odd_is_taken_or_refused(kind: str, count: int) -> None:
     told = [fuzz.failure(kind, 7, number) for number in range(count)]
     assert {number: said for number, said in enumerate(told) if said} == {}
     # Neither is everything refused, nor is everything taken: the cases reach beyond the first check.
     assert 0.05 * count < told.count("") < 0.95 * count
 
 
-def test_a_failure_is_told_with_its_place(fuzz: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failure_is_told_with_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(fuzz.CASES, "states", lambda chance: [][0])
     assert "IndexError in test_odd_values.py:" in fuzz.failure("states", 0, 0)
 

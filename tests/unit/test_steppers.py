@@ -1,17 +1,123 @@
-"""Explicit steppers give up what is thrown off; Richardson's extrapolation keeps to what a cell can be."""
+"""Steppers: the closed form solves its equation, others keep to what a cell can be."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from digiclay.core.base.arrays import Floats
 from digiclay.core.model.physics import find_speeds
+from digiclay.core.steppers.closed_form import (
+    LARGE,
+    TINY,
+    StepStart,
+    find_loaded_path,
+    replace_zeros,
+    solve_carefully,
+    solve_crossing,
+    solve_pressed,
+)
 from digiclay.core.steppers.explicit import Explicit, Rates
 from digiclay.core.steppers.richardson import extrapolate
 
-from tests.assemble import make_system
+from tests.assemble import make_system, one_cell
+
+COUNT = 4000
+
+
+def integrated(e: float, bow: float, slip: float, decay: float, pulp: float) -> tuple[float, float]:
+    """Return the load's part of the way, and the mean of max(exp(e) - 1, 0), by the midpoint rule.
+
+    Without load the way is the parabola e + slip s + 6 bow s (1 - s), whose mean lies `bow` above the
+    straight line between its ends; a load acts where exp(e) is above `pulp`.
+    """
+    push = mean = 0.0
+    ds = 1.0 / COUNT
+
+    def rate(s: float, push: float) -> float:
+        grown = math.exp(min(e + slip * s + 6.0 * bow * s * (1.0 - s) + push, LARGE))
+        return decay * min(pulp - grown, 0.0)
+
+    for i in range(COUNT):
+        s = i * ds
+        push_middle = push + 0.5 * ds * rate(s, push)
+        middle = s + 0.5 * ds
+        mean += ds * max(
+            math.expm1(e + slip * middle + 6.0 * bow * middle * (1.0 - middle) + push_middle), 0.0
+        )
+        push += ds * rate(middle, push_middle)
+    return push, mean
+
+
+def solved(e: float, bow: float, slip: float, decay: float, pulp: float) -> tuple[float, float]:
+    """Return what `crossed` says of one cell."""
+    push, mean = solve_crossing(*(np.array([value]) for value in (e, bow, slip, decay, pulp)))
+    return float(push[0]), float(mean[0])
+
+
+@pytest.mark.parametrize(
+    ("e", "slip", "decay", "pulp"),
+    [(-1.0, 2.0, 1.5, 1.0), (-0.5, 2.0, 0.8, 1.4), (0.8, -2.0, 1.5, 1.0), (1.2, -2.5, 0.7, 1.3)],
+)
+def test_a_cell_that_meets_or_leaves_on_a_straight_way_is_solved_exactly(
+    e: float, slip: float, decay: float, pulp: float
+) -> None:
+    # The sum's own error is of second order in its steps, of first at the one that holds the instant.
+    assert solved(e, 0.0, slip, decay, pulp) == pytest.approx(integrated(e, 0.0, slip, decay, pulp), abs=3e-6)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share: float) -> None:
+    # Met after 1 - share of a straight way: the parabola's mean over the rest is bow share (3 - 2 share).
+    slip, decay, bow = 0.5, 0.2, 0.005
+    e = -(1.0 - share) * slip
+    gained = solved(e, bow, slip, decay, 1.0)[0] - solved(e, 0.0, slip, decay, 1.0)[0]
+    exact = integrated(e, bow, slip, decay, 1.0)[0] - integrated(e, 0.0, slip, decay, 1.0)[0]
+    # The instant itself moves too, and the load bends the way: 1 to 5 % here.
+    assert gained == pytest.approx(exact, rel=0.06)
+
+
+@pytest.mark.parametrize("growth", [-5.0, -1e-9, 1e-9, 0.5, 30.0])
+def test_the_careful_solution_is_that_of_the_plain_one_where_both_hold(growth: float) -> None:
+    exponent, decay, pulp = np.array([2.0]), np.array([0.3]), np.array([1.7])
+    grown, slip = np.array([growth]), np.array([growth]) - decay * pulp
+    relief = solve_pressed(np.exp(exponent), grown, decay)
+    push, mean = solve_carefully(exponent, grown, slip, decay, pulp)
+    assert push == pytest.approx(decay * pulp - relief, rel=1e-12, abs=1e-14)
+    assert mean == pytest.approx(relief / decay, rel=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [-9000.0, 5.0, 290.0])
+@pytest.mark.parametrize("slip", [-8000.0, 0.0, 8000.0])
+@pytest.mark.parametrize("decay", [TINY, 1e-3, 1e6])
+@pytest.mark.parametrize("pulp", [1.0, 1e125])
+def test_no_size_overflows_and_no_load_pulls(exponent: float, slip: float, decay: float, pulp: float) -> None:
+    numbers = tuple(np.array([value]) for value in (slip, decay, pulp))
+    with np.errstate(all="raise", under="ignore"):
+        growth = replace_zeros(numbers[0] + numbers[1] * numbers[2])
+        push, mean = solve_carefully(np.array([exponent]), growth, *numbers)
+        met = solve_crossing(np.array([exponent]), np.zeros(1), *numbers)
+    assert np.isfinite([push, mean, *met]).all()
+    assert mean[0] >= 0.0
+    # Not to the last bit: exponents are in the thousands.
+    loaded = exponent > math.log(pulp)
+    if loaded and slip >= 0.0:  # it stays under load
+        assert push[0] <= 1e-9
+    elif loaded == (slip < 0.0):  # it leaves, or it meets the finger
+        assert met[0] <= 1e-9
+
+
+def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper() -> None:
+    # It leaves the pins. Its way is a parabola, its mean `bow` above its chord and its middle 1.5 times that.
+    # The valves are open to the high reservoir; a bend of the way without load would take the pins far down.
+    cases = [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)]
+    exponent, lift, bow, deepest = np.array(cases).T
+    one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
+    start = StepStart(np.ones((1, 4)), weights, exponent, 9.0 * one, bow, lift, relaxed=one, idle=loaded)
+    rise = find_loaded_path(one_cell().cell, 2000.0, 1e6, 1.0, start).rise
+    np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
 
 
 @dataclass(frozen=True)
