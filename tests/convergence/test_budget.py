@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import SAMPLES
 from digiclay.core.scene.schema import Scene
 from digiclay.core.studies.omissions import Fitted, find_omissions, propose_omissions
-from numpy.typing import NDArray
 
 from tests.assemble import record, sample
 
@@ -33,7 +33,7 @@ def cut(name: str) -> Scene:
     return replace(scene, simulation=replace(scene.simulation, duration=lasts))
 
 
-def heights(scene: Scene) -> NDArray[np.float64]:
+def heights(scene: Scene) -> Floats:
     """Return all heights of a run, (t, n), m."""
     return record(assemble(scene), scene.section("trajectory").trajectory(), scene.periods).height
 

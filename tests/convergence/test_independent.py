@@ -10,7 +10,7 @@ stand still, and the pulp over them relaxes exponentially.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from types import SimpleNamespace as Numbers
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -26,27 +26,6 @@ from tests.assemble import Record, record, sample
 SHUT = 1e-7
 #: How far a pin and the finger together come closer in a period, at most, m.
 MARGIN = 1e-3
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """The parameters, read off the system."""
-
-    area: float
-    high: float
-    low: float
-    laminar: float
-    turbulent: float
-    resistance: float
-    knee: float
-    lag: float
-    dead_time: float
-    b: float
-    m: float
-    share: float
-    rates: Floats
-    weights: Floats
-    axes: Floats
 
 
 def numbers() -> Numbers:

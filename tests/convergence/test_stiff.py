@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.engine.simulation import periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session import snapshot
-from numpy.typing import NDArray
 
 from benchmarks import stiff
 from benchmarks.stiff import CASES, EASY, HOLD
@@ -32,33 +32,33 @@ WELL = [name for name, case in CASES.items() if not case.why]
 SWINGS = ("one pin", "all at the lower end stop")
 
 
-def at_shared_ends(height: NDArray[np.float64], exact: NDArray[np.float64], period: float) -> float:
+def at_shared_ends(height: Floats, exact: Floats, period: float) -> float:
     """Return the largest height error where control periods of all lengths end: with the held commands; m."""
     own, every = round(HOLD / period), round(HOLD / stiff.PERIOD)
     return float(np.abs(height[own - 1 :: own] - exact[every - 1 :: every]).max())
 
 
 @cache
-def recorded(name: str) -> NDArray[np.float64]:
+def recorded(name: str) -> Floats:
     """Return the recorded commands of a case."""
     with stiff.strict():
         return stiff.commands_of(CASES[name])
 
 
 @cache
-def integrated(name: str, stepper: str, step: float, period: float) -> NDArray[np.float64]:
+def integrated(name: str, stepper: str, step: float, period: float) -> Floats:
     """Return the heights under the recorded commands, (t, n), m."""
     with stiff.strict():
         return stiff.replayed(CASES[name], recorded(name), stepper, step, period)
 
 
 @cache
-def reference(name: str) -> tuple[NDArray[np.float64], float]:
+def reference(name: str) -> tuple[Floats, float]:
     """Return the heights of a case under its recorded commands, and how far they may be off, m."""
     return stiff.reference(CASES[name], recorded(name), stiff.ROUGH, partial(integrated, name))
 
 
-def replayed(name: str, step: float) -> NDArray[np.float64]:
+def replayed(name: str, step: float) -> Floats:
     """Return the heights of the default stepper under the recorded commands, (t, n), m."""
     return integrated(name, "bernoulli", step, stiff.period_of(step))
 
@@ -132,7 +132,7 @@ def test_the_force_on_a_pin_behind_a_shut_valve_is_that_of_a_finer_step(state: s
     assert np.abs(coarse - fine).max() < 3e-3
 
 
-def forces_after(state: str, parts: int) -> NDArray[np.float64]:
+def forces_after(state: str, parts: int) -> Floats:
     """Return the forces (50, n) of the control periods behind a kept state, N."""
     path = SAMPLES / f"{state}.state"
     scene = load(path.with_suffix(".toml"))

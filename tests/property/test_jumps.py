@@ -132,7 +132,7 @@ def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
     assert_withstands(bed, spots, turn, period, stepper, **changes)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(jumps, turns, st.sampled_from(PERIODS))
 def test_the_adaptive_stepper_withstands_jumps(
     spots: list[Spot], turn: tuple[float, ...], period: float

@@ -38,17 +38,16 @@ def test_tension_stays_finite_at_any_depth_and_is_cut_beyond_all_physical_ones()
     assert LARGEST_EXPONENT / Contact().exponent > 0.1  # more than a stroke
 
 
-@pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
-@pytest.mark.parametrize("depth", [1e-3, 1.5e-3, 2e-3, 2.4e-3])
-def test_the_cells_together_carry_what_a_flat_plate_does(arrangement: str, depth: float) -> None:
+@pytest.mark.parametrize(("arrangement", "share"), [("aligned", 0.34), ("hexagonal", 0.29)])
+def test_the_cells_together_carry_what_a_flat_plate_does(arrangement: str, share: float) -> None:
     # The share f_d was fitted for this: 0.34 on the square grid, 0.29 on the hexagonal one. One constant
     # cannot match all depths: a quarter from 1 to 2.4 mm, averaged over where the finger stands.
-    share = 0.29 if arrangement == "hexagonal" else 0.34
     contact, bed = Contact(share=share), make_grid(Layout(rows=15, columns=15, arrangement=arrangement))
     offsets = np.stack(np.meshgrid(np.arange(6), np.arange(6)), axis=-1).reshape(-1, 2) * 0.5e-3
-    poses = np.array([[x, y, -depth, *LEVEL] for x, y in offsets])
-    carried = share * contact.tension(-under(Fingertip().outline(poses), bed.x, bed.y)).sum(axis=1)
-    assert carried.mean() == pytest.approx(float(contact.tension(np.array([depth]))[0]), rel=0.25)
+    for depth in (1e-3, 1.5e-3, 2e-3, 2.4e-3):
+        poses = np.array([[x, y, -depth, *LEVEL] for x, y in offsets])
+        carried = share * contact.tension(-under(Fingertip().outline(poses), bed.x, bed.y)).sum(axis=1)
+        assert carried.mean() == pytest.approx(float(contact.tension(np.array([depth]))[0]), rel=0.25)
 
 
 def reduced(time: float) -> float:
