@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from digiclay.core.metrics.summary import find_contact_rows
+from digiclay.core.metrics.finger_path import find_contact_rows
 from digiclay.plots.bed import draw_map, draw_path, draw_relief
 from digiclay.plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
 from digiclay.plots.run import LETTERS, session_cells

@@ -270,8 +270,7 @@ def measure_trial(
         found |= {name: own[name] for name in ("lag_mean", "lag_max", "max_total_force")}
         found |= {"rfd": own["rfd_session"], "losses": float(judged.losses)}
         found["contact_loss_share"] = judged.loss_share
-        felt = perceive(found["rfd"], found["set_point"], found["ridge_unevenness"])
-        found |= felt.figures()
+        found |= perceive(found["rfd"], found["set_point"], found["ridge_unevenness"])
     relief = measure_relief(scene, done.history, sum_cells(done.history).following, found["ridge_offset"])
     found |= {"relief_rms": relief.rms, "relief_largest": relief.largest}
     found["period_cost"] = spent / done.periods

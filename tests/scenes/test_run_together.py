@@ -12,7 +12,7 @@ from digiclay.core.base.errors import DivergenceError, ParameterError
 from digiclay.core.batch.packing import describe_structure
 from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.control.methods import METHODS
-from digiclay.core.metrics.summary import METRICS
+from digiclay.core.metrics.metric_table import METRICS
 from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference

@@ -8,17 +8,15 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.finger_path import sum_cells
-from digiclay.core.metrics.summary import (
-    METRICS,
-    compute_cell_area,
+from digiclay.core.metrics.finger_path import measure_lag, sum_cells
+from digiclay.core.metrics.force import (
     compute_contact_loss_share,
-    compute_metrics,
     compute_rfd,
     compute_weights,
     find_first_touch,
-    measure_lag,
 )
+from digiclay.core.metrics.metric_table import METRICS
+from digiclay.core.metrics.summary import compute_cell_area, compute_metrics
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
 

@@ -28,30 +28,21 @@ def find_contact_rows(total_force: ArrayLike) -> Rows:
 
 @dataclass(frozen=True, eq=False)
 class CellSums:
-    """Sums over the cells of t rows of n cells, and the first and last heights.
-
-    Attributes
-    ----------
-    total : ndarray (t,)
-        Total force, N.
-    x, y, height : ndarray (t,)
-        Sums over the cells of the force times place, and times height, N m.
-    strongest : ndarray (t,)
-        Largest force on a cell, N.
-    following : ndarray of int (t,)
-        How many cells follow the force.
-    first, last : ndarray (n,)
-        Heights in the first and in the last row, m.
-    """
+    """Sums over the cells of t rows of n cells, (t,), and the first and last heights, (n,)."""
 
     total: Floats
+    """Total force, N."""
     x: Floats
     y: Floats
     height: Floats
+    """Sums of the force times place, and times height, N m."""
     strongest: Floats
+    """Largest force on a cell, N."""
     following: NDArray[np.intp]
+    """How many cells follow the force."""
     first: Floats
     last: Floats
+    """Heights in the first and in the last row, m."""
 
     @property
     def touching(self) -> Rows:
@@ -66,11 +57,7 @@ class CellSums:
 
 
 def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
-    """Return the sums over the cells of a history.
-
-    `history`: the arrays of ``history.npz``, of at least one row: height, force, mode, total_force and
-    position.
-    """
+    """Return the sums over the cells of a history, the arrays of ``history.npz``, of at least one row."""
     total, height, force, position = (
         np.asarray(history[name], dtype=np.float64) for name in ("total_force", "height", "force", "position")
     )
@@ -91,12 +78,9 @@ def sum_row(force: Floats, x: Floats, y: Floats, height: Floats) -> Floats:
 
 
 def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
-    """Return how far the blister is behind the fingertip, in the rows in contact.
+    """Return how far the blister is behind the fingertip, (t, 7), in the rows in contact, m.
 
-    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
-    point, r_j the cells' positions.
-
-    `sums`: of t rows; `fingertip` (t, 7), lowest point, m, and quaternion. Returns (rows in contact,), m.
+    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the lowest point, r_j the positions.
     """
     rows = sums.touching
     centroid = np.column_stack([sums.x, sums.y])[rows] / sums.total[rows, None]
@@ -105,12 +89,7 @@ def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
 
 
 def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
-    """Return how far the surface under the fingertip stands above its lowest point, in the rows in contact.
-
-    ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
-
-    `sums`: of t rows; `fingertip` (t, 7), lowest point, m, and quaternion. Returns (rows in contact,), m.
-    """
+    """Return ``sum F_j H_j / sum F_j - z``, the surface under the fingertip, in the rows in contact, m."""
     rows, tip = sums.touching, np.asarray(fingertip, dtype=np.float64)
     above: Floats = sums.height[rows] / sums.total[rows] - tip[rows, 2]
     return above
@@ -123,11 +102,8 @@ def measure_ridge_errors(
 
     ``e_j = H_j(end) - z(t_j)``, t_j the last row of `rows` in which no cell is nearer to the
     fingertip than cell j. A cell counts when the fingertip went on, in rows of the same unbroken
-    stretch, to a place at least `away` from it: where it pressed or left is no ridge.
-
-    `position` (n, 2), m; `final` (n,), heights at the end, m; `fingertip` (t, 7), lowest point, m, and
-    quaternion; `rows` bool (t,), rows in which the fingertip shapes; `away`, m. Returns (cells that count,),
-    m, in the order in which the fingertip passed them.
+    stretch, to a place at least `away` from it: where it pressed or left is no ridge. Returned are the
+    cells that count, in the order in which the fingertip passed them.
     """
     place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
     chosen = np.flatnonzero(rows)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,12 +18,9 @@ WINDOW = 0.25
 
 
 def compute_weights(time: ArrayLike) -> Floats:
-    """Return the time each row stands for, s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half of it at the ends.
-
-    `time` (t,), increasing, s. Returns (t,), the weight of a single row is 1.
-    """
+    """Return the time each row stands for, (t,), s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half at the ends."""
     moment = np.asarray(time, dtype=np.float64)
-    if len(moment) < 2:
+    if len(moment) < 2:  # nothing to average over
         return np.ones(len(moment))
     half = 0.5 * np.diff(moment)
     each: Floats = np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
@@ -32,16 +28,13 @@ def compute_weights(time: ArrayLike) -> Floats:
 
 
 def compute_mean(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted mean, or None when there is nothing to average. `values`, `weight` (t,)."""
+    """Return the weighted mean of values (t,), or None when there is nothing to average."""
     total = float(np.sum(weight))
     return float(np.sum(weight * values)) / total if total > 0.0 else None
 
 
 def compute_deviation(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted standard deviation about the weighted mean, or None without any rows.
-
-    `values`, `weight` (t,).
-    """
+    """Return the weighted standard deviation about the weighted mean, or None without any rows."""
     middle = compute_mean(values, weight)
     if middle is None:
         return None
@@ -52,10 +45,7 @@ def compute_deviation(values: Floats, weight: Floats) -> float | None:
 def measure_overshoot(values: ArrayLike, target: float) -> float | None:
     """Return how far a signal goes beyond its target, as a share of its way there.
 
-    ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; a falling signal is judged alike.
-
-    `values` (t,), the signal, from the row in which it sets out. Returns 0 for a signal that never passes its
-    target; None for one that has no way to go.
+    ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; None for a signal at its target from the start.
     """
     signal = np.asarray(values, dtype=np.float64)
     if not len(signal) or signal[0] == target:
@@ -65,13 +55,7 @@ def measure_overshoot(values: ArrayLike, target: float) -> float | None:
 
 
 def measure_settling_time(time: ArrayLike, values: ArrayLike, target: float, band: float) -> float | None:
-    """Return the time after which a signal stays within a band about its target, s.
-
-    From the first row to the first one from which on ``|y_i - y_target| <= band`` to the end.
-
-    `time`, `values` (t,), s, and the signal; `target`, `band`: in the signal's unit. Returns none when the
-    signal is outside the band at its end, or has no rows.
-    """
+    """Return the time after which ``|y_i - y_target| <= band`` to the end, s; None when it never does."""
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     outside = np.flatnonzero(~(np.abs(signal - target) <= band))
     if not len(signal) or (outside.size and outside[-1] == len(signal) - 1):
@@ -85,10 +69,7 @@ def measure_amplitude(values: ArrayLike) -> float:
 
 
 def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
-    """Return how often a signal rises through its mean, Hz; None when it does so less than three times.
-
-    `time`, `values` (t,), s, and the signal.
-    """
+    """Return how often a signal rises through its mean, Hz; None when it does so less than three times."""
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     above = signal > signal.mean() if len(signal) else np.empty(0, dtype=bool)
     rises = np.flatnonzero(~above[:-1] & above[1:])
@@ -108,11 +89,8 @@ def measure_oscillation(
 ) -> float | None:
     """Return the rms over time of a signal less its moving average.
 
-    ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window around row i. A row
-    counts when its whole window is within an unbroken stretch of the chosen rows.
-
-    `time`, `values` (t,), increasing, s, and the signal; `rows` bool (t,), chosen rows; `window`, s. Returns
-    none when no stretch is as long as the window.
+    ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window, s, around row i. A row
+    counts when its whole window is within an unbroken stretch of the chosen rows; None when no row does.
     """
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     off: list[Floats] = []
@@ -139,47 +117,20 @@ ABOVE, BELOW = (0.07, 0.10), (0.15, 0.27)
 SPATIAL_RESOLUTION = 0.94e-3
 
 
-@dataclass(frozen=True)
-class Perceived:
-    """Deviations in units of touch; None where there is nothing to compute from.
-
-    Attributes
-    ----------
-    least, most : float or None
-        Just noticeable differences of force, with the largest and with the smallest Weber fraction.
-    resolutions : float or None
-        Spatial resolutions of a fingertip.
-    """
-
-    least: float | None
-    most: float | None
-    resolutions: float | None
-
-    def figures(self) -> dict[str, float | None]:
-        """Return the values by the keys of `METRICS`."""
-        return {
-            "rfd_jnd_least": self.least,
-            "rfd_jnd_most": self.most,
-            "ridge_unevenness_touch": self.resolutions,
-        }
-
-
 def find_weber_fractions(force: float) -> tuple[float, float]:
-    """Return the smallest and the largest Weber fraction of a force.
-
-    `force`: reference force, N, above 0. Raises ParameterError when the force is not above 0 or not finite.
-    """
+    """Return the smallest and the largest Weber fraction of a force, N; ParameterError unless above 0."""
     if not (math.isfinite(force) and force > 0.0):
         raise ParameterError("Perception", "force", "must be above 0 N and finite", f"{force:g} N")
     return ABOVE if force >= BORDER else BELOW
 
 
-def perceive(deviation: float | None, force: float | None, unevenness: float | None) -> Perceived:
-    """Return deviations in units of touch.
+def perceive(
+    deviation: float | None, force: float | None, unevenness: float | None
+) -> dict[str, float | None]:
+    """Return the `METRICS` in units of touch; None where there is nothing to compute from.
 
-    `deviation`: of the force from its reference, N, at least 0; `force`: reference force, N, above 0;
-    `unevenness`: of a surface, m, at least 0. Raises ParameterError when a deviation is negative or not
-    finite, or the force is no reference.
+    `deviation`: of the force from its reference, N; `force`: reference force, N; `unevenness`: of a surface,
+    m. Raises ParameterError when a deviation is negative or not finite, or the force is no reference.
     """
     for name, value, unit in (("deviation", deviation, "N"), ("unevenness", unevenness, "m")):
         if value is not None and not (math.isfinite(value) and value >= 0.0):
@@ -188,7 +139,8 @@ def perceive(deviation: float | None, force: float | None, unevenness: float | N
     if deviation is not None and force is not None:
         fine, coarse = find_weber_fractions(force)
         least, most = deviation / (coarse * force), deviation / (fine * force)
-    return Perceived(least, most, None if unevenness is None else unevenness / SPATIAL_RESOLUTION)
+    resolutions = None if unevenness is None else unevenness / SPATIAL_RESOLUTION
+    return {"rfd_jnd_least": least, "rfd_jnd_most": most, "ridge_unevenness_touch": resolutions}
 
 
 #: Settled is a force this near to its set point, as a share of it.
@@ -217,11 +169,9 @@ def compute_rfd(
 
 
 def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
-    """Return the share of the time from first to last contact without contact.
+    """Return the share of the time from first to last contact without contact; None: no contact.
 
     A pause the session makes on purpose, with the fingertip lifted, counts as well.
-
-    `time` (t,), s; `total_force` (t,), N. Returns in [0, 1); None when the fingertip never touches.
     """
     touching = find_contact_rows(total_force)
     if not np.any(touching):
@@ -250,11 +200,9 @@ def find_first_touch(total_force: ArrayLike) -> slice:
 def measure_touchdown(
     time: Floats, total_force: Floats, set_point: Floats
 ) -> tuple[float | None, float | None]:
-    """Return overshoot and settling time of the force at first touch; None without a set point.
+    """Return overshoot, as a share, and settling time, s, of the force at first touch; None: no set point.
 
-    `time`, `total_force` (t,), s, N; `set_point` (t,), total force asked for, N; NaN in rows that ask for
-    none: in them the force is not settled. Returns `passed`: largest force beyond the set point, as a share
-    of its mean over the first touch; `settled`, s.
+    The set point is NaN in rows that ask for no force: in them it is not settled.
     """
     first = find_first_touch(total_force)
     if first.stop == first.start:

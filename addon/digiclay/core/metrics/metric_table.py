@@ -9,24 +9,15 @@ FACTORS = {"mm": 1e3, "mm/s": 1e3, "mN": 1e3, "µm": 1e6, "µs": 1e6, "ml": 1e6,
 
 
 class Metric(NamedTuple):
-    """Number by which a session or a control method is judged.
-
-    Parameters
-    ----------
-    unit : str
-        SI; "1" of a share or a count.
-    doc : str
-        Meaning.
-    label : str
-        Short name for people, where one is shown.
-    shown : str
-        Unit that people read.
-    """
+    """Number by which a session or a control method is judged."""
 
     unit: str
+    """SI; "1" of a share or a count."""
     doc: str
     label: str = ""
+    """Short name for people, where one is shown."""
     shown: str = ""
+    """Unit that people read."""
 
     @property
     def factor(self) -> float:

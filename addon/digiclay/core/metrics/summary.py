@@ -17,64 +17,36 @@ from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.control_interface import SetPoint, find_set_point
 from ..surface.skin_mesh import find_grid_shape
-from .finger_path import (
-    CellSums,
-    find_contact_rows,
-    measure_lag,
-    measure_ridge_errors,
-    measure_surface_under,
-    sum_cells,
-)
+from .finger_path import CellSums, measure_lag, measure_ridge_errors, measure_surface_under, sum_cells
 from .force import (
     compute_contact_loss_share,
     compute_deviation,
     compute_mean,
     compute_rfd,
     compute_weights,
-    find_first_touch,
     measure_oscillation,
     measure_touchdown,
     perceive,
 )
-from .metric_table import METRICS
-
-__all__ = [
-    "METRICS",
-    "compute_cell_area",
-    "compute_contact_loss_share",
-    "compute_metrics",
-    "compute_metrics_from_sums",
-    "compute_rfd",
-    "compute_weights",
-    "find_contact_rows",
-    "find_first_touch",
-    "measure_lag",
-]
 
 #: All cells.
 ALL = slice(None)
 
 
 def compute_cell_area(position: ArrayLike) -> float | None:
-    """Return the area of the bed one cell stands for, m²: distance in a row times distance of the rows.
-
-    `position` (n, 2), m; ordered row by row. Returns a single row is taken as wide as its pins are apart;
-    None for a single pin.
-    """
+    """Return the area a cell of positions (n, 2), row by row, stands for, m²; None for a single pin."""
     place = np.asarray(position, dtype=np.float64)
     rows, columns = find_grid_shape(place)
     along = abs(float(place[1, 0] - place[0, 0])) if columns > 1 else 0.0
     across = abs(float(place[columns, 1] - place[0, 1])) if rows > 1 else 0.0
-    area = (along or across) * (across or along)
-    return area or None
+    # A single row is taken as wide as its pins are apart.
+    return (along or across) * (across or along) or None
 
 
 def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
-    """Return every metric of a session.
+    """Return every metric of a session by the keys of `METRICS`, SI; None without a basis, never a NaN.
 
-    `history`: the arrays of ``history.npz``: time, height, force, mode, fingertip, total_force and position;
-    `set_point`: force asked for; None where none is. Returns the keys of `METRICS` in SI units; None where
-    there is nothing to compute from, never a NaN. Raises ParameterError when the history has no rows.
+    `history`: the arrays of ``history.npz``. Raises ParameterError when the history has no rows.
     """
     time = np.asarray(history["time"], dtype=np.float64)
     if not len(time):
@@ -92,12 +64,9 @@ def compute_metrics_from_sums(
     set_point: SetPoint | None,
     near: NDArray[np.intp] | slice = ALL,
 ) -> dict[str, float | None]:
-    """Return every metric of the session the sums are of.
+    """Return every metric of a session of t rows, (t,) or (t, 7), and n cells, (n, 2); see `compute_metrics`.
 
-    `sums`: of t rows of n cells; `time` (t,), s; `fingertip` (t, 7), lowest point, m, and quaternion;
-    `position` (n, 2), m; ordered row by row; `set_point`: force asked for; None where none is; `near`: the
-    cells that are the nearest to the fingertip at some time, where they are known: only they can be left
-    behind in a ridge. Returns see `compute_metrics`.
+    `near`: the cells nearest to the fingertip at some time: only they can be left behind in a ridge.
     """
     total, weight, felt, rows = sums.total, compute_weights(time), sums.touching, sums.shaping
     # A fingertip straight above its blister is a rounding error away from it, not 1e-17 m.
@@ -108,7 +77,7 @@ def compute_metrics_from_sums(
     wanted = find_set_point(set_point, sums.following)
     beyond, settled = measure_touchdown(time, total, wanted)
     formed, area = sums.last - sums.first, compute_cell_area(position)
-    found: dict[str, float | None] = {
+    values: dict[str, float | None] = {
         "duration": float(time[-1] - time[0]),
         "set_point": _typical(set_point, wanted[rows], weight[rows]),
         "rfd": compute_rfd(time, total, wanted),
@@ -134,10 +103,10 @@ def compute_metrics_from_sums(
         "raised_volume": None if area is None else area * float(np.sum(np.maximum(formed, 0.0))),
         "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
     }
-    known = {
-        name: value if value is not None and np.isfinite(value) else None for name, value in found.items()
+    metrics = {
+        name: value if value is not None and np.isfinite(value) else None for name, value in values.items()
     }
-    return known | perceive(known["rfd"], known["set_point"], known["ridge_unevenness"]).figures()
+    return metrics | perceive(metrics["rfd"], metrics["set_point"], metrics["ridge_unevenness"])
 
 
 def _typical(set_point: SetPoint | None, wanted: Floats, weight: Floats) -> float | None:

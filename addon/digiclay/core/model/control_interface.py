@@ -54,19 +54,15 @@ class Controller(Protocol):
     @property
     def rows(self) -> int:
         """State rows a cell needs."""
-        ...
 
     def begin(self) -> Any:
         """Return the memory before a session."""
-        ...
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
         """Take in the cells the fingertip may touch; return memory and the disc x, y, radius to control."""
-        ...
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Return memory and orders for the cells of the disc and all that still move."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -31,15 +31,12 @@ class Flow(Protocol):
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return flow over drop in laminar flow, m3/s/Pa, of openings K, in the array `out` if given."""
-        ...
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return flow over drop, m3/s/Pa. `opening`: valve opening K; `drop`: pressure drop, Pa."""
-        ...
 
     def flow(self, opening: Floats, drop: Floats) -> Floats:
         """Return the flow into the cylinder, m3/s. `opening`: valve opening K; `drop`: pressure drop, Pa."""
-        ...
 
 
 class Lag(Protocol):
@@ -50,15 +47,12 @@ class Lag(Protocol):
 
     def opening(self, own: Floats, command: Floats) -> Floats:
         """Return the opening K, shape (n,). `own` (rows, n); `command` (n,)."""
-        ...
 
     def rate(self, own: Floats, command: Floats) -> Floats:
         """Return the rates of change of `own`, 1/s. `own` (rows, n); `command` (n,)."""
-        ...
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
         """Return the linear map from own rows and queued commands to the openings at times of a period, s."""
-        ...
 
     def settle(self, own: Floats) -> None: ...
 
@@ -69,12 +63,10 @@ class Pulp(Protocol):
     @property
     def rates(self) -> Floats:
         """Rates of the filters, shape (rows, 1), 1/s."""
-        ...
 
     @property
     def shares(self) -> Floats:
         """Shares of the force that the filters take in the end, shape (rows,)."""
-        ...
 
     @property
     def rows(self) -> int: ...
@@ -83,7 +75,6 @@ class Pulp(Protocol):
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
         """Return the rates of change of `own`, N/s. `own` (rows, k); `tension` (k,), elastic force, N."""
-        ...
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]: ...
 
@@ -91,7 +82,6 @@ class Pulp(Protocol):
 
     def age(self, own: Floats, time: Floats) -> None:
         """Let `own` decay without tension, in place. `own` (rows, k); `time` (k,), s."""
-        ...
 
 
 class Sensors(Protocol):
@@ -102,11 +92,9 @@ class Sensors(Protocol):
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is."""
-        ...
 
     def update(self, own: Floats, truth: Truth) -> None:
         """Bring `own`, (rows, m), up to date, in place, with what there is at the end of a period."""
-        ...
 
     def read(self, seen: Measurement, period: int) -> Measurement:
         """Return cells, as they are after so many control periods, with measured forces and heights."""
@@ -149,23 +137,19 @@ class Stepper(Protocol):
     @property
     def nodes(self) -> tuple[float, ...]:
         """When, in shares of a physics step, the fingertip's pose is needed."""
-        ...
 
     @property
     def bridges(self) -> bool:
         """Whether a step may hold the instant at which a lagging valve goes over to the next command."""
-        ...
 
     def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
         """Compute once what all periods share, for a `physics.Cell` and the physics steps of a period."""
-        ...
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
         """Prepare to move cells on, of which the finger may touch the first k, as often as their set serves.
 
         Rows (r + q, n[, b]) are those of `physics.Cell`, then the commands of the queue, oldest first.
         """
-        ...
 
 
 @dataclass(frozen=True)
