@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.model.conduit import Conduit, OrificeAndConduit, connect_in_series
+from digiclay.core.model.conduit import Conduit, OrificeAndConduit
 from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.valve import Fluid, Orifice, Valve, make_orifice
 from scipy.integrate import quad
@@ -65,7 +65,9 @@ def test_with_the_opening_as_gap_all_openings_turn_turbulent_at_one_drop() -> No
 def series(gap: str = "stroke") -> OrificeAndConduit:
     """Return a wide valve, a thin fluid and a narrow conduit."""
     conduit = Conduit(length=10e-3, diameter=0.3e-3)
-    return connect_in_series(make_orifice(Valve(orifice_diameter=0.8e-3, gap=gap), THIN), conduit, THIN)
+    return OrificeAndConduit(
+        make_orifice(Valve(orifice_diameter=0.8e-3, gap=gap), THIN), conduit.resistance(THIN)
+    )
 
 
 @pytest.mark.parametrize(
@@ -109,9 +111,11 @@ def test_the_drops_of_valve_and_conduit_add_up(gap: str, power: int) -> None:
 
 def test_a_conduit_without_length_changes_nothing_and_behind_a_wide_valve_it_is_all() -> None:
     valve = make_orifice(WIDE, THIN)
-    without = connect_in_series(valve, Conduit(length=0.0), THIN)
+    without = OrificeAndConduit(valve, 0.0)
     assert without.flow(MESH, DROPS) == pytest.approx(valve.flow(MESH, DROPS), rel=1e-14)  # rounding
-    wide = connect_in_series(make_orifice(Valve(orifice_diameter=0.2), Fluid()), Conduit(), Fluid())
+    wide = OrificeAndConduit(
+        make_orifice(Valve(orifice_diameter=0.2), Fluid()), Conduit().resistance(Fluid())
+    )
     # 200 mm against 0.8 mm: the valve's resistance is (1/250)^4 of the conduit's, some 1e-9.
     drop = np.array([1e2, 1e4, 1e5])
     assert wide.flow(np.ones(3), drop) * wide.resistance == pytest.approx(drop, rel=1e-6)

@@ -71,28 +71,19 @@ def count_true(test: NDArray[np.bool_]) -> Any:
 
 
 def per_row(values: Floats, dimensions: int) -> Floats:
-    """Return numbers of each row so that rows (r, n) or (r, n, b) can be calculated with them.
-
-    `values` (r,) or (r, 1) or (r, b); `dimensions`: of the rows.
-    """
+    """Return numbers (r,), (r, 1) or (r, b) such that rows (r, n) or (r, n, b) combine with them."""
     return values.reshape(len(values), *(1,) * (dimensions - 2), -1)
 
 
 def apply_map(linear: Floats, rows: Floats) -> Floats:
-    """Return what a linear map makes of rows.
-
-    `linear` (o, i) or (o, i, b); `rows` (i, n) or (i, n, b). Returns (o, n) or (o, n, b).
-    """
+    """Return what a linear map (o, i[, b]) makes of rows (i, n[, b]), shape (o, n[, b])."""
     made: Floats = np.empty((len(linear), *rows.shape[1:]))
     prepare_map(linear, rows, made)()
     return made
 
 
 def prepare_map(linear: Floats, rows: Floats, out: Floats) -> Callable[[], Any]:
-    """Return a function that works out a linear map of rows, as they are when it is called, into an array.
-
-    `linear`, `rows`: see `apply_map`; `out` (o, n) or (o, n, b), contiguous.
-    """
+    """Return a function that applies a map to rows, as they are then, into contiguous `out`: `apply_map`."""
     if linear.ndim == 3:
         return partial(_by_run, linear, rows, out)
     flat, made = (rows, out) if rows.ndim == 2 else (rows.reshape(len(rows), -1), out.reshape(len(out), -1))

@@ -188,10 +188,9 @@ def _finite(value: float) -> bool:
 
 
 def parse(text: str, unit: str) -> float:
-    """Read a quantity written with a unit, such as ``"3 mm"`` or ``"20um"``, into SI.
+    """Read a quantity with one of the `UNITS`, such as ``"3 mm"``, into an SI unit.
 
-    `text`: a number, and a unit from `UNITS`; `unit`: the SI unit the parameter is declared in. Raises
-    ValueError when the number or the unit cannot be read, or the unit measures something else.
+    Raises ValueError when the number or the unit cannot be read, or the unit measures something else.
     """
     read = WRITTEN.fullmatch(text.strip())
     if not read:
@@ -208,8 +207,5 @@ def parse(text: str, unit: str) -> float:
 
 
 def find_nearest_name(name: str, known: list[str], alike: float = 0.5) -> str:
-    """Return the known name a misspelt one is nearest to, or ``""``; `alike` is the least share in common.
-
-    `alike`: 0 to 1.
-    """
+    """Return the name a misspelt one is nearest to, or ``""``; `alike`, 0 to 1: least share in common."""
     return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=alike)), "")

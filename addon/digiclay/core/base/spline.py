@@ -13,11 +13,9 @@ from .arrays import Floats
 
 
 def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
-    """Return monotone cubic splines through some knots at some places.
+    """Return monotone cubic splines (m, s) through knots (k,), rising or falling, of values (k, s).
 
-    `knot` (k,), rising or falling; two of them give straight lines; `value` (k, s), a column a spline; `at`
-    (m,), beyond the outer knots the splines go on straight. Returns (m, s), between two knots never beyond
-    their values.
+    Two knots give straight lines; at places (m,) beyond the outer ones the splines continue straight.
     """
     if knot[0] > knot[-1]:
         knot, value = knot[::-1], value[::-1]
@@ -37,10 +35,7 @@ def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
 
 
 def compute_inner_slopes(width: Floats, value: Floats) -> Floats:
-    """Return the slopes at the inner knots, and 0 at both ends, shape of `value`.
-
-    `width` (k - 1,), between the knots; `value` (k, s).
-    """
+    """Return the slopes (k, s) at inner knots, 0 at both ends, of widths (k - 1,) and values (k, s)."""
     width = width[:, None]
     secant = np.diff(value, axis=0) / width
     slopes = np.zeros_like(value)

@@ -143,13 +143,7 @@ class BatchStepper:
 
 
 class BatchMovement:
-    """Moves one set of cells of b runs, period by period.
-
-    Parameters
-    ----------
-    plan, rows, near
-        See `interfaces.Stepper.prepare`.
-    """
+    """Moves one set of cells of b runs, period by period; see `interfaces.Stepper.prepare`."""
 
     def __init__(self, batch: BatchStepper, plan: Any, rows: Floats, near: int) -> None:
         self._stepper, self._plan, self._alike = stepper, plan, alike = batch.stepper, plan, batch.alike

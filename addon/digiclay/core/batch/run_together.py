@@ -115,15 +115,8 @@ class Histories:
     """Histories of runs: stretches are kept, and written into a history when it is asked for.
 
     A history of all cells of all runs would fill the memory long before the batch is large enough.
-
-    Parameters
-    ----------
-    scenes : mapping of int to Scene
-        By the numbers of their runs.
-    recorder : Recorder or None
-        Theirs; None: there are no histories.
-    play : Play
-        Before the sessions.
+    Scenes are by the numbers of their runs, `play` is before the sessions; without a recorder there are no
+    histories.
     """
 
     def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:

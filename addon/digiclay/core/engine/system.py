@@ -48,13 +48,11 @@ class System:
         if movement is None:
             movement = self.stepper.prepare(self.plan, active.driven, active.near)
             active.movements[self.plan] = movement
-        active.touched.force[:] = movement(self._trace_underside(active, finger))
-
-    def _trace_underside(self, active: ActiveSet, finger: FingerPeriod | None) -> Floats:
-        """Return the fingertip's underside over the near cells at `instants`, (p, k[, b]), m."""
-        if finger is None or not active.near:
-            return np.empty((self.instants.size, 0, *active.cells.shape[1:]))
-        return finger.under(active.touched.quadratic_basis)
+        if finger and active.near:
+            under = finger.under(active.touched.quadratic_basis)
+        else:
+            under = np.empty((self.instants.size, 0, *active.cells.shape[1:]))
+        active.touched.force[:] = movement(under)
 
 
 def make_segments(

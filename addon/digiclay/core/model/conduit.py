@@ -61,8 +61,3 @@ class OrificeAndConduit:
     def flow(self, opening: Floats, drop: Floats) -> Floats:
         """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`."""
         return self.conductance(opening, drop) * drop
-
-
-def connect_in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:
-    """Put a conduit behind a valve."""
-    return OrificeAndConduit(valve, conduit.resistance(fluid))

@@ -8,6 +8,7 @@ from this one class. A parameter that an earlier law of the section declares is 
 from __future__ import annotations
 
 import importlib
+from dataclasses import field as declare
 from dataclasses import fields, make_dataclass
 from functools import lru_cache
 from typing import Any
@@ -49,17 +50,17 @@ def select_law(section: str, own: Any) -> Any:
 
 def _load(section: str, law: str) -> Any:
     """Import the class of a law's parameters, and refuse one that the steps cannot compute with."""
-    kind, (base, needed) = _import(*LAWS[section][law]), NEEDED[section]
-    missing = [one.__name__ for one in (_import(*base), Parameters) if not issubclass(kind, one)]
-    missing += [one for one in needed if not hasattr(kind, one)]
+    kind, (base, needed) = import_part(*LAWS[section][law]), NEEDED[section]
+    missing = [parent.__name__ for parent in (import_part(*base), Parameters) if not issubclass(kind, parent)]
+    missing += [name for name in needed if not hasattr(kind, name)]
     if missing:
         rule = f"must derive from Parameters and {base[1]}, and have {', '.join(needed)}"
         raise ParameterError(section, law, rule, f"{kind.__name__} without {', '.join(missing)}")
     return kind
 
 
-def _import(module: str, name: str) -> Any:
-    """Import a class of the core."""
+def import_part(module: str, name: str) -> Any:
+    """Import a class of the core by name, now that a scene needs it."""
     return getattr(importlib.import_module(f"..{module}", __package__), name)
 
 
@@ -76,8 +77,8 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
     for name in names[1:]:
         for field in fields(_load(section, name)):
             if field.name not in own:
-                quantities = field.metadata["quantity"]
-                declared.setdefault(field.name, (field.type, _declare(field.default, quantities)))
+                again = declare(default=field.default, metadata=field.metadata)
+                declared.setdefault(field.name, (field.type, again))
 
     def check(self: Any) -> None:
         first.check(self)
@@ -96,12 +97,6 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
     namespace["__module__"] = __name__
     parts = [(name, kind, field) for name, (kind, field) in declared.items()]
     return make_dataclass(first.__name__, parts, bases=(first,), frozen=True, namespace=namespace)
-
-
-def _declare(default: Any, quantities: Any) -> Any:
-    """Declare a field with the quantity of another one."""
-    given = {field.name: getattr(quantities, field.name) for field in fields(quantities)}
-    return quantity(default, given.pop("doc"), **given)
 
 
 def _restore(section: str, values: dict[str, Any]) -> Parameters:

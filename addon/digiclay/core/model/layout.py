@@ -94,8 +94,7 @@ class Layout(Parameters):
     @property
     def shifted(self) -> bool:
         """Whether a cell has six neighbors, not four; ParameterError in a bed without a lattice."""
-        steps = list_steps(ARRANGEMENTS[self.arrangement].shift)
-        return steps.shape[1] == len(BACK)
+        return list_steps(ARRANGEMENTS[self.arrangement].shift).shape[1] == len(BACK)
 
     def find_neighbors(self, *, corners: bool) -> Cells:
         """Return the neighbors of all cells; see the function of this name."""

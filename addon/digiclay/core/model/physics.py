@@ -32,20 +32,20 @@ class Cell:
     touch: Touch | None
 
     @cached_property
-    def lag_rows(self) -> slice:
+    def lag_rows(self) -> slice[int, int, None]:
         """The rows of ``y`` that the valve lag owns."""
         first = self.pulp_rows.stop
         return slice(first, first + self.lag.rows)
 
     @cached_property
-    def pulp_rows(self) -> slice:
+    def pulp_rows(self) -> slice[int, int, None]:
         """The rows of ``y`` that the relaxation owns."""
         return slice(1, 1 + (self.touch.pulp.rows if self.touch else 0))
 
     @cached_property
     def rows(self) -> int:
         """State rows a cell needs."""
-        return 1 + (self.touch.pulp.rows if self.touch else 0) + self.lag.rows
+        return self.pulp_rows.stop + self.lag.rows
 
 
 @dataclass(frozen=True, eq=False)

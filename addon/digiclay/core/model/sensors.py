@@ -122,12 +122,7 @@ def _draw_uniform(counter: Words) -> Floats:
 class NoiseAhead:
     """Normal numbers of the coming periods, drawn at once for the cells read last.
 
-    They depend on seed, period and cell alone, so that any leading part of the cells is served with them.
-
-    Parameters
-    ----------
-    seed : int or ndarray of int (b,)
-        Not negative.
+    They depend on seed, a number or (b,), period and cell alone, so any leading part of the cells is served.
     """
 
     def __init__(self, seed: Any) -> None:

@@ -47,27 +47,16 @@ class Trajectory:
 
     *smooth* joins them by monotone cubics (Fritsch and Carlson): velocity is continuous,
     and no coordinate overshoots a waypoint. *linear* joins them by straight lines.
-    Before the first and after the last waypoint the fingertip stays.
-
-    Parameters
-    ----------
-    times : ndarray (w,)
-        Strictly increasing, s.
-    positions : ndarray (w, 3)
-        m.
-    orientations : ndarray (w, 4)
-        Unit quaternions w, x, y, z; turned along the shortest arc.
-    interpolation : {"smooth", "linear"}
-
-    Raises
-    ------
-    ParameterError
-        On values that are not finite, times that do not increase, or a quaternion of length 0.
+    Before the first and after the last waypoint the fingertip stays. Raises ParameterError on values that are
+    not finite, times that do not increase, or a quaternion of length 0.
     """
 
     times: Floats
+    """(w,): Strictly increasing, s."""
     positions: Floats
+    """(w, 3): m."""
     orientations: Floats
+    """(w, 4): Quaternions w, x, y, z, turned along the shortest arc; made unit ones."""
     interpolation: str = "smooth"
 
     def __post_init__(self) -> None:

@@ -16,41 +16,36 @@ from ..engine.system import System, make_segments
 from ..model.control_interface import Controller
 from ..model.delay import Queue, split_delay
 from ..model.fingertip import require_one
-from ..model.interfaces import Flow, Lag, Pulp, Sensors, Stepper
-from ..model.laws import select_law
+from ..model.interfaces import Flow, Sensors, Stepper
+from ..model.laws import import_part, select_law
 from ..model.layout import Grid, make_grid
+from ..model.null_parts import InstantValve, PerfectSensors, Uncontrolled, Unrelaxed
 from ..model.physics import Cell, find_speeds
 from ..model.touch import Touch
 from ..model.valve import Orifice
-from .schema import STEPPERS, Finger, Scene, import_part
+from .schema import STEPPERS, Scene
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Part of a system that depends neither on the bed, the control nor the sensors: how a cell moves.
-
-    Attributes
-    ----------
-    line : Queue
-        Commands on their way.
-    plan : object
-        The stepper's.
-    instants : ndarray
-        See `engine.system.make_segments`.
-    """
+    """Part of a system that depends neither on the bed, the control nor the sensors: how a cell moves."""
 
     cell: Cell
     line: Queue
+    """Commands on their way."""
     stepper: Stepper
     plan: Any
+    """The stepper's."""
     instants: Floats
+    """See `engine.system.make_segments`."""
 
 
 def make_motion(scene: Scene) -> Motion:
     """Build a scene's cells and the plan of their steps."""
     stepper = _make_stepper(scene)
     period = scene.simulation.control_period
-    cell = Cell(scene.actuator, _make_flow(scene), scene.supply, _make_lag(scene), _make_touch(scene))
+    lag = scene.valve_lag or InstantValve()
+    cell = Cell(scene.actuator, _make_flow(scene), scene.supply, lag, _make_touch(scene))
     line = split_delay(scene.delay, period) if scene.delay else Queue()
     # An opening that lags has a kink where the next command comes through; one that does not, a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
@@ -59,29 +54,22 @@ def make_motion(scene: Scene) -> Motion:
 
 
 def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
-    """Return how many rows the state of a scene's system has. `motion`: both its own."""
-    return _count_rows(motion, *_make_control(scene, bed, motion))
+    """Return the rows of the state of a scene's system; `bed` and `motion`: its own."""
+    return _make_control(scene, bed, motion)[2]
 
 
-def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, Sensors]:
-    """Build the control method and the sensors."""
-    return (
-        _make_controller(scene, bed, motion.cell),
-        _make_sensors(scene, motion.cell, motion.line),
-    )
-
-
-def _count_rows(motion: Motion, controller: Controller, sensors: Sensors) -> Rows:
-    """Return the rows of each part's memory."""
-    return Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows)
+def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, Sensors, Rows]:
+    """Build the control method and the sensors, and count the rows of each part's memory."""
+    controller = _make_controller(scene, bed, motion.cell)
+    sensors = _make_sensors(scene, motion.cell, motion.line)
+    return controller, sensors, Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows)
 
 
 def assemble(scene: Scene) -> System:
     """Build the system of a scene."""
     motion, period = make_motion(scene), scene.simulation.control_period
     bed = make_grid(scene.layout)
-    controller, sensors = _make_control(scene, bed, motion)
-    rows = _count_rows(motion, controller, sensors)
+    controller, sensors, rows = _make_control(scene, bed, motion)
     fastest = find_speeds(motion.cell).rise
     return System(
         grid=bed,
@@ -95,15 +83,10 @@ def assemble(scene: Scene) -> System:
         selection=Selection(bed, rows, motion.cell, period, fastest),
         instants=motion.instants,
         rows=rows,
-        by_set=_depends_on_set(scene),
+        by_set=bool(
+            (scene.sensors and scene.sensors.noisy) or (scene.control and find_method(scene.method).by_set)
+        ),
     )
-
-
-def _depends_on_set(scene: Scene) -> bool:
-    """Return whether what becomes of a cell depends on which others are active."""
-    if scene.sensors and scene.sensors.noisy:
-        return True
-    return bool(scene.control) and find_method(scene.method).by_set
 
 
 def _make_stepper(scene: Scene) -> Stepper:
@@ -118,18 +101,9 @@ def _make_flow(scene: Scene) -> Flow:
     valve: Orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
     if scene.conduit is None:
         return valve
-    from ..model.conduit import connect_in_series
+    from ..model.conduit import OrificeAndConduit
 
-    return connect_in_series(valve, scene.conduit, scene.fluid)
-
-
-def _make_lag(scene: Scene) -> Lag:
-    """Return how the valve follows its command."""
-    if scene.valve_lag:
-        return scene.valve_lag
-    from ..model.null_parts import InstantValve
-
-    return InstantValve()
+    return OrificeAndConduit(valve, scene.conduit.resistance(scene.fluid))
 
 
 def _make_touch(scene: Scene) -> Touch | None:
@@ -137,22 +111,11 @@ def _make_touch(scene: Scene) -> Touch | None:
     finger = require_one(scene.fingers)
     if finger.fingertip is None or finger.contact is None:
         return None
-    return Touch(finger.fingertip, select_law("contact", finger.contact), _make_pulp(finger))
-
-
-def _make_pulp(finger: Finger) -> Pulp:
-    """Return how the fingertip's pulp relaxes."""
-    if finger.relaxation:
-        return finger.relaxation
-    from ..model.null_parts import Unrelaxed
-
-    return Unrelaxed()
+    return Touch(finger.fingertip, select_law("contact", finger.contact), finger.relaxation or Unrelaxed())
 
 
 def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
     """Return the sensor chain of a scene."""
-    from ..model.null_parts import PerfectSensors
-
     sensors: Sensors = PerfectSensors()
     known = scene.sensors
     if known is None:
@@ -176,8 +139,6 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
 def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
     """Return the control method, before it the display of a shape."""
     if scene.control is None and scene.shape is None:
-        from ..model.null_parts import Uncontrolled
-
         return Uncontrolled()
     from ..control.device_info import DeviceInfo
 

@@ -63,10 +63,7 @@ def find_summit(grid: Grid, heights: Floats) -> tuple[float, float]:
 
 
 def find_touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
-    """Return the height at which a level finger that comes down over a place first touches, m.
-
-    `heights` (n,), pin tops, m; `x`, `y`: the place, m.
-    """
+    """Return the height at which a level finger coming down over a place, m, first touches tops (n,), m."""
     outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
     under = compute_underside(*compute_forms(outline), grid.compute_basis(np.arange(grid.count)))
     return float(np.max(heights - under[0]))
@@ -75,8 +72,7 @@ def find_touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, 
 def make_forming_scene(scene: Scene, system: System, gesture: str) -> Scene:
     """Return a scene whose finger waits until the shape stands, and then forms its highest part.
 
-    `scene`: with a shape; `system`: of that scene; `gesture`: a key of `GESTURES`. Raises ParameterError when
-    the scene has no shape, or no finger.
+    `gesture`: a key of `GESTURES`. Raises ParameterError when the scene has no shape, or no finger.
     """
     display = find_display(system)
     if display is None:

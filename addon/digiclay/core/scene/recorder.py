@@ -11,11 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Modes
 from ..base.quantity import Parameters, quantity
 from ..engine.state import ActiveSet, Rows, State
-
-Modes = NDArray[np.int8]
 
 #: Most rows that wait to be written together.
 CHUNK = 64
@@ -33,25 +31,18 @@ class Recorder(Parameters):
 
 
 class Stretch(NamedTuple):
-    """The rows of some periods in which the same w cells take part, of one run or of b.
-
-    Attributes
-    ----------
-    cells : ndarray of int (w,) or (w, b)
-    felt : ndarray (t, 2, w) or (t, 2, w, b)
-        Heights and forces in t rows.
-    command, mode : ndarray (s, w) or (s, w, b)
-        Those given in the periods that start with s rows.
-    last, last_mode : ndarray (2, w), (w,) or (2, w, b), (w, b)
-        Heights and forces, and modes, after the last of the periods.
-    """
+    """The rows of some periods in which the same w cells take part, of one run or, in a last axis, of b."""
 
     cells: NDArray[np.intp]
+    """(w,)."""
     felt: Floats
+    """(t, 2, w): Heights and forces in t rows."""
     command: Floats
     mode: Modes
+    """(s, w): Those given in the periods that start with s rows."""
     last: Floats
     last_mode: Modes
+    """(2, w) and (w,): Heights and forces, and modes, after the last of the periods."""
 
     def split(self) -> list[Stretch]:
         """Return the stretches of b runs, each in memory of its own."""
@@ -60,15 +51,7 @@ class Stretch(NamedTuple):
 
 
 class Recording:
-    """Takes rows from states, and hands them on in stretches.
-
-    Parameters
-    ----------
-    rows : Rows
-        Which row of the state holds what.
-    keep : callable
-        Given every stretch, in their order.
-    """
+    """Takes rows from states, and gives them to `keep` in stretches, in their order."""
 
     def __init__(self, recorder: Recorder, rows: Rows, keep: Callable[[Stretch], None]) -> None:
         self.every = recorder.every
@@ -104,16 +87,11 @@ class Recording:
 
 
 class HistoryWriter:
-    """Rows of one session, preallocated.
+    """Rows of one session, preallocated for at most `count` of them.
 
     Row i is the state at its time; the command and the mode in it are those given in the control
     period that starts then. Nothing is commanded after the last row: its command is 0, and its
     mode that of the period before.
-
-    Parameters
-    ----------
-    count, cells : int
-        Most rows, and cells.
     """
 
     def __init__(self, count: int, cells: int) -> None:
@@ -126,10 +104,7 @@ class HistoryWriter:
         self._done = self._given = 0
 
     def begin(self, height: Floats, mode: Modes) -> None:
-        """Begin anew with the state before a session, in which no force acts.
-
-        `height`, `mode` (n,), of all cells.
-        """
+        """Begin anew with heights and modes (n,) before a session, in which no force acts."""
         self._now[:], self._mode_now[:] = (height, np.zeros_like(height)), mode
         self._height[0], self._force[0] = self._now
         self._done, self._given = 1, 0
@@ -151,8 +126,7 @@ class HistoryWriter:
     def finish(self, period: int, every: int) -> dict[str, NDArray[Any]]:
         """Return the rows: period (t,), height, force, command, mode (t, n); valid until it begins anew.
 
-        `period`: control periods done; where the session was cut short between two rows, it gets one more;
-        `every`: control periods a row.
+        A session cut short between two rows, of `every` periods each, gets one more.
         """
         count = 1 - (-period // every)
         self._height[count - 1], self._force[count - 1] = self._now
@@ -164,17 +138,7 @@ class HistoryWriter:
 
 
 class RunRecording(Recording):
-    """The recording of one run, which is written into its history meanwhile.
-
-    Parameters
-    ----------
-    recorder, rows
-        See `Recording`.
-    state : State
-        Before the session.
-    periods : int
-        Control periods the session may have.
-    """
+    """The recording of one run of at most so many periods, which is written into its history meanwhile."""
 
     def __init__(self, recorder: Recorder, rows: Rows, state: State, periods: int) -> None:
         self._history = HistoryWriter(recorder.rows(periods), state.rows.shape[1])

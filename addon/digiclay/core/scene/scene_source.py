@@ -26,10 +26,7 @@ def list_samples() -> list[str]:
 
 
 def find(word: str) -> Path:
-    """Return the file of a scene: a sample's name, a file, or the folder of a run.
-
-    Raises SceneError when there is no such file, or sample.
-    """
+    """Return the file of a scene, of a sample's name, a file, or the folder of a run; SceneError: none."""
     samples = list_files(SAMPLES, ".toml")
     if word not in samples and os.path.isdir(word):
         word = os.path.join(word, "scene.toml")
@@ -37,38 +34,23 @@ def find(word: str) -> Path:
 
 
 class Setting(NamedTuple):
-    """Change of a scene file by an option of the command line.
-
-    Attributes
-    ----------
-    key : str
-        Section and key, ``valve.stroke``.
-    value : str
-        TOML; a text needs no quotes.
-    option : str
-        What messages call it.
-    """
+    """Change of a scene file by an option of the command line."""
 
     key: str
+    """Section and key, ``valve.stroke``."""
     value: str
+    """TOML; a text needs no quotes."""
     option: str = "--set"
+    """What messages call it."""
 
 
 def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
-    """Read a scene file, and override it by settings.
-
-    Raises SceneError: one line: file or option, key, rule, value.
-    """
+    """Read a scene file with settings; SceneError: one line, of file or option, key, rule and value."""
     return make_scene(path, read_table(path), settings)
 
 
 def load_recorded(path: Path) -> Scene:
-    """Read the scene of a finished run, which need not be simulated again.
-
-    Without its control, when that is a method of one's own that is not loaded.
-
-    Raises SceneError as `load`.
-    """
+    """Read the scene of a finished run; without its control, when its method is not loaded."""
     table = read_table(path)
     control = table.get("control")
     method = control.get("method") if isinstance(control, dict) else None
@@ -80,11 +62,9 @@ def load_recorded(path: Path) -> Scene:
 def make_scene(
     path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = (), known: ReadParts | None = None
 ) -> Scene:
-    """Make a scene of its file's content, overridden by settings.
+    """Make a scene of the `read_table` of its file, overridden by settings; SceneError as `load`.
 
-    `path`: the file, by which messages call the scene, and beside which a shape may lie; `table`: what
-    `read_table` gives of it; it stays as it is; `known`: parts of scenes of the same file, which are not read
-    again. Raises SceneError as `load`.
+    A shape may lie beside the file. `known`: parts of scenes of the same file, which are not read again.
     """
     try:
         merged = merge_one_finger(_find_beside(table, path.parent))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -13,7 +12,7 @@ from ..base.quantity import Parameters, quantity
 from ..control.methods import ControlParameters, find_method
 from ..model.control_interface import SetPoint
 from ..model.fingertip import require_one
-from ..model.laws import LAWS, law_parameters
+from ..model.laws import LAWS, import_part, law_parameters
 from ..model.trajectory import Path, Trajectory
 
 if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part`
@@ -78,12 +77,6 @@ MOST_STEPS = 1000
 #: Most physics steps in a control period of steppers that cut each further: their plans grow with the square,
 #: to a gigabyte.
 MOST_CUT = {"adaptive": 10, "richardson": 500}
-
-
-@lru_cache
-def import_part(module: str, name: str) -> Any:
-    """Import a class of the core by name, now that a scene needs it. `module`, `name`: of the class."""
-    return getattr(importlib.import_module(f"..{module}", __package__), name)
 
 
 def import_parameters(section: str, method: str) -> type[Parameters]:

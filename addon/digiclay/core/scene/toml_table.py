@@ -36,8 +36,8 @@ TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
 def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Scene:
     """Make a scene of the tables of a scene file; whatever they leave open gets its default.
 
-    `table`: as `tomllib.loads` gives it; `name`: the scene's name, where the table has none; `known`: parts
-    of similar tables, which are not read again. Raises ParameterError: its owner is the section.
+    `name`: where the table has none; `known`: parts of similar tables, which are not read again. Raises
+    ParameterError: its owner is the section.
     """
     known = known or ReadParts()
     refuse_unknown("", table, TOP_LEVEL)
@@ -199,10 +199,7 @@ def _read_waypoint(owner: str, row: Table) -> Waypoint:
 
 
 def format_scene(scene: Scene, write: Writer | None = None) -> str:
-    """Write a scene as a scene file that resolves to an equal one: every parameter, in SI units.
-
-    `write`: another `write_part`.
-    """
+    """Write a scene as a scene file that resolves to an equal one, in SI units; `write`: as `write_part`."""
     return "\n".join(_write_lines(scene, write or write_part)) + "\n"
 
 
@@ -233,10 +230,7 @@ def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
 
 
 def write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:
-    """Return the lines of a section; none for an omitted part.
-
-    `method`: the control method, in the control's section.
-    """
+    """Return the lines of a section, in the control's with its method; none for an omitted part."""
     if part is None:
         return
     if isinstance(part, Path):

@@ -85,45 +85,6 @@ class BernoulliPlan:
     """Pressure that a unit of tension makes, Pa."""
 
 
-def make_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
-    """Compute once what all periods share."""
-    times, weights, nodes = _gauss_points(queue, segments)
-    end = segments[-1].start + segments[-1].length
-    pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
-    to_decay = contact.share * contact.stiffness / cell.actuator.area
-    m, supply = contact.exponent, cell.supply
-    to_load, unit = to_decay / m, contact.stiffness / m
-    shares = tuple(1.0 - pulp.mean_loss_map(part.length)[1] for part in segments)
-    steps, deviations = np.zeros((2, len(nodes), len(times)))
-    for s, part in enumerate(segments):
-        own = nodes[s]
-        steps[s, own] = weights[own] / cell.actuator.area
-        deviations[s, own] = steps[s, own] * (0.5 - (times[own] - part.start) / part.length)
-
-    widest = float(cell.flow.laminar_conductance(1.0))
-    hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
-
-    moves = _moves(supply, steps, m * deviations, to_decay * np.array(shares)[:, None] * steps, m)
-    path = m * _path(segments)
-    return BernoulliPlan(
-        cell,
-        segments,
-        cell.lag.response(queue, [*times, end]),
-        moves,
-        path,
-        _loaded(moves, path, m * contact.offset),
-        nodes,
-        weights,
-        tuple(_mean_loss(pulp, part.length, unit) for part in segments),
-        tuple(_propagator(pulp, part.length, unit, contact.share) for part in segments),
-        shares,
-        cell.flow.knee > supply.largest,
-        (m, m * contact.offset, 1.0 / m, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY),
-        np.array([hard, hard, hard, 0.5 * LARGE, LARGEST_DEVIATION]),
-        to_load,
-    )
-
-
 def _hard(cell: Cell, to_load: float, steepest: float) -> float:
     """Return the exponent from which on a flow may be turbulent or an exponential overflow."""
     # How far the load may drive up the drop before some flow could turn turbulent.
@@ -220,7 +181,39 @@ class BernoulliExponential:
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
         """Work out once what all periods share."""
-        return make_plan(cell, queue, segments)
+        times, weights, nodes = _gauss_points(queue, segments)
+        end = segments[-1].start + segments[-1].length
+        pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
+        to_decay = contact.share * contact.stiffness / cell.actuator.area
+        m, supply = contact.exponent, cell.supply
+        to_load, unit = to_decay / m, contact.stiffness / m
+        shares = tuple(1.0 - pulp.mean_loss_map(part.length)[1] for part in segments)
+        steps, deviations = np.zeros((2, len(nodes), len(times)))
+        for s, part in enumerate(segments):
+            own = nodes[s]
+            steps[s, own] = weights[own] / cell.actuator.area
+            deviations[s, own] = steps[s, own] * (0.5 - (times[own] - part.start) / part.length)
+        widest = float(cell.flow.laminar_conductance(1.0))
+        hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
+        moves = _moves(supply, steps, m * deviations, to_decay * np.array(shares)[:, None] * steps, m)
+        path = m * _path(segments)
+        return BernoulliPlan(
+            cell,
+            segments,
+            cell.lag.response(queue, [*times, end]),
+            moves,
+            path,
+            _loaded(moves, path, m * contact.offset),
+            nodes,
+            weights,
+            tuple(_mean_loss(pulp, part.length, unit) for part in segments),
+            tuple(_propagator(pulp, part.length, unit, contact.share) for part in segments),
+            shares,
+            cell.flow.knee > supply.largest,
+            (m, m * contact.offset, 1.0 / m, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY),
+            np.array([hard, hard, hard, 0.5 * LARGE, LARGEST_DEVIATION]),
+            to_load,
+        )
 
     def prepare(self, plan: BernoulliPlan, rows: Floats, near: int) -> StepWorkspace:
         """Prepare to move a block of cells; see `interfaces.Stepper`."""
@@ -232,12 +225,7 @@ class StepWorkspace:
 
     The cells are those of one run, (n,), or of b runs, (n, b), and then the plan's numbers and maps may
     be each run's own. What is in the arrays before a period does not count. Linear maps are bound to
-    the arrays they lead from and to.
-
-    Parameters
-    ----------
-    plan, rows, near
-        See `interfaces.Stepper.prepare`; k is short for `near` here.
+    the arrays they lead from and to. See `interfaces.Stepper.prepare`; k is short for `near` here.
     """
 
     def __init__(self, plan: BernoulliPlan, rows: Floats, near: int) -> None:

@@ -37,9 +37,8 @@ _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 def solve_pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     """Return the relief of cells that stay under load: ``e(1) - e(0) = growth - relief``.
 
-    `grown` (k,), ``exp(e(0))``; `growth`, `decay` (k,), neither may be zero (`TINY` will do); neither
-    exponent may pass `LARGE`. Returns (k,), ``log(1 + q)``, ``q = decay exp(e) (exp(growth) - 1)/growth``.
-    The mean of exp(e) over the step is relief / decay.
+    It is ``log(1 + q)``, ``q = decay grown (exp(growth) - 1)/growth``, `grown` being ``exp(e(0))``; relief /
+    decay is the mean of exp(e). Growth and decay may not be zero (`TINY` will do), no exponent pass `LARGE`.
     """
     q: Floats = np.expm1(growth)
     q /= growth
@@ -54,9 +53,8 @@ def solve_carefully(
 ) -> tuple[Floats, Floats]:
     """Return the load's part of the way, and the mean of exp(e), of cells that stay under load, at any size.
 
-    `exponent` (k,), e(0); `growth`, `slip`, `decay`, `pulp` (k,), see the module; `decay` not below `TINY`,
-    `growth` not zero (`TINY` will do). Returns `push` (k,), ``e(1) - e(0) - slip``, never above 0 where e(0)
-    is above ``log(pulp)``; `mean` (k,).
+    `decay` not below `TINY`, `growth` not zero (`TINY` will do). The first, ``e(1) - e(0) - slip``, is never
+    above 0 where e(0) is above ``log(pulp)``.
     """
     size = np.abs(growth)
     part, log_decay = np.log(-np.expm1(-size) / size), np.log(decay)
@@ -78,13 +76,11 @@ def solve_carefully(
 def solve_crossing(
     exponent: Floats, deviation: Floats, slip: Floats, decay: Floats, pulp: Floats
 ) -> tuple[Floats, Floats]:
-    """Solve for cells that meet or leave the fingertip within the step.
+    """Return ``e(1) - e(0) - slip`` and the mean of ``max(exp(e) - 1, 0)`` of cells that meet or leave.
 
-    `exponent`, `slip`, `decay`, `pulp` (k,), see the module. Below ``log(pulp)`` at the start means meeting,
-    above it leaving; `deviation` (k,), chord deviation of the path without load: its mean above the straight
-    line between its ends. Returns `push` (k,), ``e(1) - e(0) - slip``, the load's part; the instant of
-    meeting or leaving is found exactly on a straight way, and to second order on a bent one; `mean` (k,),
-    mean of ``max(exp(e) - 1, 0)``.
+    Below ``log(pulp)`` at the start means meeting, above it leaving; the instant is exact on a straight way,
+    and of second order on a bent one. `deviation`: chord deviation of the path without load, its mean above
+    the straight line between its ends.
     """
     growth = replace_zeros(slip + decay * pulp)
     slip = np.where(np.abs(slip) < _STILL, _STILL, slip)
