@@ -38,14 +38,14 @@ def test_a_run_is_silent_when_it_is_wrong_and_its_estimate_does_not_show_it(
     assert stiff.Outcome(error * stiff.WRONG, estimate * stiff.WRONG).silent is silent
 
 
-def test_warnings_and_overflow_are_errors_and_a_divergence_is_shown_by_quantity_value_and_time(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_strict_makes_errors_of_warnings_and_overflow() -> None:
     with pytest.raises(UserWarning, match="careful"), stiff.strict():
         warnings.warn("careful", stacklevel=1)
     with pytest.raises(FloatingPointError), stiff.strict():
         np.exp(np.array([1e4]))
 
+
+def test_a_divergence_is_shown_by_quantity_value_and_time(monkeypatch: pytest.MonkeyPatch) -> None:
     def diverged(*_: object) -> None:
         raise DivergenceError(0.25, 3, "height", math.nan, "Use a shorter step.")
 
@@ -54,10 +54,13 @@ def test_warnings_and_overflow_are_errors_and_a_divergence_is_shown_by_quantity_
     assert outcome.cell == "height nan at 0.25 s"
 
 
-def test_all_steps_play_the_same_commands_and_the_reference_agrees_with_another_stepper() -> None:
+def test_all_steps_play_the_same_commands() -> None:
     # Each divides the time of a command: the problem does not change with the step.
     ratios = [stiff.HOLD / stiff.period_of(step) for step in stiff.STEPS]
     assert ratios == pytest.approx([round(ratio) for ratio in ratios], abs=1e-9)
+
+
+def test_the_reference_agrees_with_another_stepper() -> None:
     # Runge-Kutta at 0.1 ms, order 4 but for the kinks: 10 nm.
     commands = stiff.commands_of(CASES[EASY])
     exact, _ = stiff.reference(CASES[EASY], commands)

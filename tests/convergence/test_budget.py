@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -11,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import SAMPLES
 from digiclay.core.scene.schema import Scene
 from digiclay.core.studies.omissions import Fitted, find_omissions, propose_omissions
+from numpy.typing import NDArray
 
 from tests.assemble import record, sample
 
@@ -33,7 +34,7 @@ def cut(name: str) -> Scene:
     return replace(scene, simulation=replace(scene.simulation, duration=lasts))
 
 
-def heights(scene: Scene) -> Floats:
+def heights(scene: Scene) -> NDArray[np.float64]:
     """Return all heights of a run, (t, n), m."""
     return record(assemble(scene), scene.section("trajectory").trajectory(), scene.periods).height
 
@@ -61,7 +62,11 @@ def test_the_error_told_is_the_one_against_a_tenfold_finer_integration_within_it
     assert off <= one.departure + 2.0 * one.own_error + 1e-6  # the full scene's own error at 1 ms
 
 
-def test_what_is_left_out_is_left_out_of_the_scene_and_what_leaves_the_budget_is_not_kept() -> None:
+def test_a_larger_budget_leaves_no_more_work_to_do() -> None:
+    assert found("tap", BUDGET).work <= found("tap", 5e-6).work < 1.0
+
+
+def test_what_is_left_out_is_left_out_of_the_scene() -> None:
     one = find_omissions(cut("tap"), 500e-6)
     full = {omission.said: omission.leave_out for omission in propose_omissions(cut("tap"), 500e-6)}
     rebuilt = cut("tap")
@@ -69,24 +74,28 @@ def test_what_is_left_out_is_left_out_of_the_scene_and_what_leaves_the_budget_is
         rebuilt = full[said](rebuilt)
     assert one.left_out
     assert one.scene == rebuilt
-    narrow = found("tap", 5e-6)
-    assert found("tap", BUDGET).work <= narrow.work < 1.0
-    relaxation = next(tried for tried in narrow.tried if "relax" in tried.said)
+
+
+def test_a_trial_that_leaves_the_budget_is_broken_off_and_not_kept() -> None:
+    relaxation = next(tried for tried in found("tap", 5e-6).tried if "relax" in tried.said)
     assert (relaxation.departure, relaxation.kept) == (math.inf, False)
 
 
-@pytest.mark.parametrize(
-    ("budget", "said"),
-    [
-        *((no_length, r"run.budget must be above 0 m") for no_length in (0.0, -1e-6, math.nan, math.inf)),
-        (1e-10, r"own integration.*richardson"),
-    ],
-)
-def test_a_budget_that_is_no_length_or_below_the_integrations_own_error_is_refused(
-    budget: float, said: str
-) -> None:
-    with pytest.raises(ParameterError, match=said):
+@pytest.mark.parametrize("budget", [0.0, -1e-6, math.nan, math.inf])
+def test_a_budget_that_is_no_length_is_refused(budget: float) -> None:
+    with pytest.raises(ParameterError, match=r"run.budget must be above 0 m"):
         find_omissions(cut("tap"), budget)
+
+
+def test_a_budget_below_the_integrations_own_error_is_refused_with_the_remedy() -> None:
+    with pytest.raises(ParameterError, match=r"own integration.*richardson"):
+        find_omissions(cut("tap"), 1e-10)
+
+
+def told(capsys: pytest.CaptureFixture[str]) -> Callable[[str], bool]:
+    """Return a function that tells whether something was printed."""
+    text = capsys.readouterr().out
+    return lambda said: said in text
 
 
 def test_run_with_a_budget_tells_what_it_left_out_and_writes_it(
@@ -94,9 +103,9 @@ def test_run_with_a_budget_tells_what_it_left_out_and_writes_it(
 ) -> None:
     out = tmp_path / "run"
     assert main(["run", "tap", "--budget", "20um", "--out", str(out), "--no-errors"]) == 0
-    printed = capsys.readouterr().out
+    printed = told(capsys)
     noted = json.loads((out / "metrics.json").read_text())["budget"]
     assert noted["allowed"] == pytest.approx(20e-6, rel=1e-15)  # read from "20um": rounding
     assert noted["measured"] <= 20e-6
     assert noted["left_out"]
-    assert all(said in printed for said in noted["left_out"])
+    assert all(printed(said) for said in noted["left_out"])
