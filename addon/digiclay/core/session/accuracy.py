@@ -39,21 +39,14 @@ STRETCH, PAUSE, SPREAD = 20, 180, 4
 
 @dataclass(frozen=True)
 class Errors:
-    """Largest errors over all cells: over all rows of a run, or at the end of a stretch of a live session.
-
-    Attributes
-    ----------
-    height : float
-        m.
-    force : float
-        Of a cell, N.
-    total_force : float
-        Of all cells together, N.
-    """
+    """Largest errors over all cells: over all rows of a run, or at the end of a stretch of a live session."""
 
     height: float
+    """m."""
     force: float
+    """Of a cell, N."""
     total_force: float
+    """Of all cells together, N."""
 
     @classmethod
     def estimate(cls, largest: Floats) -> Errors:
@@ -63,34 +56,23 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class ErrorMonitor:
-    """Reference solution of a live session, over a stretch at intervals; it lags behind the session.
-
-    Attributes
-    ----------
-    system : System
-        The session's, with the `reference_settings`.
-    state : State or None
-        The reference's; None between two stretches.
-    age : int
-        Control periods of the session since the stretch began.
-    done : int
-        Control periods of the reference since then.
-    before : int
-        Control periods of the session in the tick before.
-    waiting : tuple of (State, ndarray)
-        Periods of the stretch that the reference has still to do: the session after each, of which only the
-        active cells are as they were then, and the fingertip at both ends of it.
-    reached : ndarray (2, n) or None
-        Heights, m, and forces, N, of the session at the end of the stretch.
-    """
+    """Reference solution of a live session, over a stretch at intervals; it lags behind the session."""
 
     system: System
+    """The session's, with the `reference_settings`."""
     state: State | None = None
+    """The reference's; None between two stretches."""
     age: int = 0
+    """Control periods of the session since the stretch began."""
     done: int = 0
+    """Control periods of the reference since then."""
     before: int = 0
+    """Control periods of the session in the tick before."""
     waiting: Noted = ()
+    """Periods of the stretch that the reference has still to do: the session after each, of
+    which only the active cells are as they were then, and the fingertip at both ends of it."""
     reached: Floats | None = None
+    """(2, n): Heights, m, and forces, N, of the session at the end of the stretch."""
 
 
 def has_every_command(scene: Scene) -> bool:

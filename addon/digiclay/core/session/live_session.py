@@ -32,24 +32,16 @@ SLACK = 1e-6
 
 @dataclass(frozen=True)
 class Clock:
-    """Wall clock of a live session.
-
-    Attributes
-    ----------
-    seen : float or None
-        When the clock was last looked at, s; None: it starts with the next look.
-    left : float
-        Time gone by that is not simulated yet, less than a control period, s.
-    cost : float
-        Wall time one control period takes, s, as measured of late; 0: not known.
-    ticks : tuple of (float, float)
-        When the clock was looked at within the last second, and what was simulated then, s.
-    """
+    """Wall clock of a live session."""
 
     seen: float | None = None
+    """When the clock was last looked at, s; None: it starts with the next look."""
     left: float = 0.0
+    """Time gone by that is not simulated yet, less than a control period, s."""
     cost: float = 0.0
+    """Wall time one control period takes, s, as measured of late; 0: not known."""
     ticks: tuple[tuple[float, float], ...] = ()
+    """When the clock was looked at within the last second, and what was simulated then, s."""
 
     @property
     def factor(self) -> float:
@@ -155,28 +147,19 @@ def _order_smoothing(system: System, smoothing: Floats) -> Iterator[System]:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Fingertip path, and what was smoothed, since the start of the recording.
-
-    Attributes
-    ----------
-    start : bytes
-        The state recording began with, kept by `snapshot.dump`.
-    first : int
-        Its period.
-    rows : ndarray (capacity, 7 f + 4 + 1)
-        Poses of the fingers at the end of each period, what was smoothed in it, see `core.control.smoothing`,
-        and the moment it was simulated in; row 0: the start.
-    count : int
-        How many of the rows are in use.
-    saved : int
-        How many of those the file has, as a take.
-    """
+    """Fingertip path, and what was smoothed, since the start of the recording."""
 
     start: bytes
+    """The state recording began with, kept by `snapshot.dump`."""
     first: int
+    """Its period."""
     rows: Floats
+    """(capacity, 7 f + 4 + 1): Poses of the fingers at the end of each period, what was smoothed in it, see
+    `core.control.smoothing`, and the moment it was simulated in; row 0: the start."""
     count: int
+    """How many of the rows are in use."""
     saved: int = 0
+    """How many of those the file has, as a take."""
 
     @classmethod
     def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
@@ -250,23 +233,16 @@ class Moment:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LiveSession:
-    """Live session at one instant, at the core of those in Blender and of servers.
-
-    Attributes
-    ----------
-    state : State
-        Used up by the next control period: nothing of it may be stored.
-    pose : ndarray (7,)
-        The fingertip's, up to which the session has followed it.
-    recording : Recording or None
-        Of the fingertip path.
-    """
+    """Live session at one instant, at the core of those in Blender and of servers."""
 
     scene: Scene
     system: System
     state: State
+    """Used up by the next control period: nothing of it may be stored."""
     pose: Floats
+    """(7,): The fingertip's, up to which the session has followed it."""
     recording: Recording | None = None
+    """Of the fingertip path."""
 
 
 Session = TypeVar("Session", bound=LiveSession)

@@ -23,22 +23,15 @@ SPAN, ROWS = 10.0, 1000
 
 @dataclass(frozen=True, eq=False)
 class RecentTrace:
-    """Ring buffer of rows: a new row replaces the oldest.
-
-    Attributes
-    ----------
-    every : int
-        Control periods a row.
-    pins : tuple of int
-        The picked pins, at most `PICKED`.
-    rows : ndarray (k, 3 + PICKED)
-        Time, s; total force, N; set point, N, or NaN where there is none; heights of the
-        picked pins, m, NaN for those that are not there. Oldest first.
-    """
+    """Ring buffer of rows: a new row replaces the oldest."""
 
     every: int
+    """Control periods a row."""
     pins: tuple[int, ...]
+    """The picked pins, at most `PICKED`."""
     rows: Floats
+    """(k, 3 + PICKED): Time, s; total force, N; set point, N, or NaN where there is none; heights of the
+    picked pins, m, NaN for those that are not there. Oldest first."""
 
     @property
     def time(self) -> Floats:

@@ -36,25 +36,17 @@ RUN_METRICS = {**METRICS, **{name: RUN[name] for name in ("losses", "run_time", 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Results of a session.
-
-    Attributes
-    ----------
-    history : dict of ndarray
-        The arrays of ``history.npz``; empty without a recorder.
-    periods : int
-        Control periods done.
-    run_time : float
-        Time the simulation took, s; neither building nor writing is in it.
-    metrics : dict
-        What ``metrics.json`` holds; SI units.
-    """
+    """Results of a session."""
 
     scene: Scene
     history: History
+    """The arrays of ``history.npz``; empty without a recorder."""
     periods: int
+    """Control periods done."""
     run_time: float
+    """Time the simulation took, s; neither building nor writing is in it."""
     metrics: dict[str, Any]
+    """What ``metrics.json`` holds; SI units."""
 
     @property
     def figures(self) -> dict[str, float | None]:
@@ -91,21 +83,14 @@ class Result:
 
 
 class Ended(NamedTuple):
-    """End of a session.
-
-    Attributes
-    ----------
-    periods : int
-        Control periods done.
-    run_time : float
-        Time the simulation took, s.
-    losses : int or None
-        From `count_losses`.
-    """
+    """End of a session."""
 
     periods: int
+    """Control periods done."""
     run_time: float
+    """Time the simulation took, s."""
     losses: int | None
+    """From `count_losses`."""
 
 
 def count_losses(memory: object) -> int | None:

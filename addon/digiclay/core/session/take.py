@@ -47,30 +47,20 @@ MOST_PARTS = 64
 class Take:
     """Stretch of a session.
 
-    Attributes
-    ----------
-    scene : Scene
-        Its trajectory is not used: the fingertip follows `poses`.
-    start, end : bytes
-        The states before and after, from `snapshot.dump`.
-    poses : ndarray (t + 1, f, 7)
-        Fingers at the start, and at the end of each of t control periods: lowest point, m,
-        and unit quaternion.
-    smoothing : ndarray (t, 4) or None
-        What is smoothed in each period, see `control.smoothing`; None: nothing in any.
-
-    Raises
-    ------
-    ParameterError
-        When there is no period, a pose is not finite, the scene has another number of fingers, or what is
-        smoothed is no disc and strength a period.
+    Raises ParameterError when there is no period, a pose is not finite, the scene has another number of
+    fingers, or what is smoothed is no disc and strength a period.
     """
 
     scene: Scene
+    """Its trajectory is not used: the fingertip follows `poses`."""
     start: bytes
     poses: Floats
+    """(t + 1, f, 7): Fingers at the start, and at the end of each of t control periods: lowest point, m, and
+    unit quaternion."""
     end: bytes
+    """The states before and after, from `snapshot.dump`."""
     smoothing: Floats | None = None
+    """(t, 4): What is smoothed in each period, see `control.smoothing`; None: nothing in any."""
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)

@@ -54,29 +54,20 @@ THIN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Heights of a bed for a shape, and the parts of the shape beyond them.
-
-    Attributes
-    ----------
-    heights : ndarray (n,)
-        m, from 0 to the stroke.
-    covered : int
-        Cells the shape covers; the others stand at its foot.
-    overhanging : int
-        Cells over which more of the shape lies below its top surface; only the top is displayed.
-    too_low, too_high : int
-        Cells clipped at the bed's floor, at the end of the stroke.
-    filled : int
-        Cells under small holes of the shape, whose heights are taken from around.
-    """
+    """Heights of a bed for a shape, and the parts of the shape beyond them."""
 
     name: str
     heights: Floats
+    """(n,): m, from 0 to the stroke."""
     covered: int
+    """Cells the shape covers; the others stand at its foot."""
     overhanging: int
+    """Cells over which more of the shape lies below its top surface; only the top is displayed."""
     too_low: int
     too_high: int
+    """Cells clipped at the bed's floor, at the end of the stroke."""
     filled: int = 0
+    """Cells under small holes of the shape, whose heights are taken from around."""
 
     def describe(self) -> str:
         """Return the fit in one line."""

@@ -155,23 +155,16 @@ CHUNK = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
-    """Heights over a rectangle of pixels; a pixel is one unit wide, with its value in the middle.
-
-    Attributes
-    ----------
-    values : ndarray (r, c)
-        The first row lies at the lowest y. Each is the mean of up to `block` x `block` pixels.
-    pixels : (int, int)
-        Rows and columns of pixels.
-    value_length : float or None
-        Meters in the unit of the values; None where they are no lengths.
-    """
+    """Heights over a rectangle of pixels; a pixel is one unit wide, with its value in the middle."""
 
     name: str
     values: Floats
+    """(r, c): The first row lies at the lowest y. Each is the mean of up to `block` x `block` pixels."""
     pixels: tuple[int, int]
+    """Rows and columns of pixels."""
     block: int = 1
     value_length: float | None = None
+    """Meters in the unit of the values; None where they are no lengths."""
 
     length = None
     underside = None

@@ -71,21 +71,15 @@ SAME = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class ShapeMesh:
-    """Triangles with z up.
-
-    Attributes
-    ----------
-    vertices : ndarray (v, 3)
-        In the file's unit.
-    faces : ndarray of int (f, 3)
-    length : float
-        Meters in that unit.
-    """
+    """Triangles with z up."""
 
     name: str
     vertices: Floats
+    """(v, 3): In the file's unit."""
     faces: Indices
+    """(f, 3)."""
     length: float
+    """Meters in that unit."""
 
     @property
     def value_length(self) -> float:

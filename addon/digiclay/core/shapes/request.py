@@ -87,23 +87,16 @@ class Placement(NamedTuple):
 
 
 class Tops(NamedTuple):
-    """Top surface of a shape at the pins of a bed, (n,) each.
-
-    Attributes
-    ----------
-    value : ndarray (n,)
-        In the file's unit; 0 where the shape covers no pin.
-    covered : ndarray (n,) of bool
-    overhang : ndarray (n,) of bool
-        Pins over which another part of the shape lies below the top: it cannot be displayed.
-    filled : int
-        Pins under small holes, whose values are taken from around.
-    """
+    """Top surface of a shape at the pins of a bed, (n,) each."""
 
     value: Floats
+    """(n,): In the file's unit; 0 where the shape covers no pin."""
     covered: Flags
+    """(n,)."""
     overhang: Flags
+    """(n,): Pins over which another part of the shape lies below the top: it cannot be displayed."""
     filled: int = 0
+    """Pins under small holes, whose values are taken from around."""
 
 
 class Relief(Protocol):

@@ -157,22 +157,15 @@ THROUGH = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Line from pin to pin.
-
-    Attributes
-    ----------
-    points : ndarray (m, 2)
-        m; the first again at the end of a closed one.
-    joined : (bool, bool)
-        Whether the first and the last point are at a junction with another line.
-    nodes : frozenset of int
-        Junctions with other lines that it runs through, or ends at.
-    """
+    """Line from pin to pin."""
 
     points: Floats
+    """(m, 2): m; the first again at the end of a closed one."""
     closed: bool
     joined: tuple[bool, bool]
+    """Whether the first and the last point are at a junction with another line."""
     nodes: frozenset[int]
+    """Junctions with other lines that it runs through, or ends at."""
 
 
 def find_chains(

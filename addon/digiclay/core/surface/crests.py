@@ -315,27 +315,18 @@ NOTCH = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Crest:
-    """Line along a feature.
-
-    Attributes
-    ----------
-    points : ndarray (p, 3)
-        m, a pitch apart at most.
-    off : ndarray (p,)
-        How far the feature is off its former place along it, m, positive.
-    closed : bool
-        Then the last point is the first.
-    half : float
-        Half the width of the feature at half its height, the median along the line, m.
-    crossed : bool
-        Whether it meets another line.
-    """
+    """Line along a feature."""
 
     points: Floats
+    """(p, 3): m, a pitch apart at most."""
     off: Floats
+    """(p,): How far the feature is off its former place along it, m, positive."""
     closed: bool
+    """Then the last point is the first."""
     half: float
+    """Half the width of the feature at half its height, the median along the line, m."""
     crossed: bool
+    """Whether it meets another line."""
 
     @property
     def length(self) -> float:
@@ -344,21 +335,14 @@ class Crest:
 
 
 class Ridge(NamedTuple):
-    """Part of a feature: lines that meet, or a mound.
-
-    Attributes
-    ----------
-    crests : tuple of Crest
-        The longest first; none for a mound.
-    core : ndarray (m, 2)
-        Places along the top, m.
-    half : float
-        Half its width, m.
-    """
+    """Part of a feature: lines that meet, or a mound."""
 
     crests: tuple[Crest, ...]
+    """The longest first; none for a mound."""
     core: Floats
+    """(m, 2): Places along the top, m."""
     half: float
+    """Half its width, m."""
 
 
 def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[Ridge, ...]:

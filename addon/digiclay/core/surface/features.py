@@ -153,35 +153,24 @@ GAP = 0.005
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """Boss or crease: region of the skin beyond the threshold from the former surface.
-
-    Attributes
-    ----------
-    kind : {"boss", "crease"}
-    number : int
-        1 is the largest of its kind.
-    pins : ndarray of int (k,)
-        The pins in it, ascending.
-    region : Region
-        The part of the skin.
-    apart : Region
-        The same, without a narrow strip beside the feature it is divided from.
-    extreme : float
-        Largest height of a boss, or depth of a crease, off the former surface, m.
-    crests : tuple of ndarray (p, 3)
-        The lines along its top, or its bottom, m; the longest first. A closed one ends where it begins.
-    flat : bool
-        Whether most of its top is level.
-    """
+    """Boss or crease: region of the skin beyond the threshold from the former surface."""
 
     kind: str
     number: int
+    """1 is the largest of its kind."""
     pins: Indices
+    """(k,): The pins in it, ascending."""
     region: Region
+    """The part of the skin."""
     apart: Region
+    """The same, without a narrow strip beside the feature it is divided from."""
     extreme: float
+    """Largest height of a boss, or depth of a crease, off the former surface, m."""
     crests: tuple[Floats, ...]
+    """(p, 3): The lines along its top, or its bottom, m; the longest first. A closed one ends where it
+    begins."""
     flat: bool
+    """Whether most of its top is level."""
 
     @property
     def form(self) -> str:

@@ -20,35 +20,23 @@ from .skin_mesh import check_heights, find_grid_shape
 class Formed:
     """All pins of a bed, row by row.
 
-    Attributes
-    ----------
-    position : ndarray (n, 2)
-        Axes of the pins, m.
-    height : ndarray (n,)
-        Pin tops, m.
-    former : ndarray (n,)
-        The same before the surface was formed, m; one number for all will do.
-    force : ndarray (n,)
-        Force on each pin, N.
-    mode : ndarray of int (n,)
-        Codes of `modes.Mode`.
-    rows, columns : int
-        Found from the positions.
-
-    Raises
-    ------
-    ParameterError
-        On fewer than 2 x 2 pins, arrays that do not fit, numbers that are not finite, or pins
-        out of order.
+    Raises ParameterError on fewer than 2 x 2 pins, arrays that do not fit, numbers that are not finite, or
+    pins out of order.
     """
 
     position: Floats
+    """(n, 2): Axes of the pins, m."""
     height: Floats
+    """(n,): Pin tops, m."""
     former: Floats
+    """(n,): The same before the surface was formed, m; one number for all will do."""
     force: Floats
+    """(n,): Force on each pin, N."""
     mode: Indices
+    """(n,): Codes of `modes.Mode`."""
     rows: int
     columns: int
+    """Found from the positions."""
 
     @classmethod
     def of(
@@ -146,36 +134,24 @@ PIECE = 1 << 16
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Vertices and triangles under one name.
-
-    Attributes
-    ----------
-    name : str
-        Letters, digits and underscores.
-    vertices : ndarray (v, 3)
-        m, z up, in the space of the bed.
-    faces : ndarray of int (f, 3)
-        Counter-clockwise seen from outside.
-    values : mapping of str to ndarray (v,)
-        Nothing, or height, m, force, N, and code of the control mode of each vertex.
-    groups : tuple of str
-        Names of groups of faces, such as features.
-    group : ndarray of int (f,)
-        To which group a face belongs: 1 is the first of `groups`, 0 none. Empty without groups.
-    vertex_group : ndarray of int (v,)
-        The same for vertices; empty without groups.
-    closed : bool
-        Whether it encloses a volume.
-    """
+    """Vertices and triangles under one name."""
 
     name: str
+    """Letters, digits and underscores."""
     vertices: Floats
+    """(v, 3): m, z up, in the space of the bed."""
     faces: Faces
+    """(f, 3): Counter-clockwise seen from outside."""
     values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    """(v,): Nothing, or height, m, force, N, and code of the control mode of each vertex."""
     groups: tuple[str, ...] = ()
+    """Names of groups of faces, such as features."""
     group: Faces = field(default_factory=lambda: np.empty(0, np.int32))
+    """(f,): To which group a face belongs: 1 is the first of `groups`, 0 none. Empty without groups."""
     vertex_group: Faces = field(default_factory=lambda: np.empty(0, np.int32))
+    """(v,): The same for vertices; empty without groups."""
     closed: bool = True
+    """Whether it encloses a volume."""
 
 
 def split_pieces(count: int) -> Iterator[slice]:

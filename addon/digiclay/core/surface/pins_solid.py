@@ -26,25 +26,17 @@ STEP = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Division of the bed into parts, one a pin, with the sides of each part in sequence.
-
-    Attributes
-    ----------
-    corner : ndarray (k, 2)
-        Where the parts meet, m.
-    start, end : ndarray of int (e,)
-        Corners of each side of each part; the part is to the left.
-    pin : ndarray of int (e,)
-        Whose side it is.
-    twin : ndarray of int (e,)
-        The same side seen from the part beyond; -1 at the edge of the bed.
-    """
+    """Division of the bed into parts, one a pin, with the sides of each part in sequence."""
 
     corner: Floats
+    """(k, 2): Where the parts meet, m."""
     start: Indices
     end: Indices
+    """(e,): Corners of each side of each part; the part is to the left."""
     pin: Indices
+    """(e,): Whose side it is."""
     twin: Indices
+    """(e,): The same side seen from the part beyond; -1 at the edge of the bed."""
 
 
 def make_parts(formed: Formed) -> Parts:

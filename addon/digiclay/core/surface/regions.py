@@ -16,24 +16,16 @@ MARGIN = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A piece of a skin.
-
-    Attributes
-    ----------
-    position : ndarray (k, 2)
-        m.
-    former : ndarray (k,)
-        Height of the skin before, m.
-    off : ndarray (k,)
-        How far the skin is off that now, m, positive; the threshold on the contour.
-    faces : ndarray of int (f, 3)
-        Counter-clockwise seen from above.
-    """
+    """A piece of a skin."""
 
     position: Floats
+    """(k, 2): m."""
     former: Floats
+    """(k,): Height of the skin before, m."""
     off: Floats
+    """(k,): How far the skin is off that now, m, positive; the threshold on the contour."""
     faces: Faces
+    """(f, 3): Counter-clockwise seen from above."""
 
     @property
     def _plan(self) -> Floats:

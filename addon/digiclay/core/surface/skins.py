@@ -213,29 +213,20 @@ def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) ->
 
 @dataclass(frozen=True, eq=False)
 class SurfaceGrid:
-    """Points of a skin, row by row.
-
-    Attributes
-    ----------
-    formed : Formed
-        The pins under it.
-    parts : int
-        Points a pitch.
-    position : ndarray (m, 2)
-        Points in plan, m.
-    height, former : ndarray (m,)
-        The skin, and the skin as it was before, m.
-    rows, columns : int
-        Of points.
-    """
+    """Points of a skin, row by row."""
 
     formed: Formed
+    """The pins under it."""
     parts: int
+    """Points a pitch."""
     position: Floats
+    """(m, 2): Points in plan, m."""
     height: Floats
     former: Floats
+    """(m,): The skin, and the skin as it was before, m."""
     rows: int
     columns: int
+    """Of points."""
 
     @cached_property
     def faces(self) -> Faces:
