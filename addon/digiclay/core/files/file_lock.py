@@ -29,21 +29,14 @@ def find_host() -> str:
 
 
 def may_have_made(pid: int, changed: float) -> bool:
-    """Return whether a process of this machine may be the one that made a file or folder.
-
-    Numbers of processes are used again: one that was started after the last change is another one.
-
-    `pid`: the number of the process that made it; `changed`: when it was changed last, s since 1970.
-    """
+    """Return whether a process of this machine may have made a file last changed then, s since 1970."""
+    # Numbers of processes are used again: one that was started after the last change is another one.
     since = find_start(pid)
     return since is not None and since <= changed + CLOCKS_DIFFER
 
 
 def find_start(pid: int) -> float | None:
-    """Return when a process was started, s since 1970; None when none of this number runs.
-
-    Where the system does not tell when, it is 0.
-    """
+    """Return when a process was started, s since 1970; 0 where that is unknown, None if it does not run."""
     if pid <= 0:
         return None
     if os.name == "nt":
@@ -122,15 +115,8 @@ class NoLocksHere(Exception):
 
 @contextmanager
 def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
-    """Hold a lock file, which is made with its folder and taken away again.
-
-    The system's own lock is taken, which no crash leaves behind; where a drive has none, a record of
-    the process. Processes that are started meanwhile do not inherit it.
-
-    `refusal`: what is said when another process holds it; it may hold ``{lock}``; `patience`: seconds to wait
-    for the other process. Raises BusyError when another process holds it. Raises OSError when the file cannot
-    be made.
-    """
+    """Hold a lock file, waiting `patience` s; BusyError with `refusal` when another process holds it."""
+    # No crash leaves the system's own lock behind, and no process started meanwhile inherits it.
     try:
         taken = _wait_for(lambda: _take(path), patience)
     except NoLocksHere:
@@ -210,15 +196,11 @@ def _is_at(file: int, path: Path) -> bool:
 
 @contextmanager
 def hold_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
-    """Hold a file that names this process and machine; one whose process is gone does not count.
-
-    What another machine holds has to be removed by hand when that one has crashed: the refusal says so.
-
-    `refusal`: what is said when another process holds it; `patience`: how long to wait for it, s.
-    """
+    """Hold a file that names this process and machine; one whose process is gone does not count."""
     if _wait_for(lambda: _record(path), patience) is None:
         owner = _read_owner(path)
         if owner is not None and owner[0] != find_host():
+            # What another machine holds has to be removed by hand when that one has crashed.
             refusal += f" It was begun on {owner[0]}; if nothing runs there, remove {path}."
         raise BusyError(refusal)
     try:

@@ -90,10 +90,7 @@ def map_array(path: Path) -> NDArray[Any]:
 
 
 def encode_png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return the file of a picture.
-
-    `pixels` (rows, columns, 3), red, green and blue in sRGB, the upper row first.
-    """
+    """Return the file of a picture (rows, columns, 3), sRGB, the upper row first."""
     rows, columns, _ = pixels.shape
     plain = np.zeros((rows, 1 + 3 * columns), np.uint8)  # each row starts with its filter: none
     plain[:, 1:] = pixels.reshape(rows, 3 * columns)

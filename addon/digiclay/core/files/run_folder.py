@@ -25,10 +25,7 @@ DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|co
 
 
 def make_safe_name(text: str) -> str:
-    """Return a text as the name of a folder: a word of letters, digits and ``. _ + -``.
-
-    It does not begin or end with a full stop, is no device in Windows, and is short enough.
-    """
+    """Return a text as a folder's name: short, of letters, digits and ``. _ + -``, no device of Windows."""
     name = re.sub(r"[^\w.+-]", "_", unicodedata.normalize("NFC", text))
     name = name.lstrip(".-").rstrip(".") or "scene"
     if DEVICES.fullmatch(name.partition(".")[0]):
@@ -41,11 +38,7 @@ def make_safe_name(text: str) -> str:
 
 
 def find_name(path: Path, general: str = "scene.toml") -> str:
-    """Return the name of a file's content: its stem, or its folder's name for a generic stem.
-
-    `path`: however it leads to the file: its own name and its folder's real one count; `general`: the name of
-    a file that says nothing.
-    """
+    """Return the name of a file's content: its stem, or its folder's name where the file's is `general`."""
     full = Path(os.path.abspath(path))
     name = full.parent.name if full.name == general else full.stem
     return name if name.strip(". ") else "scene"
@@ -76,10 +69,7 @@ UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))
 
 
 def name_unfinished(target: Path, kind: str = "part") -> Path:
-    """Return the name under which this process prepares a file or folder, beside it.
-
-    `kind`: what becomes the target; what the target was; the frames of a film.
-    """
+    """Return the name under which this process prepares a file or folder, beside it; see `UNFINISHED`."""
     return target.with_name(f".{target.name}.{os.getpid()}@{find_host()}.{kind}")
 
 
@@ -89,19 +79,14 @@ def is_unfinished(path: Path) -> bool:
 
 
 def remove_abandoned(folder: Path, name: str = "") -> None:
-    """Take away what processes of this machine that are gone have left unfinished.
-
-    What was moved aside to be replaced is put back when nothing has come in its place. What other
-    machines prepare on a shared drive stays: nothing here tells whether they are at it.
-
-    `folder`: nothing happens when there is none; `name`: of what it was to become; by default anything.
-    """
+    """Remove what ended processes of this machine left unfinished of a name, or of any."""
     try:
         found = sorted(folder.iterdir())
     except OSError:
         return
     for path in found:
         known = UNFINISHED.fullmatch(path.name)
+        # Nothing here tells whether other machines are still at what they prepare on a shared drive.
         if known is None or (name and known["name"] != name) or known["host"] not in (None, find_host()):
             continue
         with suppress(OSError):
@@ -117,20 +102,14 @@ def remove_abandoned(folder: Path, name: str = "") -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: to a temporary name beside it, then renamed.
-
-    Raises OutputError when the file cannot be written.
-    """
+    """Write a file whole or not at all, under a temporary name first; OutputError when it cannot be."""
     with open_whole(path) as file:
         file.write(content)
 
 
 @contextmanager
 def open_whole(path: Path) -> Iterator[BinaryIO]:
-    """Open a file under a temporary name to write into; it becomes `path` when the block ends without error.
-
-    Raises OutputError when the file cannot be written.
-    """
+    """Open a file that becomes `path` when the block ends without error; OutputError if it cannot be made."""
     part = name_unfinished(path)
     try:
         with part.open("wb") as file:
@@ -178,10 +157,7 @@ RUN = Content("run", (MARK,))
 
 
 def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
-    """Refuse, before any work is done, an output folder that could not be used in the end.
-
-    It may be empty, or with `overwrite` hold a run, or other content; any other is refused.
-    """
+    """Refuse an output folder that is neither empty nor, with `overwrite`, known by its content."""
     try:
         filled = out.exists() and (not out.is_dir() or any(out.iterdir()))
     except OSError as error:
@@ -203,10 +179,7 @@ def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
 
 
 def resolve_inside(folder: Path, *parts: str) -> Path:
-    """Return a path in a folder, and refuse one that leads out of it, by its name or by a link.
-
-    `parts`: names on the way from there. Raises OutputError.
-    """
+    """Return a path in a folder; OutputError for one that leads out of it, by its name or by a link."""
     path = folder.joinpath(*parts)
     end = path.resolve()
     if folder.resolve() not in end.parents:
@@ -221,18 +194,12 @@ def find_lock(path: Path) -> Path:
 
 
 def lock_name(path: Path, patience: float = 0.0) -> AbstractContextManager[None]:
-    """Hold the lock for making a file or folder of this name.
-
-    `patience`: time to wait for another process that is about to end, s.
-    """
+    """Hold the lock for making a file or folder of this name; waits `patience` s."""
     return hold_lock(find_lock(path), describe_claim(path, "being written"), patience)
 
 
 def describe_claim(path: Path, how: str) -> str:
-    """Return the error for a path that another process has locked.
-
-    `how`: what the other process does, *being written*.
-    """
+    """Return the error for a path that another process has locked; `how`: what that does, *being written*."""
     return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
 
 
@@ -245,10 +212,7 @@ class Claim:
 
     @contextmanager
     def write(self) -> Iterator[Path]:
-        """Give a folder under a temporary name to write into; on leaving it well, it becomes `out`.
-
-        An older run is replaced only then. When something is raised, all is as it was before.
-        """
+        """Give a folder to write into; on leaving without error it becomes `out`, else all is as before."""
         target = self.out.resolve()
         staged, former = name_unfinished(target), name_unfinished(target, "old")
         try:
@@ -271,10 +235,7 @@ class Claim:
 def claim_folder(
     out: Path, *, overwrite: bool, patience: float = 0.0, content: Content = RUN
 ) -> Iterator[Claim]:
-    """Claim a folder before any work, or refuse it: no other process may write it until the block ends.
-
-    Waits some seconds for a process about to end; what killed runs of this name have left is removed.
-    """
+    """Claim a folder before any work, or refuse it: no other process may write it until the block ends."""
     check_folder(out, overwrite=overwrite, content=content)
     target = out.resolve()
     with ExitStack() as until_the_end:
@@ -302,13 +263,7 @@ def _remove_if_empty(target: Path) -> Iterator[None]:
 
 @contextmanager
 def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
-    """Claim files in folders that are there already, such as a run's: no other process writes them meanwhile.
-
-    What killed processes have left unfinished of them is taken away.
-
-    `patience`: seconds to wait for another process that looks at the same folder. Raises OutputError when one
-    is claimed already, its folder is being written anew, or it cannot be made.
-    """
+    """Claim files in folders that exist, such as a run's, waiting `patience` s; OutputError if taken."""
     with ExitStack() as until_the_end:
         try:
             for folder in dict.fromkeys(file.parent for file in files):
@@ -327,28 +282,18 @@ def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
 
 @contextmanager
 def write_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Path]:
-    """Claim a folder and give one to write into, which becomes it: see `Claim.write`.
-
-    `out`, `overwrite`, `patience`: as `claim_folder` has them.
-    """
+    """Claim a folder and give one to write into, which becomes it: see `claim_folder` and `Claim.write`."""
     with claim_folder(out, overwrite=overwrite, patience=patience) as claim, claim.write() as folder:
         yield folder
 
 
 def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
-    """Return the samples of a folder by their names: its files that end with one of `kinds`.
-
-    `kinds`: endings of names, with the dot.
-    """
+    """Return the files of a folder that end with one of `kinds`, by their stems."""
     return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in kinds}
 
 
 def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
-    """Return the file a word stands for.
-
-    `word`: a sample's name, or a path; `kind`: what messages call a sample. Raises SceneError when there is
-    no such file, or sample.
-    """
+    """Return the file of a sample's name or a path; SceneError when there is no such file, or sample."""
     if word in samples:
         return samples[word]
     if os.path.isfile(word):  # unlike Path.is_file it takes any text, however odd or long

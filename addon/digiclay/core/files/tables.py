@@ -27,11 +27,7 @@ _PIECES = re.compile(
 
 
 def parse_tables(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text.
-
-    Raises ValueError when it is no TOML, or too long; the message ends with ``(at line ...)`` where that is
-    known. Raises RecursionError when lists or tables are nested too deeply.
-    """
+    """Return the tables of a TOML text; ValueError with ``(at line ...)`` where known, or RecursionError."""
     if len(text) > LARGEST:
         raise ValueError(f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)")
     for piece in _PIECES.finditer(text):
@@ -75,11 +71,7 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
 
 
 def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
-    """Build a part from its section.
-
-    `section`: what messages call it; `kind`: class of the part; `defaults`: values that differ from the
-    class's own; `own`: what the section says.
-    """
+    """Build a part from its section `own`; `defaults`: values that differ from the class's own."""
     known = list_quantities(kind)
     refuse_unknown(section, own, (*known, "method") if section == "control" else tuple(known))
     given = {key: _measured(section, key, value, known[key].unit) for key, value in own.items()}
@@ -102,10 +94,7 @@ class ReadParts:
         self._parts: dict[tuple[Any, ...], Any] = {}
 
     def read(self, section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
-        """Build a part from its section, or return the one that was built of the same.
-
-        `section`, `kind`, `defaults`, `own`: as `read_part` has them.
-        """
+        """Build a part as `read_part` does, or return the one that was built of the same."""
         key = section, kind, repr(defaults), repr(own)
         part: Part = self.keep(key, read_part, section, kind, defaults, own)
         return part

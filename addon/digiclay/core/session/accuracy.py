@@ -92,11 +92,7 @@ def make_reference(scene: Scene) -> Scene:
 
 
 def compare(height: Floats, force: Floats, other_height: Floats, other_force: Floats) -> Floats:
-    """Return the largest differences of height, m, and force, N, over the cells, and that of the total force.
-
-    `height`, `other_height` (n,) or (n, b), m; the last axis, if there is one, is the run; `force`,
-    `other_force` (k,) or (k, b), N. Returns (3,) or (3, b).
-    """
+    """Return the largest differences (3[, b]) of heights (n[, b]), m, forces (k[, b]) and total forces, N."""
     apart, pushed = np.abs(height - other_height), force - other_force
     total = np.abs(np.add.reduce(pushed))
     largest = (np.maximum.reduce(part, initial=0.0) for part in (apart, np.abs(pushed)))
@@ -110,12 +106,7 @@ def estimate_errors(
     progress: Callable[[int, int], None] | None = None,
     stopped: Callable[[], bool] | None = None,
 ) -> Errors | None:
-    """Estimate the errors of a run by integrating its commands with the `reference_settings`.
-
-    `scene`: one that `has_every_command`; `history`: what its run recorded; `progress`: told after each
-    control period how many are done, and of how many; `stopped`: asked after each control period; when it
-    says True, there is no estimate: None.
-    """
+    """Estimate the errors of a run that `has_every_command`; None when `stopped`; see `run_scene.run`."""
     system = assemble(make_reference(scene))
     system = replace(system, controller=Replay(system.grid, history["command"]))
     done, largest = len(history["time"]) - 1, np.zeros(3)
@@ -145,22 +136,14 @@ def reset(monitor: ErrorMonitor) -> ErrorMonitor:
 
 
 def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
-    """Return the monitor with a copy of the session's state, where a stretch is due; else as it is.
-
-    `state`: the session's, before a control period.
-    """
+    """Return the monitor with a copy of a session's state, where a stretch is due; else as it is."""
     if monitor.state is not None or 0 < monitor.age < STRETCH + PAUSE:
         return monitor
     return ErrorMonitor(monitor.system, state.copy(), before=monitor.before)
 
 
 def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
-    """Return the monitor with the control period that a session has just done.
-
-    `monitor`: given the state before by `begin_stretch`, or by the period before; `after`: the session's, at
-    the end of the period; `path` (2, f, 7), the fingertip at both ends of the period; see
-    `live_session.simulate_path`.
-    """
+    """Return the monitor with the period that a session has just done; `path` (2, f, 7): its fingertips."""
     monitor = replace(monitor, age=monitor.age + 1)
     if monitor.state is None:
         return begin_stretch(monitor, after)
@@ -168,13 +151,8 @@ def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
 
 
 def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMonitor, Errors | None]:
-    """Integrate noted periods at the end of a tick; return the errors where the reference ends a stretch.
-
-    One is done in every `SPREAD` of the session's at most, and none in a tick of more periods than the one
-    before: such ticks take the longest already. After a reference that diverges the monitor starts anew.
-
-    `after`: the session's, at the end of the tick; `count`: control periods of the session in this tick.
-    """
+    """Integrate noted periods after a tick of `count`; return the errors where a stretch has ended."""
+    # Ticks of more periods than the one before take the longest already.
     longer, monitor = count > monitor.before, replace(monitor, before=count)
     due = 0 if longer else min(monitor.age // SPREAD - monitor.done, max(1, count // SPREAD))
     state, force = monitor.state, monitor.system.rows.force

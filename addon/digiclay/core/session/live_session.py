@@ -55,13 +55,7 @@ class Clock:
 
 
 def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int, Clock]:
-    """Return how many control periods to simulate now, and the clock after them.
-
-    What is more than `most`, or more than this machine can do between two ticks, is dropped and
-    not made up for later.
-
-    `now`: a clock that never goes back, s; `period`: control period, s; `most`: most periods at a time.
-    """
+    """Return how many control periods, s, to simulate now, s, at `most`, and the clock after them."""
     if clock.seen is None:
         return 0, replace(clock, seen=now)
     gone = max(0.0, now - clock.seen)
@@ -82,10 +76,7 @@ def _count_affordable(clock: Clock, gone: float) -> int:
 
 
 def update_cost(clock: Clock, count: int, took: float) -> Clock:
-    """Return the clock after some periods of a measured duration.
-
-    `count`: control periods; `took`: of the wall's time, all together, s.
-    """
+    """Return the clock after a number of control periods that took a measured time, s."""
     if count < 1 or took <= 0.0:
         return clock
     each = took / count
@@ -93,24 +84,15 @@ def update_cost(clock: Clock, count: int, took: float) -> Clock:
 
 
 def interpolate_path(start: Floats, end: Floats, count: int) -> Floats:
-    """Return where the fingers are between periods, shape (count + 1, f, 7), on their ways from pose to pose.
-
-    `start`, `end` (f, 7), poses when last read, and now; `count`: control periods in between, at least 1.
-    """
+    """Return the fingers' poses (count + 1, f, 7) between periods, from poses (f, 7) to poses."""
     path: Floats = interpolate_poses(np.array([start, end]), np.arange(count + 1) / count)[0]
     path[0] = start
     return path
 
 
 def clamp_pose(pose: Floats, stroke: float) -> Floats:
-    """Return the pose, raised to where a fingertip can be: its lowest point no deeper than the bed's floor.
-
-    Pins bottom out there. A fingertip an artist drags below it would press with more newtons than
-    floating-point numbers have.
-
-    `pose` (7,); `stroke`: highest pin top, m; sideways and upwards a thousand strokes are as good as
-    infinitely far.
-    """
+    """Return the pose (7,), kept above the bed's floor and within a thousand strokes, m, of the bed."""
+    # Pins bottom out at the floor: below it the force would exceed what floating-point numbers hold.
     far = 1e3 * stroke
     inside = pose.copy()
     inside[:2] = np.clip(pose[:2], -far, far)
@@ -121,14 +103,7 @@ def clamp_pose(pose: Floats, stroke: float) -> Floats:
 def simulate_path(
     system: System, state: State, path: Floats, smoothing: Floats | None = None
 ) -> Iterator[State]:
-    """Simulate the periods of the fingers' paths; the arrays of `state` are used up.
-
-    A recorded path gives the same states bit for bit, however many periods are done at a time.
-
-    `path` (t + 1, f, 7), where the fingers are between the periods, from `interpolate_path`; `smoothing` (t,
-    4), what is smoothed in each period, see `control.smoothing`. Yields after each period; valid until the
-    next one is asked for.
-    """
+    """Yield the states along the path (t + 1, f, 7), each valid until the next one; `state` is used up."""
     fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
     systems = repeat(system, len(fingers)) if smoothing is None else _order_smoothing(system, smoothing)
     for own, finger in zip(systems, fingers, strict=True):
@@ -163,11 +138,7 @@ class Recording:
 
     @classmethod
     def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
-        """Return a recording that has nothing but its start.
-
-        `snapshot`: the state at the start; `period`: its period; `pose` (f, 7), of the fingertips then;
-        `room`: rows to have at once; more are added as they are needed.
-        """
+        """Return a recording of a start alone, with so many rows of memory: snapshot, period, poses (f, 7)."""
         rows = np.empty((room, pose.size + ORDER + 1))
         rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
         return cls(snapshot, period, rows, 1)
@@ -189,11 +160,7 @@ class Recording:
         return self.count > max(self.saved, 1)
 
     def extend(self, path: Floats, tick: int, smoothing: Floats | None = None) -> Recording:
-        """Return the recording with the poses of some more periods, shape (k, f, 7).
-
-        `path` (k, f, 7), poses at the ends of the periods; `smoothing` (k, 4), what was smoothed in them;
-        nothing when left out.
-        """
+        """Return the recording with poses (k, f, 7) of more periods, and their smoothing (k, 4)."""
         end = self.count + len(path)
         rows = self.rows
         if end > len(rows):
@@ -205,10 +172,7 @@ class Recording:
         return replace(self, rows=rows, count=end)
 
     def cut_at_tick(self, tick: int, period: int) -> Recording | None:
-        """Return the recording as it was at a moment undo came back to; None when it did not lead there.
-
-        `period`: of the state at that tick.
-        """
+        """Return the recording as of a moment undo came back to, in `period`; None if it did not lead there."""
         count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
         return self._first(count) if count and count - 1 == period - self.first else None
 
@@ -255,10 +219,7 @@ def follow_path(
     tick: int = 0,
     watch: Callable[[State], None] | None = None,
 ) -> Session:
-    """Simulate and record the control periods of a fingertip path (t + 1, 7); DivergenceError uses it up.
-
-    `smoothing`: see `simulate_path`; `tick`: see `Recording`; `watch`: given the state after each period.
-    """
+    """Simulate and record the control periods of a fingertip path (t + 1, 7); DivergenceError uses it up."""
     system, state, fingers = session.system, session.state, path[:, None]
     # The force of a pressed pin grows exponentially; the session itself reports what exceeds all floats.
     with np.errstate(over="ignore", invalid="ignore"):

@@ -30,20 +30,13 @@ def count_busy_cells(scene: Scene) -> int:
 
 
 def check_memory(scene: Scene, rows: Rows) -> None:
-    """Refuse a session beyond the memory, before it starts; ParameterError names the remedy.
-
-    `rows`: of its state.
-    """
+    """Refuse a session beyond the memory, before it starts; ParameterError names the remedy."""
     busy = count_busy_cells(scene)
     refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, measure_available_memory(), busy)
 
 
 def count_bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
-    """Return about how much memory a session takes; compared in tests/unit/test_memory_limit.py.
-
-    `rows`: of the state; `busy`: cells that may take part at once, where they are more than those under a
-    finger.
-    """
+    """Return about how much memory a session takes, with so many busy cells at once."""
     each_cell = 8 * rows.count + BYTES_BESIDE
     at_work = BYTES_BUSY
     if recorder is not None:
@@ -69,11 +62,7 @@ def measure_available_memory() -> int:
 def refuse_what_cannot_fit(
     recorder: Recorder | None, rows: Rows, cells: int, periods: int, available: int, busy: int = 0
 ) -> None:
-    """Refuse, before it starts, a session that some bytes cannot hold.
-
-    `recorder`, `rows`, `cells`, `periods`, `busy`: see `count_bytes_needed`; `available`: bytes. Raises
-    ParameterError: with the numbers, and what to change.
-    """
+    """Refuse a session that the available bytes cannot hold; the ParameterError says what to change."""
     needed = count_bytes_needed(recorder, rows, cells, periods, busy)
     if needed <= available:
         return

@@ -112,10 +112,7 @@ def sample(system: System, state: State, set_point: SetPoint | None, pins: Seque
 
 
 def extend(trace: RecentTrace, rows: list[list[float]]) -> RecentTrace:
-    """Return the trace with rows added, each as wide as its own; time may have gone back in between.
-
-    `rows`: from `sample`.
-    """
+    """Return the trace with rows of `sample` added; time may have gone back in between."""
     if not rows:
         return trace
     new = np.array(rows)

@@ -90,11 +90,7 @@ class Film(Moving):
         return len(self.moments(time))
 
     def moments(self, time: Sequence[float] | Floats) -> Floats:
-        """Return the simulated time of each frame, s.
-
-        `time` (t,), the times of a history, s. Raises ParameterError when the part asked for is not in the
-        session, or makes too many frames.
-        """
+        """Return the simulated time of each frame, s, for times (t,) of a history, or raise ParameterError."""
         first, last = float(time[0]), float(time[-1])
         stop = min(self.stop, last) if self.stop else last
         if not first <= self.start <= stop:
@@ -123,10 +119,7 @@ def name_frame(folder: Path, frame: int) -> Path:
 
 
 def list_missing(folder: Path, frames: Sequence[int]) -> list[int]:
-    """Return the frames of which a folder has no whole picture.
-
-    `folder`: it may be missing itself; `frames`: their numbers, from 0.
-    """
+    """Return the frames, numbered from 0, of which a folder has no whole picture."""
     return [frame for frame in frames if not _is_there(name_frame(folder, frame))]
 
 
@@ -141,11 +134,7 @@ def _is_there(path: Path) -> bool:
 
 
 def read_range(text: str, count: int) -> range:
-    """Return the frames that a text names: ``0-24``, ``7``, or ``50+25``, 25 frames from number 50 on.
-
-    `text`: numbers from 0. The form with ``+`` ends with the film at the latest; `count`: number of frames of
-    the film. Raises OutputError when it is no range, is empty, or goes beyond the film.
-    """
+    """Return the frames, of `count`, that a text names: ``0-24``, ``7``, or ``50+25``, 25 from 50 on."""
     read = re.fullmatch(r"(\d{1,9})(?:([-+])(\d{1,9}))?", text.strip(), re.ASCII)
     if not read:
         raise OutputError(f"--frames must be a range such as 0-24, or 50+25 (got {text!r}).")

@@ -106,11 +106,7 @@ def evaluate(
     ended: Ended,
     versions: Mapping[str, str] = MappingProxyType({}),
 ) -> Result:
-    """Return the result of a session that has come to its end.
-
-    `rows`: from `recorder.HistoryWriter.finish`; empty without a recorder; `versions`: what else to note as
-    versions the run was made with.
-    """
+    """Return the result of an ended session; `rows`: of `HistoryWriter.finish`, or none."""
     if not rows:
         return report(scene, ended, {}, versions)
     moments = rows.pop("period") * scene.simulation.control_period
@@ -137,10 +133,7 @@ def report(
     found: Mapping[str, Any],
     versions: Mapping[str, str] = MappingProxyType({}),
 ) -> Result:
-    """Return the result of a session that has come to its end, without a history.
-
-    `found`: metrics of its history; `versions`: what else to note as versions the run was made with.
-    """
+    """Return the result of an ended session without its history, but with metrics found in it."""
     simulated = ended.periods * scene.simulation.control_period
     metrics: dict[str, Any] = {
         "scene": scene.name,
@@ -205,10 +198,7 @@ def run(
 
 
 def save(result: Result, folder: Path) -> None:
-    """Write ``scene.toml``, ``history.npz`` and ``metrics.json`` into an existing folder.
-
-    Raises OutputError when the folder cannot be written.
-    """
+    """Write scene.toml, history.npz and metrics.json into a folder; OutputError when that fails."""
     try:
         (folder / "scene.toml").write_text(format_scene(result.scene), encoding="utf-8")
         if result.history:

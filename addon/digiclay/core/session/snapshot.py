@@ -29,12 +29,7 @@ LARGEST_KEPT = 1e75
 
 
 def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
-    """Return a memory as JSON holds it; its arrays are put behind those in `arrays`.
-
-    A named tuple becomes a list that starts with its name, an array its place among the arrays.
-
-    `memory`: a controller's: numbers, enumerations, arrays, and tuples of them; `arrays`: grows.
-    """
+    """Return a memory as JSON: named tuples as lists led by their names, arrays as places in `arrays`."""
     if isinstance(memory, np.ndarray):
         arrays.append(np.ascontiguousarray(memory, memory.dtype.newbyteorder("<")))
         return {"array": len(arrays) - 1}
@@ -47,11 +42,7 @@ def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
 
 
 def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
-    """Return the memory that `flatten` took apart, in the types of a memory of the same controller.
-
-    `template`: what the controller begins with; `kept`: from `flatten`; `arrays`: those that were put in,
-    read back. Raises StateError when the memory is that of another controller, or damaged.
-    """
+    """Return a flattened memory in the types of a `template` of the same controller, or raise StateError."""
     try:
         return _rebuild_like(template, kept, arrays)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError):
@@ -197,11 +188,7 @@ def load(system: System, data: bytes) -> State:
 
 
 def transfer_heights(system: System, data: bytes) -> State:
-    """Return a session's beginning with the heights of a kept state: what is left when parts have changed.
-
-    Every pin stands still at the height it had, as far as the stroke allows; pulp, valves and
-    the controller begin anew.
-    """
+    """Return a session's beginning with the heights of a kept state: what is left when parts have changed."""
     kept = _read(data)
     _check_same("number of cells", kept.header["cells"], system.grid.count)
     height = kept.arrays["rows"][0].copy()

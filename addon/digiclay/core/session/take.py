@@ -190,10 +190,7 @@ def from_bytes(data: bytes) -> Take:
 
 
 def make_take(scene: Scene, recording: Recording, end: bytes) -> Take | None:
-    """Return what was recorded as a take; None when that is no control period yet.
-
-    `end`: the state after its last row, from `snapshot.dump`.
-    """
+    """Return what was recorded as a take, with the snapshot of its end; None without a control period."""
     if recording.count < 2:
         return None
     smoothing = None if recording.smoothing is None else recording.smoothing.copy()
