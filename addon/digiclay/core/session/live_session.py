@@ -138,7 +138,7 @@ class Recording:
 
     @classmethod
     def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
-        """Return a recording of a start alone, with so many rows of memory: snapshot, period, poses (f, 7)."""
+        """Return a recording of a start alone, with room for so many rows: snapshot, period, poses (f, 7)."""
         rows = np.empty((room, pose.size + ORDER + 1))
         rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
         return cls(snapshot, period, rows, 1)
@@ -172,7 +172,7 @@ class Recording:
         return replace(self, rows=rows, count=end)
 
     def cut_at_tick(self, tick: int, period: int) -> Recording | None:
-        """Return the recording as of a moment undo came back to, in `period`; None if it did not lead there."""
+        """Return the recording as of a moment undo came back to, in `period`; None if that is another."""
         count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
         return self._first(count) if count and count - 1 == period - self.first else None
 

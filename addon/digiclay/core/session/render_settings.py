@@ -90,7 +90,7 @@ class Film(Moving):
         return len(self.moments(time))
 
     def moments(self, time: Sequence[float] | Floats) -> Floats:
-        """Return the simulated time of each frame, s, for times (t,) of a history, or raise ParameterError."""
+        """Return the simulated time of each frame, s, for times (t,) of a history; or ParameterError."""
         first, last = float(time[0]), float(time[-1])
         stop = min(self.stop, last) if self.stop else last
         if not first <= self.start <= stop:
