@@ -24,15 +24,17 @@ from digiclay.panels.session import error_line
 from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 
 
 @pytest.fixture
 def bed() -> Any:
     """A bed of 20 x 20 pins as the Add menu makes it."""
-    bpy.ops.mesh.digital_clay_add(rows=20, columns=20)
+    made = new_bed(rows=20, columns=20)
     bpy.context.view_layer.update()
-    return bpy.context.object
+    return made
 
 
 @pytest.fixture

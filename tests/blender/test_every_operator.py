@@ -15,7 +15,7 @@ from digiclay.press import tool
 from digiclay.sessions import running
 from digiclay.sessions.stroke_queue import queue_stroke
 
-from tests.blender.at_hand import select
+from tests.blender.at_hand import in_the_view, new_bed, select
 from tests.blender.session.live import Clock
 
 OPERATORS = [kind for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)]
@@ -72,7 +72,7 @@ ODD: dict[str, Callable[[Any], object]] = {
 def file(extension: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """A file with a small bed, active, beside Blender's cube: it loads quicker than a bed is made."""
     monkeypatch.chdir(tmp_path)  # for what is exported
-    BPY.mesh.digital_clay_add(rows=5, columns=5)
+    new_bed(rows=5, columns=5)
     tool.take_up(bpy.context)
     BPY.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     return bpy.data.filepath
@@ -111,10 +111,7 @@ def calls() -> Iterator[tuple[Any, str, dict[str, Any]]]:
 
 def call(operator: Any, how: str, settings: dict[str, Any]) -> str:
     """Call an operator as the 3D view would; return why it declines, or what it says of an error."""
-    (window,) = bpy.context.window_manager.windows
-    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    with in_the_view():
         try:
             operator(how, **settings)
         except RuntimeError as error:

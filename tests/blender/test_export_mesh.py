@@ -17,6 +17,8 @@ from digiclay.device.instant import Instant
 from digiclay.exchange import formed_bed
 from digiclay.settings import properties
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 
 #: float32 at 0.5 Blender units, in m.
@@ -41,10 +43,10 @@ def shaped() -> Instant:
 @pytest.fixture
 def bed(extension: None) -> bpy.types.Object:
     """A formed bed, selected as Blender's Add leaves it."""
-    bpy.ops.mesh.digital_clay_add(rows=LAYOUT.rows, columns=LAYOUT.columns)
-    view.show_arrows(bpy.context.object, True)  # only then are forces drawn
-    view.show(bpy.context.object, shaped())
-    return bpy.context.object
+    made = new_bed(rows=LAYOUT.rows, columns=LAYOUT.columns)
+    view.show_arrows(made, True)  # only then are forces drawn
+    view.show(made, shaped())
+    return made
 
 
 def corners(thing: bpy.types.Object) -> np.ndarray:

@@ -9,6 +9,8 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.device import view
 from digiclay.device.instant import Instant
 
+from tests.blender.at_hand import new_bed
+
 LAYOUT = Layout(rows=12, columns=14)
 
 
@@ -19,13 +21,11 @@ def bed(extension: None) -> bpy.types.Object:
     number = np.arange(x.size)
     raised = 5.0 * np.exp(-((x + 3) ** 2 + y**2) / 20.0) - 4.0 * np.exp(-((x - 9) ** 2 + y**2) / 20.0)
     raised += np.where(number % 14 < 3, 20.0, 0.0) + np.where(number == 160, 15.0, 0.0)
-    bpy.ops.mesh.digital_clay_add(rows=LAYOUT.rows, columns=LAYOUT.columns, pitch=3.0)
+    made = new_bed(rows=LAYOUT.rows, columns=LAYOUT.columns)
     finger = np.array([0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0])
     modes, forces = number % 8, np.zeros(x.size)
-    view.show(
-        bpy.context.object, Instant(make_grid(LAYOUT).positions, 0.04 + raised * 1e-3, modes, forces, finger)
-    )
-    return bpy.context.object
+    view.show(made, Instant(make_grid(LAYOUT).positions, 0.04 + raised * 1e-3, modes, forces, finger))
+    return made
 
 
 @pytest.mark.parametrize("kind", ["solid", "surface", "features"])

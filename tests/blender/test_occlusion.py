@@ -16,6 +16,8 @@ from digiclay.roles import ROLE
 from digiclay.sessions import running
 from mathutils import Vector
 
+from tests.blender.at_hand import in_the_view, new_bed
+
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
 LARGER = 8.0
 #: Places of the bed, m, one under the object and one beside it.
@@ -25,22 +27,19 @@ COVERED, BARE = np.array([[0.0, 0.0, 0.04]]), np.array([[0.03, 0.03, 0.04]])
 @pytest.fixture
 def factory_view(extension: None) -> Iterator[Any]:
     """The context of the factory file's view, in perspective and Solid mode."""
-    (window,) = bpy.context.window_manager.windows
-    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    with in_the_view():
         yield bpy.context
 
 
 @pytest.fixture
-def context(factory_view: Any) -> Any:
+def context(extension: None) -> Iterator[Any]:
     """The context of that view, with nothing but a bed."""
-    bpy.ops.object.select_all(action="SELECT")
-    bpy.ops.object.delete()
-    bpy.ops.mesh.digital_clay_add(rows=25, columns=25)
-    bpy.context.object.scale = (LARGER,) * 3
-    bpy.context.view_layer.update()
-    return factory_view
+    new_bed().scale = (LARGER,) * 3
+    with in_the_view():
+        for name in ("Cube", "Light", "Camera"):
+            bpy.data.objects.remove(bpy.data.objects[name])
+        bpy.context.view_layer.update()
+        yield bpy.context
 
 
 def bed() -> Any:

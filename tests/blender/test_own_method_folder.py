@@ -16,6 +16,7 @@ from digiclay.live import tick
 from digiclay.sessions import running
 from digiclay.settings import own_folder, properties
 
+from tests.blender.at_hand import new_bed
 from tests.blender.session.live import Clock, exact, move, press
 from tests.own_methods import HEAD, PAD, write_method
 
@@ -48,8 +49,7 @@ def chosen(tmp_path: Path) -> Iterator[Any]:
 
 def add_bed() -> Any:
     """Return a small bed, active."""
-    bpy.ops.mesh.digital_clay_add(rows=9, columns=9)
-    return bpy.context.object
+    return new_bed(rows=9, columns=9)
 
 
 def choose(bed: Any, name: str) -> Any:

@@ -13,6 +13,8 @@ from digiclay.device import view
 from digiclay.panels.base import CATEGORY, bed_of
 from digiclay.panels.parameters import in_use
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 
 #: Sections drawn by a panel of another kind: a shape is chosen rather than typed.
@@ -22,8 +24,7 @@ ELSEWHERE = {"shape"}
 @pytest.fixture
 def bed() -> Any:
     """A small bed, active."""
-    bpy.ops.mesh.digital_clay_add(rows=6, columns=6)
-    return bpy.context.object
+    return new_bed(rows=6, columns=6)
 
 
 def in_the_tab() -> list[Any]:

@@ -13,6 +13,8 @@ from digiclay.device import view
 from digiclay.live import bed_state
 from digiclay.sessions import running
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 PRESS = "[[stroke]]\ndepth = 0.003\nwidth = 0.012\nmoves = [[0, -0.006, 0], [0.2, 0.006, 0]]\n"
 
@@ -20,8 +22,7 @@ PRESS = "[[stroke]]\ndepth = 0.003\nwidth = 0.012\nmoves = [[0, -0.006, 0], [0.2
 @pytest.fixture
 def bed() -> Any:
     """A small bed, active."""
-    bpy.ops.mesh.digital_clay_add(rows=9, columns=11)
-    return bpy.context.object
+    return new_bed(rows=9, columns=11)
 
 
 def heights(bed: Any) -> Any:

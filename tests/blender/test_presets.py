@@ -15,6 +15,8 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.settings import own_presets, properties
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 
 
@@ -29,8 +31,7 @@ def no_presets() -> Iterator[None]:
 @pytest.fixture
 def bed() -> Any:
     """A bed, active."""
-    bpy.ops.mesh.digital_clay_add()
-    return bpy.context.object
+    return new_bed()
 
 
 def test_a_saved_preset_is_a_scene_file_of_all_parameters(bed: Any) -> None:

@@ -19,6 +19,8 @@ from digiclay.press.drape import drape
 from digiclay.settings import properties
 from digiclay.strokes.stroke import Brush
 
+from tests.blender.at_hand import in_the_view, new_bed
+
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
 LARGER = 8.0
 
@@ -40,8 +42,7 @@ def tools() -> list[str]:
 @pytest.fixture
 def bed(extension: None) -> Any:
     """A staggered bed whose pins all have heights of their own, turned, moved and scaled uniformly."""
-    bpy.ops.mesh.digital_clay_add(rows=12, columns=15, arrangement="staggered")
-    made = bpy.context.object
+    made = new_bed(rows=12, columns=15, arrangement="staggered")
     made.scale = (LARGER,) * 3
     made.rotation_euler = (0.1, -0.2, 0.5)
     cells, height = aim.read_surface(made)
@@ -51,12 +52,9 @@ def bed(extension: None) -> Any:
 
 
 @pytest.fixture
-def in_the_view(bed: Any) -> Iterator[Any]:
+def context(bed: Any) -> Iterator[Any]:
     """The context as in the main region of the 3D view."""
-    (window,) = bpy.context.window_manager.windows
-    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    with in_the_view():
         yield bpy.context
 
 
@@ -76,16 +74,16 @@ def test_the_tool_comes_and_goes_with_the_extension() -> None:
         assert tools() == []
 
 
-def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, in_the_view: Any) -> None:
+def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, context: Any) -> None:
     cells, height = aim.read_surface(bed)
     tops = np.column_stack([cells.positions, height])
-    pixels = bridge.project(in_the_view, bed, tops)
-    met = [aim.find_target(in_the_view, tuple(xy)) for xy in pixels]
+    pixels = bridge.project(context, bed, tops)
+    met = [aim.find_target(context, tuple(xy)) for xy in pixels]
     assert all(found is not None and found.bed == bed for found in met)
     hit = np.array([found.pin for found in met])
     near = np.array([found.point for found in met])
     # A pin may hide another; whatever is met lies in front of the top that was asked for, on the same ray.
-    eye = np.array(in_the_view.region_data.view_matrix.inverted().translation)
+    eye = np.array(context.region_data.view_matrix.inverted().translation)
     eye = np.array(bed.matrix_world.inverted()) @ [*eye, 1.0]
     eye = eye[:3] / bridge.SCALE
     visible = hit == np.arange(cells.count)
@@ -96,46 +94,44 @@ def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, in_the_view: A
     assert closer.all()
 
 
-def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, in_the_view: Any) -> None:
+def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, context: Any) -> None:
     from bpy_extras.view3d_utils import location_3d_to_region_2d
     from mathutils import Vector
 
     place = np.array([[0.01, -0.02, 0.045]])
     world = bed.matrix_world @ Vector(place[0] * bridge.SCALE)
-    theirs = location_3d_to_region_2d(in_the_view.region, in_the_view.region_data, world)
+    theirs = location_3d_to_region_2d(context.region, context.region_data, world)
     # A thousandth of a pixel: theirs is reckoned in float32.
-    np.testing.assert_allclose(bridge.project(in_the_view, bed, place)[0], theirs, rtol=0, atol=1e-2)
+    np.testing.assert_allclose(bridge.project(context, bed, place)[0], theirs, rtol=0, atol=1e-2)
 
 
-def test_what_lies_behind_the_eye_is_nowhere_on_the_screen(bed: Any, in_the_view: Any) -> None:
-    eye = np.array(bed.matrix_world.inverted() @ in_the_view.region_data.view_matrix.inverted().translation)
+def test_what_lies_behind_the_eye_is_nowhere_on_the_screen(bed: Any, context: Any) -> None:
+    eye = np.array(bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation)
     behind = 1.5 * eye[None] / bridge.SCALE
-    assert np.isnan(bridge.project(in_the_view, bed, behind)).all()
+    assert np.isnan(bridge.project(context, bed, behind)).all()
 
 
-def test_a_pixel_beside_the_bed_points_at_nothing(bed: Any, in_the_view: Any) -> None:
-    assert aim.find_target(in_the_view, (0.0, 0.0)) is None
+def test_a_pixel_beside_the_bed_points_at_nothing(bed: Any, context: Any) -> None:
+    assert aim.find_target(context, (0.0, 0.0)) is None
 
 
-def test_an_unevenly_scaled_bed_is_looked_through_and_pressing_it_says_why(
-    bed: Any, in_the_view: Any
-) -> None:
+def test_an_unevenly_scaled_bed_is_looked_through_and_pressing_it_says_why(bed: Any, context: Any) -> None:
     cells, height = aim.read_surface(bed)
     middle = np.array([[0.0, 0.0, float(height.max())]])
-    xy = tuple(bridge.project(in_the_view, bed, middle)[0])
-    assert aim.find_target(in_the_view, xy) is not None
+    xy = tuple(bridge.project(context, bed, middle)[0])
+    assert aim.find_target(context, xy) is not None
     bed.scale.z *= 1.2
     bpy.context.view_layer.update()
-    assert aim.find_target(in_the_view, xy) is None
+    assert aim.find_target(context, xy) is None
     with pytest.raises(DigiclayError, match="the same along x, y and z"):
-        aim.hit_point(in_the_view, bed, cells, height, xy)
+        aim.hit_point(context, bed, cells, height, xy)
 
 
-def test_a_hidden_bed_is_looked_through(bed: Any, in_the_view: Any) -> None:
+def test_a_hidden_bed_is_looked_through(bed: Any, context: Any) -> None:
     _, height = aim.read_surface(bed)
-    xy = tuple(bridge.project(in_the_view, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
+    xy = tuple(bridge.project(context, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
     bed.hide_set(True)
-    assert aim.find_target(in_the_view, xy) is None
+    assert aim.find_target(context, xy) is None
 
 
 def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
@@ -156,7 +152,7 @@ def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_presse
 
 
 @pytest.mark.usefixtures("extension")
-def test_pressing_wants_a_bed_in_a_view_in_object_mode(in_the_view: Any, bed: Any) -> None:
+def test_pressing_wants_a_bed_in_a_view_in_object_mode(context: Any, bed: Any) -> None:
     assert bpy.ops.digiclay.press.poll()
     bed.hide_set(True)
     assert not bpy.ops.digiclay.press.poll()

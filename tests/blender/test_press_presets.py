@@ -13,6 +13,8 @@ from digiclay.press import brush
 from digiclay.press.brush import FINGERS, find_kind
 from digiclay.settings import finger_size
 
+from tests.blender.at_hand import in_the_view, new_bed
+
 SHIPPED = Path(brush.HOME, "presets", brush.SUBFOLDER)
 
 
@@ -20,11 +22,8 @@ SHIPPED = Path(brush.HOME, "presets", brush.SUBFOLDER)
 def settings(extension: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """The settings of the tool in hand, over a bed; the user's own presets are in a folder of their own."""
     monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(tmp_path))
-    bpy.ops.mesh.digital_clay_add()
-    (window,) = bpy.context.window_manager.windows
-    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    new_bed()
+    with in_the_view():
         bpy.ops.wm.tool_set_by_id(name=brush.TOOL)
         yield brush.tool_settings(bpy.context)
 

@@ -14,15 +14,17 @@ from digiclay.operators.press_adjust import AdjustStrength
 from digiclay.press.brush import FINGERS, find_kind
 from digiclay.settings import finger_size, properties
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 
 
 @pytest.fixture
 def bed(extension: None) -> Any:
     """A new bed, 25 x 25 pins."""
-    bpy.ops.mesh.digital_clay_add()
+    made = new_bed()
     bpy.context.view_layer.update()
-    return bpy.context.object
+    return made
 
 
 def lengths(bed: Any) -> tuple[float, ...]:

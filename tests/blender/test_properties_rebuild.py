@@ -15,6 +15,8 @@ from digiclay.device import view
 from digiclay.live import bed_state
 from digiclay.settings import properties
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 #: Positions are float32 and drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
@@ -23,8 +25,7 @@ FLOAT32 = 0.1 * 2.0**-23
 @pytest.fixture
 def bed() -> Any:
     """A small bed away from the origin, its fingertip moved and its pins formed."""
-    bpy.ops.mesh.digital_clay_add(rows=6, columns=8)
-    bed = bpy.context.object
+    bed = new_bed(rows=6, columns=8)
     bed.location = (1.0, -2.0, 0.5)
     view.fingertip_of(bed).location.x += 0.05
     bed.data.vertices[7].co.z += 0.02

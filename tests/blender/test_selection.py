@@ -9,14 +9,15 @@ import pytest
 from digiclay.device import view
 from digiclay.live import beds
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 
 
 @pytest.fixture
 def bed() -> Any:
     """A bed from the Add menu, selected and active."""
-    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
-    return bpy.context.object
+    return new_bed(rows=5, columns=5)
 
 
 def test_a_bed_taken_out_of_the_selection_is_active_still(bed: Any) -> None:

@@ -15,7 +15,7 @@ from digiclay.device.instant import Instant
 from digiclay.device.skin_lattice import KINDS, choose_parts, interpolate, make_lattice
 from digiclay.settings import properties
 
-from tests.blender.at_hand import done
+from tests.blender.at_hand import done, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -26,8 +26,7 @@ FLOAT32 = 4 * 0.1 * 2.0**-23
 @pytest.fixture
 def bed() -> Any:
     """A bed of 8 x 9 hexagonal pins from the Add menu, every pin at a height of its own."""
-    bpy.ops.mesh.digital_clay_add(rows=8, columns=9, arrangement="hexagonal")
-    bed = bpy.context.object
+    bed = new_bed(rows=8, columns=9, arrangement="hexagonal")
     shape(bed, 1)
     return bed
 

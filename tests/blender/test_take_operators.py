@@ -17,6 +17,8 @@ from digiclay.recorded import bake, takes
 from digiclay.sessions import running, sculpting
 from numpy.typing import NDArray
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 #: Time between two ticks, s: a session follows ten control periods in each.
 TICK = 0.05
@@ -25,9 +27,9 @@ TICK = 0.05
 @pytest.fixture
 def bed() -> Any:
     """Return a bed added as a user adds it, active, in a file that plays 40 frames a second."""
-    bpy.ops.mesh.digital_clay_add(rows=12, columns=12)
+    made = new_bed(rows=12, columns=12)
     bpy.context.scene.render.fps = 40
-    return bpy.context.object
+    return made
 
 
 def begin(bed: Any) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import bpy
 import digiclay
 import pytest
 from digiclay.live import handlers
 
+from tests.blender.at_hand import new_bed
 from tests.blender.session.live import (
     Clock,
 )
@@ -27,8 +27,7 @@ def extension(factory_file: None) -> Iterator[None]:
 @pytest.fixture
 def bed() -> Any:
     """A small bed in the open scene."""
-    bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
-    return bpy.context.object
+    return new_bed(rows=13, columns=13)
 
 
 @pytest.fixture
