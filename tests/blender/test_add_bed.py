@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
-import digiclay
 import numpy as np
 import pytest
 from digiclay import bridge
@@ -18,8 +14,6 @@ from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
 from digiclay.settings import own_presets, properties
 from digiclay.settings.devices import BEDS
-
-from tests.timeouts import TIMEOUT
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -39,21 +33,22 @@ def add(**chosen: Any) -> Any:
     return bpy.context.object
 
 
-def test_a_bed_added_without_choices_is_the_papers_but_for_the_ground_of_the_blister() -> None:
-    bed = add()
-    assert properties.scene_of(bed) == resolve({"control": {"ground": "cell"}}, bed.name)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_the_method_chosen_is_the_bed_s(method: str) -> None:
-    bed, ground = add(method=method), {"ground": "cell"} if method == "virtual_master" else {}
-    assert properties.scene_of(bed) == resolve({"control": {"method": method, **ground}}, bed.name)
-
-
-@pytest.mark.parametrize("name", PRESETS)
-def test_the_preset_chosen_is_the_bed_s(name: str) -> None:
-    bed = add(preset=name)
-    assert properties.scene_of(bed) == resolve({"preset": name, "control": {"ground": "cell"}}, bed.name)
+@pytest.mark.parametrize(
+    ("chosen", "table"),
+    [
+        ({}, {}),
+        *(({"method": name}, {"control": {"method": name}}) for name in METHODS),
+        *(({"preset": name}, {"preset": name}) for name in PRESETS),
+    ],
+)
+def test_a_bed_is_that_of_a_scene_file_but_for_the_ground_of_the_blister(
+    chosen: dict[str, str], table: dict[str, Any]
+) -> None:
+    wanted = resolve(table)
+    if wanted.method == "virtual_master":
+        wanted = resolve({**table, "control": {"ground": "cell"}})
+    bed = add(**chosen)
+    assert properties.scene_of(bed) == wanted.with_sections(name=bed.name)
 
 
 def test_a_preset_of_the_user_s_own_is_offered_and_taken(preset: str) -> None:
@@ -68,10 +63,6 @@ def test_another_method_than_the_preset_s_brings_its_own_gains(preset: str) -> N
     assert (scene.control, scene.blister, scene.valve.stroke) == (plain.control, None, 41e-6)
 
 
-def test_the_pitch_is_the_number_typed_and_not_its_32_bits() -> None:
-    assert properties.scene_of(add(pitch=2.7)).layout.pitch == 2.7e-3
-
-
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 9), (6, 6)])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
 def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows: int, columns: int, method: str) -> None:
@@ -81,16 +72,18 @@ def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows: int, columns: i
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 2.5])
-def test_a_bed_shown_in_another_scale_still_stands_on_the_cursor(scale: float) -> None:
+def test_a_bed_of_any_scale_stands_on_the_cursor_selected_with_its_fingertip_above_the_pins(
+    scale: float,
+) -> None:
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     bed = add(rows=6, columns=6, scale=scale)
+    assert bpy.context.selected_objects == [bed]
     bpy.context.view_layer.update()
-    shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     # float32 at 3 units.
-    assert min((bed.matrix_world @ vertex.co).z for vertex in shown.data.vertices) == pytest.approx(
-        3.0, abs=1e-5
-    )
+    assert min((bed.matrix_world @ point.co).z for point in shown.vertices) == pytest.approx(3.0, abs=1e-5)
     assert bridge.uniform(bed) == pytest.approx(scale, rel=1e-6)
+    assert bridge.pose(view.fingertip_of(bed))[2] > 0.040
 
 
 def test_the_scale_shown_leaves_the_device_as_it_is() -> None:
@@ -100,15 +93,6 @@ def test_the_scale_shown_leaves_the_device_as_it_is() -> None:
     # Blender's matrices are float32, here of lengths up to 0.5 units: 0.05 m of the device.
     np.testing.assert_allclose(poses[0], poses[1], rtol=0, atol=1e-7)
     assert properties.scene_of(large).layout == properties.scene_of(small).layout
-
-
-def test_two_beds_each_have_a_fingertip_and_settings_of_their_own() -> None:
-    first, second = add(rows=6, columns=6), add(rows=7, columns=7, method="elastic")
-    assert view.fingertip_of(first) != view.fingertip_of(second)
-    assert (properties.scene_of(first).method, properties.scene_of(second).method) == (
-        "virtual_master",
-        "elastic",
-    )
 
 
 @pytest.mark.parametrize("name", BEDS)
@@ -125,8 +109,9 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name: str) -> None:
 
 
 def test_a_bed_of_a_kind_may_have_another_plan() -> None:
-    scene = properties.scene_of(add(bed="design", rows=6, columns=30, pitch=2.0))
-    assert (scene.layout.rows, scene.layout.columns, scene.layout.pitch) == (6, 30, 2e-3)
+    scene = properties.scene_of(add(bed="design", rows=6, columns=30, pitch=2.7))
+    # The pitch is the number typed, and not its 32 bits.
+    assert (scene.layout.rows, scene.layout.columns, scene.layout.pitch) == (6, 30, 2.7e-3)
     assert scene.fingers[0].fingertip.length == 5e-3
 
 
@@ -143,13 +128,3 @@ def test_a_preset_that_cannot_be_read_is_refused_in_one_line(preset: str) -> Non
         bpy.ops.mesh.digital_clay_add(preset=preset)
     assert "Traceback" not in str(caught.value)
     assert len(bpy.data.objects) == before
-
-
-def test_an_imported_run_has_the_settings_it_was_run_with(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "digiclay", "run", "tap", "--quiet", "--out", str(tmp_path / "run")]
-    command += ["--set", "valve.stroke=41 um", "--set", "simulation.duration=0.05"]
-    subprocess.run(command, check=True, timeout=TIMEOUT, cwd=Path(digiclay.__file__).parents[1])
-    path = str(tmp_path / "run" / "history.npz")
-    assert bpy.ops.import_scene.digital_clay_run(filepath=path) == {"FINISHED"}
-    scene = properties.scene_of(bpy.context.object)
-    assert (scene.valve.stroke, scene.layout.rows) == (41e-6, 11)

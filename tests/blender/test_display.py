@@ -98,25 +98,22 @@ def test_turning_arrows_on_after_a_session_shows_the_forces_it_ended_with(
     np.testing.assert_allclose(forces(bed), session.state.row(session.system.rows.force), rtol=2.0**-23)
 
 
-def test_the_overlay_is_drawn_only_while_a_session_runs_whose_bed_wants_it(
+def test_the_overlay_and_its_timer_are_there_only_while_a_session_runs_whose_bed_wants_it(
     bed: Any, session: running.Running
 ) -> None:
-    assert not views.shown()
+    def is_there() -> bool:
+        assert bpy.app.timers.is_registered(views._again) is views.shown()
+        return views.shown()
+
+    assert not is_there()
     views.follow()
-    assert views.shown()
-    bed.digiclay_display.overlay = False
-    assert not views.shown()
-    bed.digiclay_display.overlay = True
-    assert views.shown()
+    assert is_there()
+    for wanted in (False, True):
+        bed.digiclay_display.overlay = wanted
+        assert is_there() is wanted
     running.drop(session.uid)
     views.follow()
-    assert not views.shown()
-
-
-def test_the_overlays_timer_comes_and_goes_with_it(bed: Any, session: running.Running) -> None:
-    for wanted in (True, False, True):
-        bed.digiclay_display.overlay = wanted
-        assert bpy.app.timers.is_registered(views._again) is wanted
+    assert not is_there()
 
 
 def test_disabling_the_extension_takes_the_overlay_away(bed: Any, session: running.Running) -> None:
@@ -168,9 +165,3 @@ def test_pins_that_cannot_be_picked_are_refused(bed: Any, pins: tuple[int, ...],
     with pytest.raises(DigiclayError, match=said):
         pick_pins(bed, pins)
     assert view.picked_pins(bed) == ()
-
-
-def test_the_panel_display_stands_in_the_sidebar(bed: Any) -> None:
-    panel = bpy.types.DIGICLAY_PT_display
-    assert (panel.bl_category, panel.bl_label) == ("Digital Clay", "Display")
-    assert panel.poll(bpy.context)

@@ -161,6 +161,7 @@ def test_an_export_that_cannot_be_written_is_refused_in_one_line(bed, tmp_path, 
 
 def test_lengths_are_millimeters_of_the_device_whatever_the_size_of_the_bed(bed, tmp_path):
     bed.scale = (3.0, 3.0, 3.0)
+    bpy.context.view_layer.objects.active = view.fingertip_of(bed)  # as good as the bed
     bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), kind="surface")
     bpy.ops.wm.stl_import(filepath=str(tmp_path / "bed.stl"))
     assert np.ptp(corners(bpy.context.object)[:, 0]) == pytest.approx(13 * 3.0, rel=1e-6)
@@ -180,13 +181,10 @@ def test_the_mesh_is_the_surface_with_its_features_as_vertex_groups(bed, kind):
         assert len(mine) > 8
         assert np.mean(mine) == pytest.approx(x, abs=1.5e-3)
     assert (open_edges(made) == 0) == (kind != "surface")
-
-
-def test_the_mesh_keeps_force_and_mode_of_the_pins(bed):
-    bpy.ops.mesh.digital_clay_make(kind="surface")
-    attributes = bpy.context.object.data.attributes
-    assert [round(attributes["force"].data[i].value, 6) for i in (0, 7, 167)] == [0.0, 0.07, 1.67]
-    assert [attributes["mode"].data[i].value for i in (0, 7, 167)] == [0, 7, 7]
+    if kind == "surface":
+        force, mode = (made.data.attributes[name].data for name in ("force", "mode"))
+        assert [round(force[i].value, 6) for i in (0, 7, 167)] == [0.0, 0.07, 1.67]
+        assert [mode[i].value for i in (0, 7, 167)] == [0, 7, 7]
 
 
 def test_a_session_tells_its_forces_whether_they_are_drawn_or_not(bed):
@@ -254,15 +252,6 @@ def test_the_mesh_goes_on_into_a_boolean(bed):
     assert enclosed(solid.data) - enclosed(evaluated.data) == pytest.approx(0.5e-3, rel=0.2)
 
 
-def test_the_features_are_listed_in_the_panel(bed):
-    assert bpy.ops.digiclay.find_features() == {"FINISHED"}
-    lines = bed["digiclay_features"].splitlines()
-    assert lines[0] == "1 boss and 1 crease"
-    assert lines[1].startswith("boss_1: 4.")
-    assert "mm high" in lines[1]
-    assert "mm deep" in lines[3]
-
-
 def test_features_can_be_measured_from_a_surface_that_was_kept(bed):
     assert not bpy.ops.digiclay.forget_surface.poll()
     bpy.ops.digiclay.keep_surface()
@@ -270,16 +259,9 @@ def test_features_can_be_measured_from_a_surface_that_was_kept(bed):
     assert bed["digiclay_features"] == "0 bosses and 0 creases"
     bpy.ops.digiclay.forget_surface()
     bpy.ops.digiclay.find_features()
-    assert bed["digiclay_features"].startswith("1 boss and 1 crease")
-
-
-def test_the_kept_surface_comes_through_saving(bed, tmp_path):
-    bpy.ops.digiclay.keep_surface()
-    name, kept = bed.name, formed_bed.read_formed(bed).former.copy()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    bpy.ops.wm.read_factory_settings()
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    np.testing.assert_array_equal(formed_bed.read_formed(bpy.data.objects[name]).former, kept)
+    total, boss, _, crease, *_ = bed["digiclay_features"].splitlines()
+    assert (total, boss[:10], "mm high" in boss) == ("1 boss and 1 crease", "boss_1: 4.", True)
+    assert "mm deep" in crease
 
 
 def test_the_heights_are_measured_from_the_rest_height_of_the_settings(bed):
@@ -297,9 +279,3 @@ def test_a_bed_that_lost_its_attributes_is_told(bed):
     bed.data.attributes.remove(bed.data.attributes["force"])
     with pytest.raises(RuntimeError, match=r"has lost the attributes of its pins: press Rebuild"):
         bpy.ops.mesh.digital_clay_make()
-
-
-def test_the_operators_also_work_from_the_fingertip(bed, tmp_path):
-    bpy.context.view_layer.objects.active = view.fingertip_of(bed)
-    bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"))
-    assert (tmp_path / "bed.stl").stat().st_size > 84

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,8 @@ import numpy as np
 import pytest
 from digiclay import bridge, command_line
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.modes import Mode
-from digiclay.core.model.layout import Layout, make_grid
-from digiclay.device import view
 from digiclay.device.instant import Instant
+from digiclay.settings import properties
 
 #: Positions are float32 and drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
@@ -74,43 +71,12 @@ def test_importing_the_package_imports_nothing_heavy_and_registers_nothing() -> 
     assert done.stdout == "[]\n", done.stderr
 
 
-def test_the_manifest_and_the_package_agree() -> None:
-    manifest = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))
-    assert manifest["version"] == digiclay.__version__
-    assert manifest["id"] == "digiclay"
-
-
 @pytest.mark.usefixtures("extension")
-@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
-def test_the_operator_adds_the_bed_it_was_asked_for(arrangement: str) -> None:
-    done = bpy.ops.mesh.digital_clay_add(rows=4, columns=7, pitch=2.5, arrangement=arrangement)
-    assert done == {"FINISHED"}
-    bed = bpy.context.object
-    assert view.is_bed(bed)
-    cells = bridge.read_cells(bed.data)
-    wanted = make_grid(Layout(rows=4, columns=7, pitch=2.5e-3, arrangement=arrangement))
-    np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
-    np.testing.assert_allclose(cells["height"], 0.040, rtol=0, atol=FLOAT32)
-    assert set(cells["mode"]) == {Mode.REST}
-
-
-@pytest.mark.usefixtures("extension")
-def test_a_new_bed_stands_on_the_cursor_selected_with_its_fingertip_above_the_pins() -> None:
-    bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
-    bpy.ops.mesh.digital_clay_add()
-    bed = bpy.context.object
-    assert bpy.context.selected_objects == [bed]
-    bpy.context.view_layer.update()
-    drawn = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    feet = [bed.matrix_world @ vertex.co for vertex in drawn.vertices]
-    assert min(point.z for point in feet) == pytest.approx(3.0, abs=1e-5)  # float32 at 3 units
-    assert bridge.pose(view.fingertip_of(bed))[2] > 0.040
-
-
-@pytest.mark.usefixtures("extension")
-def test_an_imported_run_shows_the_row_asked_for(tmp_path: Path, formed: Instant) -> None:
+def test_an_imported_run_shows_the_row_asked_for_with_the_settings_of_the_run(
+    tmp_path: Path, formed: Instant
+) -> None:
     heights = np.stack([formed.height, formed.height[::-1]])
-    scene = 'control = "absent"\n[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n'
+    scene = 'control = "absent"\n[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n[valve]\nstroke = 41e-6\n'
     (tmp_path / "scene.toml").write_text(scene)
     np.savez(
         tmp_path / "history.npz",
@@ -126,6 +92,7 @@ def test_an_imported_run_shows_the_row_asked_for(tmp_path: Path, formed: Instant
         assert bpy.ops.import_scene.digital_clay_run(filepath=path, row=row) == {"FINISHED"}
         cells = bridge.read_cells(bpy.context.object.data)
         np.testing.assert_allclose(cells["height"], wanted, rtol=0, atol=FLOAT32)
+    assert properties.scene_of(bpy.context.object).valve.stroke == 41e-6
 
 
 @pytest.mark.parametrize("row", [2, -3])

@@ -51,21 +51,17 @@ def seen(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, A
     return result | {"files": sorted(file.name for file in folder.iterdir())}
 
 
-def test_the_zip_brings_trimesh_along_and_lists_it(archive: Path) -> None:
+def test_the_zip_has_the_package_and_trimesh_and_nothing_that_was_left_lying_about(archive: Path) -> None:
     with zipfile.ZipFile(archive) as zipped:
         names = zipped.namelist()
         manifest = tomllib.loads(zipped.read("blender_manifest.toml").decode())
     assert [f"./{name}" for name in names if name.endswith(".whl")] == manifest["wheels"]
     assert any("trimesh" in wheel for wheel in manifest["wheels"])
-
-
-def test_the_zip_has_the_package_and_nothing_that_was_left_lying_about(archive: Path) -> None:
-    with zipfile.ZipFile(archive) as zipped:
-        names = zipped.namelist()
     shipped = {"LICENSE", "LICENSES/CC0-1.0.txt", "manual/guide.html", "sample_shapes/sessions/tap.toml"}
     assert {"__init__.py", "core/scene/schema.py", *shipped} <= set(names)
     assert [name for name in names if "__pycache__" in name or name.startswith(".")] == []
     assert archive.stat().st_size < 2e6
+    assert archive.name == f"digiclay-{digiclay.__version__}.zip"
 
 
 def test_no_benchmark_and_no_module_of_the_paper_or_the_studies_is_in_the_zip(archive: Path) -> None:
@@ -95,28 +91,23 @@ def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path: Path) -> None:
     assert not (copy / "dist").exists()
 
 
-def test_the_zip_installs_and_enables(seen: dict[str, Any]) -> None:
-    assert (seen["installed"], seen["enabled"]) == (["FINISHED"], True)
-
-
-def test_installing_puts_the_bundled_trimesh_into_the_users_blender(seen: dict[str, Any]) -> None:
-    assert seen["bundled"] == 1
-
-
-def test_enabling_imports_no_heavy_library(seen: dict[str, Any]) -> None:
-    assert seen["imported at once"] == []
-
-
-def test_the_installed_operator_adds_a_bed_with_its_settings(seen: dict[str, Any]) -> None:
-    assert (seen["added"], seen["scene"]) == (["FINISHED"], 36)
-
-
-def test_the_preferences_are_those_blender_shows(seen: dict[str, Any]) -> None:
-    assert seen["redraw rate"] == 24
-
-
-def test_a_users_presets_stand_in_the_extensions_own_folder(seen: dict[str, Any]) -> None:
-    assert seen["own presets"] == [str(Path("presets", "Mine.toml"))]
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"installed": ["FINISHED"], "enabled": True}, "the zip installs and enables"),
+        ({"bundled": 1, "imported at once": []}, "trimesh comes along and is not imported at once"),
+        ({"added": ["FINISHED"], "scene": 36}, "the operator adds a bed with its settings"),
+        ({"redraw rate": 24}, "the preferences are those Blender shows"),
+        ({"own presets": [str(Path("presets", "Mine.toml"))]}, "presets stand in the extension's own folder"),
+        ({"describe": 0, "run": 0, "export": 0, "render": 0}, "the command carries out"),
+        ({"own method": "mine", "own run": 0}, "a method of one's own is offered and runs"),
+        ({"own methods": [[], ["mine"]]}, "it goes and comes back with the extension"),
+        ({"left behind": [], "added again": ["FINISHED"]}, "disabled it leaves nothing; it is enabled again"),
+    ],
+)
+def test_in_a_blender_of_its_own(seen: dict[str, Any], wanted: dict[str, Any], words: str) -> None:
+    assert {name: seen[name] for name in wanted} == wanted, words
+    assert {"a tap", "surface.stl", "still.png"} <= set(seen["files"])
 
 
 @pytest.mark.parametrize(
@@ -133,25 +124,3 @@ def test_the_installed_command_says_in_a_line_what_is_not_part_of_it(
 ) -> None:
     code, told = seen[command]
     assert (code, told.count("\n"), said in told) == (2, 1, True)
-
-
-@pytest.mark.parametrize("command", ["describe", "run", "export", "render"])
-def test_the_installed_command_carries_out(command: str, seen: dict[str, Any]) -> None:
-    assert seen[command] == 0
-
-
-def test_the_commands_leave_a_run_a_mesh_and_a_picture(seen: dict[str, Any]) -> None:
-    assert {"a tap", "surface.stl", "still.png"} <= set(seen["files"])
-
-
-def test_a_method_of_ones_own_is_offered_runs_and_comes_back_with_the_extension(seen: dict[str, Any]) -> None:
-    assert (seen["own method"], seen["own run"]) == ("mine", 0)
-    assert seen["own methods"] == [[], ["mine"]]
-
-
-def test_disabling_leaves_nothing_behind_and_enabling_again_works(seen: dict[str, Any]) -> None:
-    assert (seen["left behind"], seen["added again"]) == ([], ["FINISHED"])
-
-
-def test_the_zip_is_named_after_the_version_of_the_package(archive: Path) -> None:
-    assert archive.name == f"digiclay-{digiclay.__version__}.zip"

@@ -38,36 +38,42 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short run."""
+    folder = tmp_path_factory.mktemp("short") / "run"
+    settings = ["--set", "simulation.duration=0.2", "--no-errors", "--quiet"]
+    assert main(["run", "tap", "--out", str(folder), *settings]) == 0
+    return folder
+
+
+def test_a_run_is_filmed_and_turned_from_the_command_line(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = ["--size", "64x40", "--rate", "10", "--quiet"]
+    assert main(["render", str(run), "--film", "--speed", "0.5", "--color", "force", *small]) == 0
+    assert main(["render", str(run), "--turntable", "--frames", "2", *small]) == 0
+    assert {path.name for path in run.glob("*.mp4")} == {"film.mp4", "turntable.mp4"}
+    assert capsys.readouterr().out == ""
+
+
 def test_a_batch_draws_what_is_asked_for_and_shows_it_on_its_page(capfd: pytest.CaptureFixture[str]) -> None:
     Path("drawn.toml").write_text(JOBS, encoding="utf-8")
     assert main(["batch", "drawn.toml", "--jobs", "2"]) == 0, capfd.readouterr().out
     page = Path("drawn/index.html").read_text(encoding="utf-8")
     for name in ("tap-virtual_master-short", "tap-cell_states-short"):
-        run = Path("drawn/runs", name)
+        folder = Path("drawn/runs", name)
         drawn = {"still.png", "thumbnail.jpg", "turntable.mp4", "film.mp4"}
-        assert drawn <= {path.name for path in run.iterdir()}
+        assert drawn <= {path.name for path in folder.iterdir()}
         # An MP4 file says so at its start.
-        assert all((run / film).read_bytes()[4:8] == b"ftyp" for film in ("turntable.mp4", "film.mp4"))
+        assert all((folder / film).read_bytes()[4:8] == b"ftyp" for film in ("turntable.mp4", "film.mp4"))
         assert f'href="runs/{name}/film.mp4"' in page
-        timing = json.loads((run / "timing.json").read_text(encoding="utf-8"))
+        timing = json.loads((folder / "timing.json").read_text(encoding="utf-8"))
         # Blender's module needs some tenths of a second to come up, on any machine.
         assert 0.2 < timing["start_up"] < 60.0
-        image = bpy.data.images.load(str((run / "thumbnail.jpg").resolve()))
+        image = bpy.data.images.load(str((folder / "thumbnail.jpg").resolve()))
         assert tuple(image.size) == (WIDTH, WIDTH * 100 // 160)
     assert page.count("data:image/jpeg;base64,") == 2
-
-
-def test_a_run_is_filmed_and_turned_from_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
-    settings = ["--set", "simulation.duration=0.2", "--no-errors", "--quiet"]
-    assert main(["run", "tap", "--out", "run", *settings]) == 0
-    small = ["--size", "64x40", "--rate", "10", "--quiet"]
-    assert main(["render", "run", "--film", "--speed", "0.5", "--color", "force", *small]) == 0
-    assert main(["render", "run", "--turntable", "--frames", "2", *small]) == 0
-    assert {path.name for path in Path("run").iterdir() if path.suffix == ".mp4"} == {
-        "film.mp4",
-        "turntable.mp4",
-    }
-    assert capsys.readouterr().out == ""
 
 
 @pytest.mark.parametrize(
@@ -83,10 +89,9 @@ def test_a_run_is_filmed_and_turned_from_the_command_line(capsys: pytest.Capture
     ],
 )
 def test_options_that_do_not_go_together_are_told_in_one_line(
-    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], told: str, run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main(["run", "tap", "--out", "run", "--set", "simulation.duration=0.05", "--no-errors", "--quiet"])
-    assert main(["render", "run", *arguments]) == 2
+    assert main(["render", str(run), *arguments]) == 2
     _, err = capsys.readouterr()
     assert told in err
     assert err.count("\n") == 1

@@ -88,12 +88,9 @@ def test_the_rest_of_blender_keeps_its_own_manual() -> None:
     [
         ("digiclay.take_record", "#takes"),
         ("DIGICLAY_OT_press.depth", "#brushes"),
-        ("digiclay.session_reset", "#keys"),
         ("MESH_OT_digital_clay_add.rows", "#first-ridge"),
-        ("DIGICLAY_PG_layout.pitch", "#beds"),
         ("DIGICLAY_PG_valve.orifice_diameter", "#panels"),
         ("Display.skin", "#display"),
-        ("DIGICLAY_OT_bake.first", "#takes"),
     ],
 )
 def test_online_manual_opens_the_page_at_the_section_of_a_button(

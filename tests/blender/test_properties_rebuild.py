@@ -33,70 +33,40 @@ def bed() -> Any:
     return bed
 
 
-def test_the_pins_of_a_rebuilt_bed_stand_at_rest_where_its_layout_says(bed: Any) -> None:
-    settings = bed.digiclay
-    settings.layout.rows, settings.layout.arrangement, settings.actuator.rest_height = 9, "hexagonal", 30.0
+def identity(bed: Any) -> tuple[Any, ...]:
+    """Return what a rebuilt bed keeps."""
+    tip = view.fingertip_of(bed)
+    counts = (len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.node_groups))
+    places = (tuple(bed.location), tuple(tip.location))
+    return bed.session_uid, tip.session_uid, *places, *counts, view.color_source(bed)
+
+
+def drawn_pins(bed: Any) -> int:
+    """Count the pins drawn of a bed."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    return sum(item.is_instance and item.parent.original == bed for item in graph.object_instances)
+
+
+def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_says(bed: Any) -> None:
+    view.color_by(bed, "force")
+    bed[bed_state.STATE], before, settings = b"of 48 pins", identity(bed), bed.digiclay
+    settings.layout.rows, settings.layout.columns, settings.layout.arrangement = 9, 20, "hexagonal"
+    settings.actuator.rest_height = 30.0
     assert bpy.ops.digiclay.rebuild() == {"FINISHED"}
     cells = bridge.read_cells(bed.data)
     wanted = make_grid(properties.scene_of(bed).layout)
     np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
     np.testing.assert_allclose(cells["height"], 0.030, rtol=0, atol=FLOAT32)
     assert set(cells["mode"]) == {Mode.REST}
-
-
-def test_a_rebuilt_bed_is_the_same_object_in_the_same_place_with_the_same_fingertip(bed: Any) -> None:
-    tip = view.fingertip_of(bed)
-    before = (
-        bed.session_uid,
-        tuple(bed.location),
-        tip.session_uid,
-        tuple(tip.location),
-        len(bpy.data.objects),
-        len(bpy.data.meshes),
-        len(bpy.data.node_groups),
-    )
-    bed.digiclay.layout.columns = 11
-    bpy.ops.digiclay.rebuild()
-    tip = view.fingertip_of(bed)
-    assert before == (
-        bed.session_uid, tuple(bed.location), tip.session_uid, tuple(tip.location),
-        len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.node_groups),
-    )  # fmt: skip
-
-
-def test_a_rebuilt_bed_draws_its_new_pins(bed: Any) -> None:
-    bed.digiclay.layout.columns = 11
-    bpy.ops.digiclay.rebuild()
-    graph = bpy.context.evaluated_depsgraph_get()
-    drawn = [item for item in graph.object_instances if item.is_instance and item.parent.original == bed]
-    assert len(drawn) == 66
-
-
-def test_the_housing_of_a_rebuilt_bed_is_about_its_pins(bed: Any) -> None:
-    bed.digiclay.layout.columns = 20
-    bpy.ops.digiclay.rebuild()
+    assert (identity(bed), bed_state.read_snapshot(bed), drawn_pins(bed)) == (before, None, 180)
+    # The housing is about all of them.
     shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    reach = max(vertex.co.x for vertex in shown.data.vertices)
-    assert reach > max(vertex.co.x for vertex in bed.data.vertices)
-
-
-def test_a_fingertip_that_was_deleted_comes_back(bed: Any) -> None:
+    assert max(vertex.co.x for vertex in shown.data.vertices) > max(
+        vertex.co.x for vertex in bed.data.vertices
+    )
     bpy.data.objects.remove(view.fingertip_of(bed))
     bpy.ops.digiclay.rebuild()
     assert view.fingertip_of(bed) is not None
-
-
-def test_the_state_of_other_pins_is_forgotten(bed: Any) -> None:
-    bed[bed_state.STATE] = b"of 48 pins"
-    bpy.ops.digiclay.rebuild()
-    assert bed_state.read_snapshot(bed) is None
-
-
-def test_how_a_bed_is_colored_outlives_its_pins(bed: Any) -> None:
-    view.color_by(bed, "force")
-    bed.digiclay.layout.rows = 7
-    bpy.ops.digiclay.rebuild()
-    assert view.color_source(bed) == "force"
 
 
 def test_settings_that_do_not_go_together_leave_the_bed_as_it_is(bed: Any) -> None:
@@ -132,6 +102,4 @@ def test_a_copy_of_the_bed_keeps_its_pins_when_the_other_is_rebuilt(bed: Any) ->
     bed.digiclay.layout.columns = 11
     bpy.ops.digiclay.rebuild()
     bpy.context.view_layer.update()
-    graph = bpy.context.evaluated_depsgraph_get()
-    drawn = [item for item in graph.object_instances if item.is_instance and item.parent.original == copy]
-    assert len(drawn) == 48
+    assert drawn_pins(copy) == 48

@@ -72,25 +72,16 @@ def test_a_still_has_the_size_asked_for_and_shows_the_pins_in_the_color_of_their
     assert of_the_hue(pins, COLORS[other]) < 20
 
 
-def test_the_legend_names_the_modes_present_in_their_colors(tmp_path: Path) -> None:
-    width = 2 * WIDTH
-    out = still.render_still(
-        bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2
-    )
-    legend = picture(out)[:, : width // 5]
-    assert of_the_hue(legend, COLORS[Mode.HOLD]) > 20
-
-
-def test_the_legend_has_the_palette_that_the_open_file_wears(tmp_path: Path) -> None:
-    view.build(bed_in(Mode.HOLD), bpy.context.collection)
-    palettes.set_palette("tol_muted")
-    width = 2 * WIDTH
-    out = still.render_still(
-        bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2
-    )
-    legend = picture(out)[:, : width // 5]
-    assert of_the_hue(legend, palettes.PALETTES["tol_muted"][Mode.HOLD]) > 20
-    assert of_the_hue(legend, COLORS[Mode.HOLD]) < 20
+def test_the_legend_names_the_modes_present_in_the_palette_that_the_open_file_wears(tmp_path: Path) -> None:
+    other = palettes.PALETTES["tol_muted"][Mode.HOLD]
+    for seen, unseen in ((COLORS[Mode.HOLD], other), (other, COLORS[Mode.HOLD])):
+        size = {"width": 2 * WIDTH, "height": 2 * HEIGHT}
+        out = still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", **size, samples=2)
+        legend = picture(out)[:, : 2 * WIDTH // 5]
+        assert of_the_hue(legend, seen) > 20
+        assert of_the_hue(legend, unseen) < 20
+        view.build(bed_in(Mode.HOLD), bpy.context.collection)
+        palettes.set_palette("tol_muted")
 
 
 def test_a_still_leaves_the_users_file_as_it_was(tmp_path: Path, formed: Instant) -> None:

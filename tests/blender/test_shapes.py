@@ -14,7 +14,6 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
 from digiclay.core.shapes.fitting import unpack as heights_of
-from digiclay.core.shapes.source_file import list_shapes
 from digiclay.device import view
 from digiclay.exchange import image_reader
 from digiclay.live import bed_state
@@ -116,13 +115,6 @@ def test_the_finger_is_lifted_out_of_the_shape() -> None:
     assert bpy.ops.digiclay.shape_sample(sample="dome", rise=40.0) == {"FINISHED"}
     bpy.context.view_layer.update()
     assert bridge.pose(tip)[2] > heights(made).max()
-
-
-@pytest.mark.parametrize("name", list_shapes())
-def test_every_sample_shape_is_displayed(name: str) -> None:
-    made = bed()
-    assert bpy.ops.digiclay.shape_sample(sample=name) == {"FINISHED"}
-    assert np.ptp(heights(made)) == pytest.approx(15e-3, abs=2 * SHOWN)
 
 
 def test_a_shape_is_taken_back_by_undo() -> None:

@@ -14,7 +14,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.device import view
 from digiclay.live import bed_state, tick
 from digiclay.recorded import bake, takes
-from digiclay.sessions import running, sculpting
+from digiclay.sessions import running
 from numpy.typing import NDArray
 
 from tests.blender.at_hand import new_bed
@@ -63,14 +63,6 @@ def record(bed: Any) -> str:
     return takes.list_takes(bed)[-1].number
 
 
-def test_what_is_recorded_becomes_a_take_of_the_bed(bed: Any) -> None:
-    record(bed)
-    (entry,) = takes.list_takes(bed)
-    assert entry.name == "A press"
-    # Twelve ticks of ten periods: the first look at the clock starts it.
-    assert entry.seconds == pytest.approx(0.6)
-
-
 def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(bed: Any) -> None:
     number = record(bed)
     kept, drawn = bed_state.read_snapshot(bed), heights(bed)
@@ -81,6 +73,9 @@ def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(bed: Any) ->
     assert bpy.ops.digiclay.take_replay(take=number) == {"FINISHED"}
     assert bed_state.read_snapshot(bed) == kept == takes.read(bed, number).end
     assert np.array_equal(heights(bed), drawn)
+    begin(bed)  # it goes on from there
+    assert running.find(bed).state.period == takes.read(bed, number).periods
+    tick.stop(bed.session_uid)
 
 
 def test_finer_steps_end_near_but_not_at_the_same_heights(bed: Any) -> None:
@@ -89,15 +84,6 @@ def test_finer_steps_end_near_but_not_at_the_same_heights(bed: Any) -> None:
     assert bpy.ops.digiclay.take_replay(take=number, parts=8) == {"FINISHED"}
     apart = np.abs(heights(bed) - drawn).max()
     assert 0.0 < apart < 20e-6  # what steps of 5 ms leave
-
-
-def test_the_session_goes_on_from_a_replayed_take(bed: Any) -> None:
-    number = record(bed)
-    bpy.ops.digiclay.take_replay(take=number)
-    begin(bed)
-    session = running.find(bed)
-    assert session.state.period == takes.read(bed, number).periods
-    tick.stop(bed.session_uid)
 
 
 def test_baking_a_take_shows_its_end_at_its_last_frame(bed: Any) -> None:
@@ -135,7 +121,10 @@ def test_a_session_does_not_start_on_a_baked_bed(bed: Any) -> None:
 
 
 def test_an_exported_take_is_a_scene_that_runs_as_long(bed: Any, tmp_path: Path) -> None:
-    record(bed)
+    number = record(bed)
+    begin(bed)
+    bpy.ops.digiclay.take_record()  # meanwhile a session may record
+    press(bed, deep=12e-3)
     file = tmp_path / "ein Täke 1.5.toml"
     # What follows the point of a number is no ending.
     assert bpy.ops.digiclay.take_export(filepath=str(file).removesuffix(".toml")) == {"FINISHED"}
@@ -143,6 +132,10 @@ def test_an_exported_take_is_a_scene_that_runs_as_long(bed: Any, tmp_path: Path)
     assert scene.name == "A press"
     assert scene.simulation.duration == pytest.approx(0.6)
     assert scene.cells == 144
+    assert len(running.find(bed).path) > 1
+    tick.stop(bed.session_uid)
+    assert bpy.ops.digiclay.take_remove(take=number) == {"FINISHED"}
+    assert number not in [entry.number for entry in takes.list_takes(bed)]
 
 
 def test_a_take_from_a_formed_bed_is_not_exported_and_the_file_is_not_made(bed: Any, tmp_path: Path) -> None:
@@ -154,26 +147,12 @@ def test_a_take_from_a_formed_bed_is_not_exported_and_the_file_is_not_made(bed: 
     assert not file.exists()
 
 
-def test_a_removed_take_is_gone(bed: Any) -> None:
-    number = record(bed)
-    assert bpy.ops.digiclay.take_remove(take=number) == {"FINISHED"}
-    assert takes.list_takes(bed) == []
-
-
 def test_keeping_a_take_of_nothing_says_so(bed: Any) -> None:
     begin(bed)
     bpy.ops.digiclay.take_record()
     assert bpy.ops.digiclay.take_keep() == {"CANCELLED"}
     assert running.find(bed).recording is None
     tick.stop(bed.session_uid)
-
-
-def test_a_session_that_is_stopped_while_it_records_keeps_the_take(bed: Any) -> None:
-    begin(bed)
-    bpy.ops.digiclay.take_record()
-    press(bed)
-    tick.stop(bed.session_uid)
-    assert [one.seconds for one in takes.list_takes(bed)] == [pytest.approx(0.6)]
 
 
 def test_a_changed_parameter_ends_the_recording_and_keeps_it_as_a_take_of_the_former_scene(bed: Any) -> None:
@@ -197,24 +176,4 @@ def test_a_reset_keeps_what_was_recorded(bed: Any) -> None:
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
     assert [one.seconds for one in takes.list_takes(bed)] == [pytest.approx(0.6)]
     assert running.find(bed).recording is None
-    tick.stop(bed.session_uid)
-
-
-def test_a_take_is_exported_while_a_session_runs_and_records(bed: Any, tmp_path: Path) -> None:
-    record(bed)
-    begin(bed)
-    bpy.ops.digiclay.take_record()
-    press(bed, deep=12e-3)
-    file = tmp_path / "live.toml"
-    assert bpy.ops.digiclay.take_export(filepath=str(file)) == {"FINISHED"}
-    assert load(file).simulation.duration == pytest.approx(0.6)
-    assert len(running.find(bed).path) > 1
-    tick.stop(bed.session_uid)
-
-
-def test_the_session_recorded_by_hand_is_the_one_sculpting_records(bed: Any) -> None:
-    begin(bed)
-    running.put(sculpting.set_recording(running.find(bed), True))
-    press(bed, 3)
-    assert takes.read_recording(running.find(bed)).periods == 30
     tick.stop(bed.session_uid)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +36,7 @@ def scene() -> Scene:
     return resolve({"layout": {"rows": 12, "columns": 12}})
 
 
+@functools.cache
 def taken(count: int = COUNT) -> tuple[Take, Floats]:
     """Press 5 mm deep; return the take, and all heights (t + 1, n)."""
     made = scene()
@@ -48,14 +50,18 @@ def taken(count: int = COUNT) -> tuple[Take, Floats]:
     return Take(made, first, poses[:, None], snapshot.dump(system, state)), np.array(heights)
 
 
+def build() -> Any:
+    """Return another bed in the open file."""
+    made = scene()
+    rest = Instant.at_rest(made.layout, made.actuator, made.section("fingertip"))
+    return view.build(rest, bpy.context.collection)
+
+
 @pytest.fixture
 def bed() -> Any:
     """Return a bed in the open file."""
-    made = scene()
     bpy.context.scene.render.fps = 40  # a frame is five control periods
-    return view.build(
-        Instant.at_rest(made.layout, made.actuator, made.section("fingertip")), bpy.context.collection
-    )
+    return build()
 
 
 def shown(bed: Any, frame: float) -> Floats:
@@ -91,55 +97,32 @@ def test_a_take_kept_in_a_bed_comes_back_after_saving_and_loading(bed: Any, tmp_
     assert (read.start, read.end) == (take.start, take.end)
 
 
-def test_a_copy_of_a_bed_has_its_takes(bed: Any) -> None:
-    take, _ = taken()
-    takes.add(bed, take)
-    assert takes.list_takes(bed.copy()) == takes.list_takes(bed)
-
-
 def test_a_number_is_not_used_again_while_later_takes_stand(bed: Any) -> None:
     take, _ = taken(5)
     numbers = [takes.add(bed, take).number for _ in range(3)]
     takes.remove(bed, numbers[1])
     assert takes.add(bed, take).number == "4"
     assert [one.number for one in takes.list_takes(bed)] == ["1", "3", "4"]
-
-
-def test_a_take_that_is_not_there_is_refused_with_those_that_are(bed: Any) -> None:
-    take, _ = taken(5)
-    takes.add(bed, take)
     with pytest.raises(DigiclayError, match="has no take '7': its takes are 1"):
         takes.read(bed, "7")
 
 
-def test_every_frame_shows_the_heights_of_its_moment(bed: Any) -> None:
+def test_every_frame_shows_heights_modes_forces_and_fingertip_of_its_moment(bed: Any) -> None:
     take, heights = taken()
-    baked(bed, take, first=10)
-    for frame in (0, 7, 20):
-        # Pins are drawn in float32 at ten units a meter: 3e-8 of 0.4.
-        assert np.abs(shown(bed, 10 + frame) - heights[5 * frame]).max() < 1e-7
-
-
-def test_between_two_frames_heights_are_blended(bed: Any) -> None:
-    take, heights = taken()
-    baked(bed, take)
+    moments = baked(bed, take, first=10)
     between = (heights[50] + heights[55]) / 2.0
     assert np.ptp(heights[50] - heights[55]) > 1e-5
-    # The curve's value is float32: 1e-6 of a moment.
-    assert np.abs(shown(bed, 11.5) - between).max() < 1e-7
-
-
-def test_before_the_first_frame_and_after_the_last_the_bed_stays(bed: Any) -> None:
-    take, heights = taken()
-    baked(bed, take, first=10)
-    assert np.abs(shown(bed, 1) - heights[0]).max() < 1e-7
-    assert np.abs(shown(bed, 99) - heights[-1]).max() < 1e-7
-
-
-def test_modes_and_forces_play_too(bed: Any) -> None:
-    take, _ = taken()
-    moments = baked(bed, take)
-    shown(bed, 1 + 20)
+    wanted = {
+        10: heights[0],
+        17: heights[35],
+        20.5: between,
+        1: heights[0],
+        99: heights[-1],
+        30: heights[100],
+    }
+    for frame, height in wanted.items():
+        # Pins are drawn in float32 at ten units a meter: 3e-8 of 0.4.
+        assert np.abs(shown(bed, frame) - height).max() < 1e-7, frame
     mesh = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     force, mode = np.empty(144, np.float32), np.empty(144, np.int32)
     mesh.attributes["force"].data.foreach_get("value", force)
@@ -147,13 +130,7 @@ def test_modes_and_forces_play_too(bed: Any) -> None:
     assert np.array_equal(force, moments.force[20])
     assert np.array_equal(mode, moments.mode[20])
     assert force.max() > 0.0
-
-
-def test_the_fingertip_follows_its_keyframes(bed: Any) -> None:
-    take, _ = taken()
-    baked(bed, take)
-    bpy.context.scene.frame_set(1 + 12)
-    # Locations are float32.
+    bpy.context.scene.frame_set(10 + 12)
     assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - take.poses[60, 0, :3]).max() < 1e-7
 
 
@@ -177,17 +154,9 @@ def test_freeing_a_bake_leaves_nothing_of_it(bed: Any) -> None:
     assert [curve for group in bake.curves(bed) for curve in group] == []
 
 
-def other_bed() -> Any:
-    """Return a second bed in the open file."""
-    made = scene()
-    return view.build(
-        Instant.at_rest(made.layout, made.actuator, made.section("fingertip")), bpy.context.collection
-    )
-
-
 def same_action(bed: Any) -> Any:
     """Return a second bed that was baked into the action of the first."""
-    other = other_bed()
+    other = build()
     other.animation_data_create().action = bed.animation_data.action
     baked(other, taken()[0])
     return other
