@@ -76,7 +76,8 @@ def test_an_imported_run_shows_the_row_asked_for_with_the_settings_of_the_run(
     tmp_path: Path, formed: Instant
 ) -> None:
     heights = np.stack([formed.height, formed.height[::-1]])
-    scene = 'control = "absent"\n[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n[valve]\nstroke = 41e-6\n'
+    scene = 'control = "absent"\n[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n'
+    scene += "[valve]\nstroke = 41e-6\n"
     (tmp_path / "scene.toml").write_text(scene)
     np.savez(
         tmp_path / "history.npz",

@@ -41,11 +41,25 @@ def lengths(bed: Any) -> tuple[float, ...]:
     return tuple(round(1e3 * length, 4) for length in meters)
 
 
-def test_blister_and_drawn_ellipsoid_follow_the_size_in_proportion(bed: Any) -> None:
-    bed.digiclay.size = 8.0
-    assert lengths(bed) == (8.0, 7.5, 9.25, 3.0)
-    finger = bridge.finger_of(view.fingertip_of(bed))
-    assert (finger.length, finger.width, finger.height) == pytest.approx((5e-3, 4e-3, 4e-3), rel=1e-6)
+@pytest.mark.parametrize(
+    ("follows", "size", "wanted"),
+    [
+        (True, 8.0, (8.0, 7.5, 9.25, 3.0)), (False, 8.0, (8.0, 15.0, 18.5, 6.0)),
+        (False, 60.0, (60.0, 15.0, 18.5, 6.0)),
+    ],
+)  # fmt: skip
+def test_the_ellipsoid_follows_the_size_and_the_blister_unless_it_is_set_by_itself(
+    bed: Any, follows: bool, size: float, wanted: tuple[float, ...]
+) -> None:
+    before = bridge.pose(view.fingertip_of(bed))
+    bed.digiclay.blister_follows = follows
+    bed.digiclay.size = size
+    assert lengths(bed) == wanted
+    bpy.context.view_layer.update()
+    finger, half = bridge.finger_of(view.fingertip_of(bed)), size * 0.5e-3
+    assert (finger.length, finger.width, finger.height) == pytest.approx((1.25 * half, half, half), rel=1e-6)
+    # The lowest point stays: a larger finger does not press.
+    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), before, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize(("name", "usual"), [("length", 20.0), ("width", 16.0), ("height", 16.0)])
@@ -69,20 +83,6 @@ def test_the_panel_shows_whole_widths_and_what_is_stored_are_semi_axes(
 )
 def test_a_strength_is_typed_as_a_share_or_in_per_cent(typed: str, share: float) -> None:
     assert AdjustStrength.parse(None, typed) == pytest.approx(share, rel=1e-9)
-
-
-def test_a_blister_set_by_itself_keeps_its_size(bed: Any) -> None:
-    bed.digiclay.blister_follows = False
-    bed.digiclay.size = 8.0
-    assert lengths(bed) == (8.0, 15.0, 18.5, 6.0)
-
-
-@pytest.mark.parametrize("size", [5.0, 60.0])
-def test_the_lowest_point_stays_so_that_a_larger_finger_does_not_press(bed: Any, size: float) -> None:
-    before = bridge.pose(view.fingertip_of(bed))
-    bed.digiclay.size = size
-    bpy.context.view_layer.update()
-    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), before, rtol=0, atol=1e-7)
 
 
 def test_a_blister_that_the_bed_limits_is_the_same_again_with_the_size_before(bed: Any) -> None:

@@ -61,9 +61,8 @@ def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_sa
     assert (identity(bed), bed_state.read_snapshot(bed), drawn_pins(bed)) == (before, None, 180)
     # The housing is about all of them.
     shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    assert max(vertex.co.x for vertex in shown.data.vertices) > max(
-        vertex.co.x for vertex in bed.data.vertices
-    )
+    housing, pins = (max(vertex.co.x for vertex in one.data.vertices) for one in (shown, bed))
+    assert housing > pins
     bpy.data.objects.remove(view.fingertip_of(bed))
     bpy.ops.digiclay.rebuild()
     assert view.fingertip_of(bed) is not None

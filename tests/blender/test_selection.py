@@ -6,7 +6,6 @@ from typing import Any
 
 import bpy
 import pytest
-from digiclay.device import view
 from digiclay.live import beds
 
 from tests.blender.at_hand import new_bed
@@ -20,12 +19,6 @@ def bed() -> Any:
     return new_bed(rows=5, columns=5)
 
 
-def test_a_bed_taken_out_of_the_selection_is_active_still(bed: Any) -> None:
-    beds.deselect(bed)
-    assert not bed.select_get()
-    assert bpy.context.object == bed
-
-
 def test_a_bed_of_another_view_layer_is_left_alone(bed: Any) -> None:
     for collection in bed.users_collection:
         collection.objects.unlink(bed)
@@ -33,25 +26,20 @@ def test_a_bed_of_another_view_layer_is_left_alone(bed: Any) -> None:
     assert bed.name in bpy.data.objects
 
 
-@pytest.mark.parametrize("before", [True, False])
-def test_after_the_session_the_active_bed_is_selected_again_if_it_was_before(bed: Any, before: bool) -> None:
-    bed.select_set(before)
-    beds.deselect(bed)
-    beds.select_active(frozenset({bed.session_uid}))
-    assert bed.select_get() is before
-
-
-def test_what_was_selected_meanwhile_stays_the_selection(bed: Any) -> None:
-    beds.deselect(bed)
-    tip = view.fingertip_of(bed)
-    tip.select_set(True)
-    beds.select_active(frozenset({bed.session_uid}))
-    assert bpy.context.selected_objects == [tip]
-
-
-def test_another_object_that_is_active_is_not_selected(bed: Any) -> None:
+@pytest.mark.parametrize(
+    ("case", "wanted"),
+    [("selected before", ["Digital Clay"]), ("not selected before", []), ("another is active", []),
+     ("another was selected meanwhile", ["Cube"])],
+)  # fmt: skip
+def test_after_the_session_the_active_bed_is_selected_again_if_it_was_before(
+    bed: Any, case: str, wanted: list[str]
+) -> None:
     cube = bpy.data.objects["Cube"]
+    bed.select_set(case != "not selected before")
     beds.deselect(bed)
-    bpy.context.view_layer.objects.active = cube
+    assert (bed.select_get(), bpy.context.object) == (False, bed)
+    if case == "another is active":
+        bpy.context.view_layer.objects.active = cube
+    cube.select_set(case == "another was selected meanwhile")
     beds.select_active(frozenset({bed.session_uid}))
-    assert bpy.context.selected_objects == []
+    assert [thing.name for thing in bpy.context.selected_objects] == wanted

@@ -34,19 +34,27 @@ def still(bed: Any) -> bake.BakedFrames:
     )
 
 
-@pytest.mark.parametrize("baked", [False, True])
-def test_a_bed_that_is_appended_comes_with_its_fingertip_and_nothing_else(
-    tmp_path: Path, baked: bool
-) -> None:
+@pytest.mark.parametrize("how", ["append", "append baked", "link"])
+def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_path: Path, how: str) -> None:
     bed = added()
-    if baked:
+    if how == "append baked":
         bake.apply(bed, still(bed), 1, Fingertip(), keyframe_finger=False)
     at = bridge.pose(view.fingertip_of(bed))
     name = bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     bpy.ops.wm.read_homefile(use_empty=True)
     looked()
-    bpy.ops.wm.append(directory=str(tmp_path / "bed.blend" / "Object") + "/", filename=name)
+    source = {"directory": str(tmp_path / "bed.blend" / "Object") + "/", "filename": name}
+    if how == "link":
+        bpy.ops.wm.link(**source)
+        done("Link")
+        assert (len(bpy.context.scene.objects), housings()) == (1, 1)
+        select(bpy.context.scene.objects[0])
+        bpy.ops.object.make_local(type="ALL")
+        done("Make Local")
+        assert whole(*beds())
+        return
+    bpy.ops.wm.append(**source)
     # As Blender leaves it, without any help.
     (bed,) = beds()
     assert whole(bed)
@@ -56,23 +64,6 @@ def test_a_bed_that_is_appended_comes_with_its_fingertip_and_nothing_else(
     assert housings() == 1
     bpy.context.view_layer.update()
     np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), at, rtol=0, atol=1e-7)
-
-
-def test_a_bed_that_is_linked_brings_nothing_else_and_gets_its_fingertip_when_made_local(
-    tmp_path: Path,
-) -> None:
-    name = added().name
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True)
-    looked()
-    bpy.ops.wm.link(directory=str(tmp_path / "bed.blend" / "Object") + "/", filename=name)
-    done("Link")
-    (bed,) = bpy.context.scene.objects
-    assert housings() == 1
-    select(bed)
-    bpy.ops.object.make_local(type="ALL")
-    done("Make Local")
-    assert whole(*beds())
 
 
 @pytest.mark.parametrize("by_hand", [True, False])
@@ -139,14 +130,6 @@ def test_the_ball_of_an_older_file_can_be_clicked_on() -> None:
     done("Older")
     assert not ball.hide_select
     assert all(ball.lock_location)
-
-
-def test_one_of_two_beds_deleted_leaves_the_other_as_it_is() -> None:
-    first, second = added(), added(1.0)
-    # Not by an operator: what the outliner and scripts do is looked after as well.
-    bpy.data.objects.remove(first)
-    done("Delete")
-    assert whole(second)
 
 
 @pytest.mark.parametrize("linked", [False, True])
@@ -263,31 +246,25 @@ def test_a_bed_is_hidden_and_shown_with_its_fingertip(name: str) -> None:
     assert hidden(name, *parts) == [False, True, True]
     hide(tip, False)
     assert hidden(name, *parts) == [False] * 3
-
-
-def test_undo_shows_again_what_was_hidden_along() -> None:
-    bed = added()
-    bed.hide_set(True)
-    done("Hide")
+    hide(bed, True)
     undone()
-    (bed,) = beds()
-    tip = view.fingertip_of(bed)
-    assert hidden("eye", bed, tip, tip[BALL]) == [False] * 3
+    tip = view.fingertip_of(beds()[0])
+    assert hidden(name, beds()[0], tip, tip[BALL]) == [False] * 3
 
 
-def test_a_copy_of_a_bed_whose_settings_do_not_go_together_gets_a_fingertip_too() -> None:
-    bed = added()
-    bed.digiclay.layout.pitch = 1.0  # mm, less than the bore
-    select(bed)
-    bpy.ops.object.duplicate()
-    done("Duplicate")
-    assert whole(bed, bpy.context.object)
-
-
-def test_a_bed_whose_settings_do_not_go_together_is_exported_as_it_is_drawn() -> None:
+def test_a_bed_whose_settings_do_not_go_together_is_exported_as_it_is_drawn_and_copied() -> None:
     bed = added()
     bed.digiclay.layout.pitch = 1.0  # mm, less than the bore
     with pytest.raises(ParameterError, match="Pitch must be"):
         properties.read_scene(bed)
     assert bpy.ops.digiclay.find_features() == {"FINISHED"}
     np.testing.assert_array_equal(formed_bed.read_formed(bed).height, bridge.read_cells(bed.data)["height"])
+    select(bed)
+    bpy.ops.object.duplicate()
+    done("Duplicate")
+    assert whole(bed, bpy.context.object)
+    # Not by an operator: what the outliner and scripts do is looked after as well.
+    copy = bpy.context.object
+    bpy.data.objects.remove(bed)
+    done("Delete")
+    assert whole(copy)

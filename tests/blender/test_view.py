@@ -62,14 +62,6 @@ def test_the_modes_have_as_many_materials_each_in_its_color(bed: Any) -> None:
         np.testing.assert_allclose(shader.inputs["Base Color"].default_value, wanted, rtol=0, atol=1e-6)
 
 
-def test_cells_are_read_back_as_they_were_written(bed: Any, formed: Instant) -> None:
-    cells = bridge.read_cells(bed.data)
-    np.testing.assert_allclose(cells["position"], formed.position, rtol=0, atol=FLOAT32)
-    np.testing.assert_allclose(cells["height"], formed.height, rtol=0, atol=FLOAT32)
-    np.testing.assert_array_equal(cells["mode"], formed.mode)
-    np.testing.assert_allclose(cells["force"], formed.force, rtol=2.0**-23)
-
-
 def test_a_second_bed_shares_the_materials_and_nothing_else(bed: Any, formed: Instant) -> None:
     materials = len(bpy.data.materials)
     other = view.build(formed, bpy.context.scene.collection)
@@ -91,18 +83,6 @@ def test_a_tilted_fingertip_touches_down_at_its_lowest_point(bed: Any, formed: I
     # of the lowest point, and above it by no more than the facet's sagitta.
     assert np.linalg.norm(lowest[:2] - at[:2]) < 0.010 * np.pi / 32
     assert 0.0 <= lowest[2] - at[2] < 0.010 * (np.pi / 64) ** 2
-
-
-def test_the_pose_of_a_fingertip_is_read_back(bed: Any, formed: Instant) -> None:
-    turn = np.array([0.8, 0.3, -0.4, 0.33])
-    at = np.array([0.004, -0.002, 0.055, *(turn / np.linalg.norm(turn))])
-    fingertip = view.fingertip_of(bed)
-    bridge.place_fingertip(fingertip, at, Fingertip(length=0.012))
-    bed.location = (3.0, -2.0, 1.0)
-    bed.rotation_euler = (0.0, 0.0, 0.7)
-    bpy.context.view_layer.update()
-    # Blender's matrices are float32, and this one is inverted three units from the origin.
-    np.testing.assert_allclose(bridge.pose(fingertip), at, rtol=0, atol=2e-6)
 
 
 def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed: Any, formed: Instant) -> None:
@@ -130,19 +110,23 @@ def test_the_fingertip_is_an_empty_and_the_ellipsoid_in_it_cannot_be_picked_by_m
     np.testing.assert_allclose(ball.scale, wanted, rtol=2.0**-23)
 
 
-def test_scaling_the_fingertip_by_hand_does_not_move_what_touches(bed: Any, formed: Instant) -> None:
-    tip = view.fingertip_of(bed)
-    tip.scale = (3.0, 1.0, 0.5)
+def test_the_pose_of_a_fingertip_is_read_back_however_the_bed_stands_and_the_fingertip_is_scaled(
+    bed: Any, formed: Instant
+) -> None:
+    fingertip = view.fingertip_of(bed)
+    turn = np.array([0.8, 0.3, -0.4, 0.33])
+    at = np.array([0.004, -0.002, 0.055, *(turn / np.linalg.norm(turn))])
+    bed.location, bed.rotation_euler, bed.scale = (3.0, -2.0, 1.0), (0.2, -0.4, 0.9), (2.5, 2.5, 2.5)
+    for pose, finger in ((formed.fingertip, formed.finger), (at, Fingertip(length=0.012))):
+        bridge.place_fingertip(fingertip, pose, finger)
+        bpy.context.view_layer.update()
+        # Blender's matrices are float32, and this one is inverted three units from the origin.
+        np.testing.assert_allclose(bridge.pose(fingertip), pose, rtol=0, atol=2e-6)
+    assert bridge.uniform(bed) == pytest.approx(2.5, rel=1e-6)
+    bridge.place_fingertip(fingertip, formed.fingertip, formed.finger)
+    fingertip.scale = (3.0, 1.0, 0.5)  # by hand: what touches stays
     bpy.context.view_layer.update()
-    np.testing.assert_allclose(bridge.pose(tip), formed.fingertip, rtol=0, atol=FLOAT32)
-
-
-def test_a_uniformly_scaled_bed_reads_the_same_pose(bed: Any, formed: Instant) -> None:
-    bed.scale = (2.5, 2.5, 2.5)
-    bed.rotation_euler = (0.2, -0.4, 0.9)
-    bpy.context.view_layer.update()
-    assert bridge.uniform(bed) == pytest.approx(2.5, rel=1e-6)  # float32
-    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), formed.fingertip, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(bridge.pose(fingertip), formed.fingertip, rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize(
@@ -160,11 +144,9 @@ def test_a_bed_that_is_not_uniformly_scaled_is_refused_with_the_reason(
     bpy.context.view_layer.update()
     with pytest.raises(DigiclayError, match=said):
         bridge.pose(view.fingertip_of(bed))
-
-
-def test_a_bed_sheared_by_its_parent_is_refused(bed: Any) -> None:
-    bed.parent, bed.rotation_euler = bpy.data.objects["Cube"], (0.0, 0.0, 0.7853981)
-    bed.parent.scale = (1.0, 2.0, 1.0)
+    cube = bpy.data.objects["Cube"]
+    bed.parent, bed.scale, bed.rotation_euler = cube, (1.0, 1.0, 1.0), (0.0, 0.0, 0.7853981)
+    cube.scale = (1.0, 2.0, 1.0)
     bpy.context.view_layer.update()
     with pytest.raises(DigiclayError, match="sheared"):
         bridge.uniform(bed)
@@ -180,6 +162,10 @@ def test_a_bed_sheared_by_its_parent_is_refused(bed: Any) -> None:
 )
 def test_a_display_that_draws_nothing_is_refused(bed: Any, change: Any, value: Any, message: str) -> None:
     with pytest.raises(DigiclayError, match=message):
+        change(bed, value)
+    bed.modifiers.clear()
+    assert not view.wants_force(bed)
+    with pytest.raises(DigiclayError, match="Digital Clay must have the geometry nodes modifier"):
         change(bed, value)
 
 
@@ -210,8 +196,13 @@ def arrows(bed: Any) -> np.ndarray:
 
 
 def test_arrows_stand_on_the_pressed_pins_as_long_as_their_force(bed: Any, formed: Instant) -> None:
+    (ball,) = view.fingertip_of(bed).children
     assert len(arrows(bed)) == 0
+    copy = bed.copy()
+    bpy.context.collection.objects.link(copy)
     view.show_arrows(bed, True)
+    assert not view.shows_arrows(copy)
+    assert ball.material_slots[0].material[view.ROLE] == "fingertip_clear"
     view.scale_arrows(bed, 0.050)
     drawn, pressed = arrows(bed), formed.force > 0.0
     assert len(drawn) == pressed.sum() == 47
@@ -220,22 +211,7 @@ def test_arrows_stand_on_the_pressed_pins_as_long_as_their_force(bed: Any, forme
     assert len(drawn_pins(bed)[0]) == 48 + 47
     view.show_arrows(bed, False)
     assert len(drawn_pins(bed)[0]) == 48
-
-
-def test_one_sees_through_the_fingertip_while_arrows_are_on(bed: Any) -> None:
-    (ball,) = view.fingertip_of(bed).children
-    for on, name in ((True, "fingertip_clear"), (False, "fingertip")):
-        view.show_arrows(bed, on)
-        assert ball.material_slots[0].material[view.ROLE] == name
-
-
-def test_a_copy_of_a_bed_keeps_its_own_colors_and_arrows(bed: Any) -> None:
-    other = bed.copy()
-    bpy.context.collection.objects.link(other)
-    view.color_by(other, "force")
-    view.show_arrows(other, True)
-    assert (view.color_source(bed), view.shows_arrows(bed)) == ("mode", False)
-    assert (view.color_source(other), view.shows_arrows(other)) == ("force", True)
+    assert ball.material_slots[0].material[view.ROLE] == "fingertip"
 
 
 def test_forces_are_written_only_while_something_drawn_tells_them(bed: Any) -> None:
@@ -253,23 +229,6 @@ def test_forces_are_written_only_while_something_drawn_tells_them(bed: Any) -> N
         view.show_state(bed, system, state)
         forces = bridge.read_cells(bed.data)["force"]
         np.testing.assert_allclose(forces, state.row(system.rows.force), rtol=2.0**-23)
-
-
-def test_a_running_session_moves_the_pins_and_leaves_the_fingertip_to_the_user(bed: Any) -> None:
-    system = assemble(resolve({"layout": {"rows": 6, "columns": 8}, "control": "absent"}))
-    tip = view.fingertip_of(bed)
-    tip.location.x += 1.0
-    view.show_state(bed, system, begin(system))
-    tops, _ = drawn_pins(bed)
-    np.testing.assert_allclose(tops[:, 2], system.cell.actuator.rest_height, rtol=0, atol=FLOAT32)
-    assert tip.location.x > 0.9
-
-
-def test_a_bed_whose_nodes_were_removed_is_refused_by_name_and_shows_no_forces(bed: Any) -> None:
-    bed.modifiers.clear()
-    assert not view.wants_force(bed)
-    with pytest.raises(DigiclayError, match="Digital Clay must have the geometry nodes modifier"):
-        view.color_by(bed, "force")
 
 
 def test_an_instant_shown_keeps_its_forces_though_nothing_drawn_tells_them(formed: Instant) -> None:

@@ -7,15 +7,13 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.live import bed_state
-from digiclay.sessions import running, sculpting
+from digiclay.sessions import running
 
 from tests.blender.session.live import (
     FLOAT32,
-    TICK,
     Clock,
     exact,
     move,
@@ -116,13 +114,6 @@ def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed
     assert running.find(bed).scene.method == "plastic"
 
 
-def test_a_parameter_that_is_changed_in_mid_session_takes_effect(bed: Any, clock: Clock) -> None:
-    started(bed)
-    bed.digiclay.control.virtual_master.force_setpoint = 0.8
-    assert clock.tick() == []
-    assert running.find(bed).scene.set_point == SetPoint(0.8)
-
-
 def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed: Any, clock: Clock) -> None:
     started(bed)
     clock.tick(40)
@@ -131,13 +122,3 @@ def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed: Any, clock: Clock) -> Non
     assert bed.data.vertices[0].co.z == 9.0
     move(bed, clock, [(0.0, 38.0)] * 2)
     assert bed.data.vertices[0].co.z < 1.0
-
-
-def test_recorded_poses_are_those_of_the_fingertip(bed: Any, clock: Clock) -> None:
-    started(bed)
-    clock.tick(2)
-    running.put(sculpting.set_recording(running.find(bed), True))
-    move(bed, clock, [(0.0, 46.0), (3.0, 45.0), (6.0, 40.0)])
-    path = running.find(bed).path
-    np.testing.assert_allclose(path[-1, 0], [6e-3, 0, 40e-3, 1, 0, 0, 0], rtol=0, atol=FLOAT32)
-    assert len(path) == pytest.approx(1 + 3 * TICK / 5e-3, abs=1)

@@ -106,27 +106,20 @@ def test_a_file_that_cannot_be_saved_leaves_the_recording_as_it_was(recording: A
     assert handlers.has_unsaved()
 
 
+@pytest.mark.parametrize(
+    ("how", "kept"),
+    [("the recording goes on", []), ("session_stop", ["Take 1"]), ("take_keep", ["Take 1"])],
+)
 def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(
-    recording: Any, clock: Clock
+    recording: Any, clock: Clock, how: str, kept: list[str]
 ) -> None:
     for _ in range(2):
         handlers.write_recovery()
         assert seconds(recording) == [SECONDS]
+    if kept:
+        getattr(bpy.ops.digiclay, how)()
     handlers.clear_recovery()
-    assert seconds(recording) == []
-
-
-def test_a_session_that_ends_while_blender_may_save_by_itself_keeps_one_take(recording: Any) -> None:
-    handlers.write_recovery()
-    bpy.ops.digiclay.session_stop()
-    assert seconds(recording) == [SECONDS]
-
-
-def test_a_take_kept_while_blender_may_save_by_itself_is_the_only_one_and_the_first(recording: Any) -> None:
-    handlers.write_recovery()
-    bpy.ops.digiclay.take_keep()
-    handlers.clear_recovery()
-    assert [entry.name for entry in takes.list_takes(recording)] == ["Take 1"]
+    assert [entry.name for entry in takes.list_takes(recording)] == kept
 
 
 def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording: Any, clock: Clock) -> None:
@@ -153,7 +146,10 @@ def test_another_file_leaves_the_former_one_with_its_take_to_be_recovered(
 
 def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, tmp_path: Path) -> None:
     save(tmp_path / "saved.blend")
-    assert seconds(load(tmp_path / "saved.blend")) == [SECONDS]
+    bed = load(tmp_path / "saved.blend")
+    assert seconds(bed) == [SECONDS]
+    started(bed)  # and nothing where nothing is recorded
+    bpy.ops.wm.read_homefile(use_empty=True)
     assert not handlers.file_path().exists()
 
 
@@ -173,13 +169,6 @@ def test_what_is_recorded_anew_after_undo_is_not_what_was_saved() -> None:
     assert back is not None
     assert not back.unsaved
     assert back.extend(np.zeros((4, 7)), 2).unsaved
-
-
-def test_nothing_is_left_where_nothing_is_recorded(bed: Any, clock: Clock) -> None:
-    started(bed)
-    recorded_on(bed, clock)
-    bpy.ops.wm.read_homefile(use_empty=True)
-    assert not handlers.file_path().exists()
 
 
 def test_what_cannot_be_left_is_told(recording: Any, tmp_path: Path) -> None:

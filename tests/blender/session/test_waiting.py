@@ -87,20 +87,16 @@ def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed: Any, clock
     np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
 
 
-def test_a_deleted_bed_ends_its_session_with_a_message(bed: Any, clock: Clock) -> None:
+@pytest.mark.parametrize("what", ["bed", "scene"])
+def test_a_deleted_bed_or_scene_ends_the_session_with_a_message(bed: Any, clock: Clock, what: str) -> None:
     started(bed)
-    bpy.ops.object.delete()
-    notes = clock.tick()
-    assert [note.level for note in notes] == ["WARNING"]
-    assert running.list_sessions() == ()
-
-
-def test_a_deleted_scene_ends_the_session_with_a_message(bed: Any, clock: Clock) -> None:
-    started(bed)
-    gone, other = bpy.context.window.scene, bpy.data.scenes.new("Other")
-    bpy.context.window.scene = other
-    bpy.data.scenes.remove(gone)
-    assert ["was deleted" in note.message for note in clock.tick()] == [True]
+    if what == "bed":
+        bpy.ops.object.delete()
+    else:
+        gone = bpy.context.window.scene
+        bpy.context.window.scene = bpy.data.scenes.new("Other")
+        bpy.data.scenes.remove(gone)
+    assert [(note.level, "was deleted" in note.message) for note in clock.tick()] == [("WARNING", True)]
     assert running.list_sessions() == ()
 
 
