@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.toml_table import resolve
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
+from digiclay.sessions.stroke_queue import change_stroke
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -46,6 +48,38 @@ class Hand:
         """Press at a place and lift off again."""
         down, up = np.linspace(46, 37, 10), np.linspace(37, 46, 10)
         return self.move(session, [(x, z) for z in (*down, *[37] * 10, *up, *[46] * 20)])
+
+
+def go_on(session: Running, ticks: int) -> Running:
+    """Let the session go on; the fingertip stays where it is."""
+    now = session.clock.seen or 0.0
+    for count in range(ticks):
+        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
+    return session
+
+
+def finish(session: Running, ticks: int = 300) -> Running:
+    """Let the session go on until no stroke is left."""
+    for _ in range(ticks):
+        if not session.strokes:
+            break
+        session = go_on(session, 1)
+    return session
+
+
+def let_go(session: Running, number: int) -> Running:
+    """End a stroke where the hand is."""
+    return change_stroke(session, number, lambda stroke: replace(stroke, held=False))
+
+
+def pin(session: Running, x: float, y: float) -> int:
+    """Return the pin at a place, mm."""
+    return int(session.system.grid.at(np.array([1e-3 * x]), np.array([1e-3 * y]))[0])
+
+
+def risen(session: Running, x: float, y: float) -> float:
+    """Return how far the pin at a place, mm, is above rest, m."""
+    return float(heights(session)[pin(session, x, y)]) - 40e-3
 
 
 def heights(session: Running) -> Floats:

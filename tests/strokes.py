@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
@@ -14,7 +12,8 @@ from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.stroke import Brush, draw
 from numpy.typing import NDArray
 
-from tests.hand import TICK, heights
+from tests import hand
+from tests.hand import heights, let_go
 
 Floats = NDArray[np.float64]
 Places = list[tuple[float, float]]
@@ -41,21 +40,14 @@ def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, sha
             session, number,
             lambda stroke, at=at, t=part * DURATION: draw(stroke, t, *at, depth * 1e-3, share),
         )  # fmt: skip
-    return change_stroke(session, number, lambda stroke: replace(stroke, held=False))
+    return let_go(session, number)
 
 
 def finish(session: Running, most: float = 60.0) -> Running:
     """Let the session go on until its strokes are finished and the pins at rest, at most so long, s."""
-    now = session.clock.seen or 0.0
-    for count in range(round(most / TICK)):
-        if not session.strokes:
-            break
-        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
+    session = hand.finish(session, round(most / hand.TICK))
     assert not session.strokes
-    now = session.clock.seen or 0.0
-    for count in range(15):
-        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
-    return session
+    return hand.go_on(session, 15)
 
 
 def form(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -68,59 +69,53 @@ def test_every_theme_gets_letters_that_can_be_read(
     back: tuple[float, float, float], ink: tuple[float, float, float]
 ) -> None:
     assert contrast(choose_colors(back, ink).ink, back) >= LETTERS
-
-
-def test_the_contrast_of_black_and_white_is_that_of_the_guidelines() -> None:
     assert contrast((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) == pytest.approx(21.0, rel=1e-12)
 
 
-def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None:
-    words = said(lay_out(session(), choose_colors(DARK, LIGHT), ROOM, 1.0))
-    for part in (
-        "Digital Clay", "Method: virtual master", "0.97 x real time", "2.1 µm, 0.46 mN", "0.35 N",
-        "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister",
-    ):  # fmt: skip
-        assert part in words
-    assert "N: beyond 3 mm" in said(lay_out(session(beyond=True), choose_colors(DARK, LIGHT), ROOM, 1.0))
-
-
-def test_a_hard_knock_does_not_flatten_the_force_about_the_set_point() -> None:
-    force = np.full(1001, 0.4)
-    force[900] = 180.0
-    assert "2 N" in said(lay_out(session(force=force), choose_colors(DARK, LIGHT), ROOM, 1.0)).split(" | ")
-
-
-def test_errors_too_small_to_matter_are_not_spelled_out() -> None:
-    words = said(lay_out(session(errors=(9e-12, 0.0)), choose_colors(DARK, LIGHT), ROOM, 1.0))
-    assert "Solver error: about 0.01 µm or less, 0.01 mN or less" in words
-
-
 def test_the_colors_of_the_force_are_explained_while_pins_wear_them() -> None:
-    plain = lay_out(session(), choose_colors(DARK, LIGHT), ROOM, 1.0)
-    hot = lay_out(session(top=0.2), choose_colors(DARK, LIGHT), ROOM, 1.0)
+    plain = draw(session())
+    hot = draw(session(top=0.2))
     assert len(plain.boxes) == 1
     assert [box.color for box in hot.boxes[1:]] == list(heat.COLORS)
     assert "Force on a pin | 0 N | 0.2 N" in said(hot)
 
 
-def test_it_says_what_is_not_known_yet() -> None:
-    empty = np.empty(0)
-    told = session(
-        factor=None, errors=None, set_point=None, time=empty, force=empty, heights=np.empty((0, 2)), method=""
-    )
-    words = said(lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0))
-    assert "Solver error: not estimated yet" in words
-    assert "Method: none" in words
-    assert "real time" not in words
-    assert "set point" not in words
+def draw(told: Readings) -> Picture:
+    """Lay out in ordinary room on a dark theme."""
+    return lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0)
 
 
-def test_pins_picked_just_now_have_no_past_and_are_drawn_all_the_same() -> None:
-    told = session(heights=np.full((1001, 2), np.nan))
-    picture = lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0)
-    assert "312: | 40:" in said(picture)
-    for line in picture.lines:
-        assert np.isfinite(line.points).all()
+EMPTY = np.empty(0)
+KNOCK = np.where(np.arange(1001) == 900, 180.0, 0.4)
+#: What a session tells; what is written then, and what is not.
+WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
+    "all it has": (
+        {}, ("Digital Clay", "Method: virtual master", "0.97 x real time", "2.1 µm, 0.46 mN", "0.35 N",
+             "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister"),
+        ("N: beyond",),
+    ),
+    "beyond its model": ({"beyond": True}, ("N: beyond 3 mm",), ()),
+    "a hard knock, which does not flatten the force": ({"force": KNOCK}, (" | 2 N | ",), ()),
+    "errors too small to matter": (
+        {"errors": (9e-12, 0.0)}, ("Solver error: about 0.01 µm or less, 0.01 mN or less",), ()
+    ),
+    "nothing that is not known yet": (
+        {"factor": None, "errors": None, "set_point": None, "time": EMPTY, "force": EMPTY,
+         "heights": np.empty((0, 2)), "method": ""},
+        ("Solver error: not estimated yet", "Method: none"), ("real time", "set point"),
+    ),
+    "pins picked just now": ({"heights": np.full((1001, 2), np.nan)}, ("312: | 40:",), ()),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WORDS)
+def test_it_tells(case: str) -> None:
+    changes, present, absent = WORDS[case]
+    picture = draw(session(**changes))
+    words = f" | {said(picture)} | "
+    assert [part for part in present if part not in words] == []
+    assert [part for part in absent if part in words] == []
+    assert all(np.isfinite(line.points).all() for line in picture.lines)
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
@@ -154,9 +149,11 @@ def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
 
 @pytest.mark.parametrize("corner", ["bottom_left", "bottom_right", *TAKEN])
 @pytest.mark.parametrize("content", [COMPACT, FULL])
-def test_it_stands_in_the_corner_that_was_chosen(corner: str, content: Content) -> None:
-    picture = lay_out(session(), choose_colors(DARK, LIGHT), ROOM, 1.0, content, corner)
-    box, (left, bottom, right, top) = picture.boxes[0], ROOM
+def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner: str, content: Content) -> None:
+    room = find_room(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)])
+    assert room == (50.0, 0.0, 700.0, 648.0)
+    picture = lay_out(session(), choose_colors(DARK, LIGHT), room, 1.0, content, corner)
+    box, (left, bottom, right, top) = picture.boxes[0], room
     gap = box.x - left if corner.endswith("left") else right - box.x - box.width
     assert gap == 12.0
     gap = top - box.y - box.height if corner.startswith("top") else box.y - bottom
@@ -178,14 +175,6 @@ def test_in_short_it_has_two_rows(changes: dict[str, object], rows: str) -> None
     assert picture.boxes[0].height < 60.0
 
 
-def test_panels_over_the_view_are_kept_clear_of() -> None:
-    assert find_room(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)]) == (
-        50.0, 0.0, 700.0, 648.0,
-    )  # fmt: skip
-    right = lay_out(session(), choose_colors(DARK, LIGHT), (50.0, 0.0, 700.0, 648.0), 1.0).boxes[0]
-    assert right.x + right.width <= 700.0
-
-
 def test_a_curve_shows_the_window_alone_and_nothing_that_is_no_number() -> None:
     time, box = np.arange(11.0), Box(100.0, 50.0, 200.0, 40.0, DARK)
     value = np.where(time == 7.0, np.nan, time)
@@ -205,13 +194,10 @@ def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> 
 
 
 def test_the_set_point_is_the_dashed_line_at_its_height() -> None:
-    picture = lay_out(session(set_point=0.25), choose_colors(DARK, LIGHT), ROOM, 1.0)
+    picture = draw(session(set_point=0.25))
     (dashed,) = (line for line in picture.lines if line.dashed)
     low, high = (line.points[0, 1] for line in picture.lines[:2])
     share = (dashed.points[0, 1] - low) / (high - low)
-    top = float(
-        next(w.text for w in picture.words if w.text.endswith(" N") and w.text[0] == "0" and "." in w.text)[
-            :-2
-        ]
-    )
+    axis = next(words.text for words in picture.words if re.fullmatch(r"0\.\d+ N", words.text))
+    top = float(axis.removesuffix(" N"))
     assert share == pytest.approx(0.25 / top, rel=1e-9)

@@ -73,7 +73,8 @@ def test_symmetry_strength_and_line_are_those_of_the_tool() -> None:
 
 
 def test_ctrl_inverts_the_brush() -> None:
-    assert PointerStroke(ctrl=True).kind is Brush.RAISE
+    kinds = [PointerStroke(brush=name, ctrl=True).kind for name in ("lower", "raise", "level")]
+    assert kinds == [Brush.RAISE, Brush.LOWER, Brush.LEVEL]
     assert PointerStroke(ctrl=True).amount == 15e-3
 
 

@@ -99,13 +99,6 @@ def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_fi
     assert (heights(back) == 40e-3).all()
 
 
-def test_gestures_kept_do_not_grow_in_number() -> None:
-    hand, session = Hand(), started()
-    for _ in range(sculpting.GESTURES + 3):
-        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
-    assert len(session.gestures) == sculpting.GESTURES
-
-
 def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
     hand = Hand()
     session = hand.press(started())
@@ -123,15 +116,10 @@ def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
     back = sculpting.restore(hand.press(session, 6.0), kept, pose())
     assert snapshot.dump(back.system, back.state) == kept
     assert len(back.gestures) == 1
+    other, said = sculpting.begin_session(8, "Copy", SCENE, pose(), kept)
+    assert (said, snapshot.dump(other.system, other.state)) == ("", kept)
     # Before the first start it finds a bed at rest.
     assert (heights(sculpting.restore(session, None, pose())) == 40e-3).all()
-
-
-def test_a_bed_goes_on_from_what_was_kept() -> None:
-    session = Hand().press(started())
-    other, said = sculpting.begin_session(8, "Copy", SCENE, pose(), session.snapshot)
-    assert said == ""
-    assert snapshot.dump(other.system, other.state) == session.snapshot
 
 
 def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:
@@ -140,13 +128,6 @@ def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -
     later, said = sculpting.begin_session(8, "Copy", other, pose(), session.snapshot)
     assert np.array_equal(heights(later), heights(session))
     assert "heights were taken up" in said
-
-
-@pytest.mark.parametrize("kept", [b"nothing", b""])
-def test_a_kept_state_that_cannot_be_used_begins_at_rest_and_says_so(kept: bytes) -> None:
-    session, said = sculpting.begin_session(7, "Bed", SCENE, pose(), kept)
-    assert (heights(session) == 40e-3).all()
-    assert "begins at rest" in said
 
 
 def test_a_gain_that_is_changed_takes_effect_and_nothing_jumps() -> None:
@@ -163,6 +144,11 @@ def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
     hand, session = Hand(), started()
     circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 30)]
     session = hand.move(session, [*circle * 16])  # longer than the trace's ten seconds, so that it is full
+    assert session.errors is not None
+    assert 0.0 < session.errors.height < 1e-4
+    for _ in range(sculpting.GESTURES + 3):
+        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
+    assert len(session.gestures) == sculpting.GESTURES
     tracemalloc.start()
     try:
         floors = []
@@ -190,12 +176,6 @@ def test_a_step_too_long_to_halve_has_no_error_estimate() -> None:
     session, _ = sculpting.begin_session(7, "Bed", resolve(table), pose())
     session = sculpting.advance(session, pose(), 0.0, 9)
     assert sculpting.advance(session, pose(z=39.0), 2.0, 9).errors is None
-
-
-def test_an_error_estimate_is_there_after_a_second() -> None:
-    session = Hand().move(started(), [(0.0, 39.0)] * 40)
-    assert session.errors is not None
-    assert 0.0 < session.errors.height < 1e-4
 
 
 def test_scenes_whose_parts_do_not_go_together_are_refused() -> None:

@@ -15,12 +15,12 @@ from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
-from digiclay.strokes.stroke import SYMMETRIES, Brush, draw, lay_line, lay_path, lay_ring
+from digiclay.strokes.stroke import SYMMETRIES, Brush, draw
 from digiclay.strokes.sweep import find_radius
 from numpy.typing import NDArray
 
 from tests.assemble import replayed
-from tests.hand import TICK, heights, pose, started
+from tests.hand import finish, go_on, heights, let_go, pin, pose, risen, started
 from tests.reliefs import heighten, measure_roughness
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
@@ -38,16 +38,6 @@ def spiked(*places: tuple[float, float]) -> Running:
     return sculpting.restore(session, snapshot.dump(system, heighten(system, relief)), pose(z=60.0))
 
 
-def pin(session: Running, x: float, y: float) -> int:
-    """Return the pin at a place, mm."""
-    return int(session.system.grid.at(np.array([1e-3 * x]), np.array([1e-3 * y]))[0])
-
-
-def height_at(session: Running, x: float, y: float) -> float:
-    """Return how far the pin at a place, mm, stands out, m."""
-    return float(heights(session)[pin(session, x, y)]) - 40e-3
-
-
 def queue_smooth(
     session: Running, start: tuple[float, float], end: tuple[float, float], share: float = 1.0,
     symmetry: str = "NONE",
@@ -62,40 +52,22 @@ def queue_smooth(
         session = change_stroke(
             session, number, lambda one, p=part, a=at: draw(one, 0.5 * p, *a, 4e-3, share)
         )
-    return change_stroke(session, number, lambda one: replace(one, held=False))
-
-
-def go_on(session: Running, ticks: int) -> Running:
-    """Let the session go on; the fingertip stays where it is."""
-    now = session.clock.seen or 0.0
-    for _ in range(ticks):
-        now += TICK
-        session = sculpting.advance(session, session.pose, now, 100)
-    return session
-
-
-def finish(session: Running) -> tuple[Running, list[float]]:
-    """Let the session go on until no stroke is left; return the total forces as well, N."""
-    felt = []
-    for _ in range(300):
-        if not session.strokes:
-            break
-        session = go_on(session, 1)
-        felt.append(float(session.state.row(session.system.rows.force).sum()))
-    return session, felt
+    return let_go(session, number)
 
 
 def test_a_smooth_stroke_takes_down_a_spike_without_a_touch() -> None:
-    done, felt = finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0)))
-    assert height_at(done, 0.0, 0.0) < 0.4 * SPIKE
-    assert max(felt) == 0.0
+    session = queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0))
+    while session.strokes:
+        session = go_on(session, 1)
+        assert not session.state.row(session.system.rows.force).any()
+    assert risen(session, 0.0, 0.0) < 0.4 * SPIKE
 
 
 def test_a_short_stroke_waits_for_its_pins() -> None:
     session, number = queue_stroke(spiked((0.0, 0.0)), 0.0, 0.0, 4e-3, brush=Brush.SMOOTH)
     session = change_stroke(session, number, lambda one: replace(draw(one, 0.1, 0.0, 0.0, 4e-3), held=False))
-    done, _ = finish(session)
-    assert height_at(done, 0.0, 0.0) < SPIKE - 2e-3
+    done = finish(session)
+    assert risen(done, 0.0, 0.0) < SPIKE - 2e-3
     assert not (done.state.mode() == Mode.BLISTER).any()
     # All have arrived: nothing moves on.
     assert np.abs(heights(go_on(done, 10)) - heights(done)).max() < 10e-6
@@ -109,7 +81,7 @@ def test_the_finger_travels_close_above_the_pins() -> None:
 
 def test_a_weaker_stroke_smooths_less() -> None:
     left = [
-        height_at(finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0), share))[0], 0.0, 0.0)
+        risen(finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0), share)), 0.0, 0.0)
         for share in (1.0, 0.1)
     ]
     assert left[0] < left[1] - 1e-3 < SPIKE - 2e-3
@@ -118,9 +90,9 @@ def test_a_weaker_stroke_smooths_less() -> None:
 def test_a_smooth_stroke_is_one_gesture_that_is_taken_back_alone() -> None:
     session = spiked((-12.0, 0.0), (12.0, 0.0))
     before = heights(session)
-    session, _ = finish(queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0)))
+    session = finish(queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0)))
     once = heights(session)
-    session, _ = finish(queue_smooth(session, (12.0, -6.0), (12.0, 6.0)))
+    session = finish(queue_smooth(session, (12.0, -6.0), (12.0, 6.0)))
     assert (session.finished_strokes, len(session.gestures)) == (2, 2)
     back = sculpting.rewind(session)
     np.testing.assert_array_equal(heights(back), once)
@@ -130,21 +102,21 @@ def test_a_smooth_stroke_is_one_gesture_that_is_taken_back_alone() -> None:
 def test_strokes_that_press_and_smooth_are_queued_behind_each_other() -> None:
     session = spiked((-12.0, 0.0))
     session, number = queue_stroke(session, 12e-3, 0.0, 4e-3)
-    session = change_stroke(session, number, lambda one: replace(one, held=False))
+    session = let_go(session, number)
     session = queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0))
     session, number = queue_stroke(session, 12e-3, 12e-3, 4e-3)
-    session = change_stroke(session, number, lambda one: replace(one, held=False))
-    done, _ = finish(session)
+    session = let_go(session, number)
+    done = finish(session)
     assert (done.finished_strokes, len(done.gestures)) == (3, 3)
-    assert max(height_at(done, 12.0, 0.0), height_at(done, 12.0, 12.0)) < -2e-3
-    assert height_at(done, -12.0, 0.0) < 0.5 * SPIKE
+    assert max(risen(done, 12.0, 0.0), risen(done, 12.0, 12.0)) < -2e-3
+    assert risen(done, -12.0, 0.0) < 0.5 * SPIKE
 
 
 def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before() -> None:
     session = spiked((0.0, 0.0))
     before = heights(session)
     session = go_on(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)), 15)
-    assert height_at(session, 0.0, 0.0) < SPIKE - 1e-3
+    assert risen(session, 0.0, 0.0) < SPIKE - 1e-3
     back = sculpting.withdraw_stroke(session)
     np.testing.assert_array_equal(heights(back), before)
     # No order is left behind.
@@ -153,7 +125,7 @@ def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before() -> None:
 
 def test_a_recording_of_smooth_strokes_is_a_take_that_replays_bit_for_bit() -> None:
     session = sculpting.set_recording(spiked((0.0, 0.0)), True)
-    session, _ = finish(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)))
+    session = finish(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)))
     take = read_recording(session)
     assert take is not None
     assert take.smoothing is not None
@@ -162,9 +134,9 @@ def test_a_recording_of_smooth_strokes_is_a_take_that_replays_bit_for_bit() -> N
 
 def test_undo_shortens_the_orders_of_a_recording_with_its_path() -> None:
     session = sculpting.set_recording(spiked((0.0, 0.0), (-12.0, 0.0)), True)
-    once, _ = finish(queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0)))
-    twice, _ = finish(queue_smooth(once, (-3.0, 0.0), (3.0, 0.0)))
-    back, _ = finish(queue_smooth(sculpting.rewind(twice), (0.0, -3.0), (0.0, 3.0)))
+    once = finish(queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0)))
+    twice = finish(queue_smooth(once, (-3.0, 0.0), (3.0, 0.0)))
+    back = finish(queue_smooth(sculpting.rewind(twice), (0.0, -3.0), (0.0, 3.0)))
     keep = back.recording
     assert keep is not None
     start = snapshot.load(back.system, keep.start)
@@ -174,18 +146,9 @@ def test_undo_shortens_the_orders_of_a_recording_with_its_path() -> None:
 
 def test_a_symmetric_stroke_smooths_all_its_images_as_one_gesture() -> None:
     corners = [(-12.0, -12.0), (-12.0, 12.0), (12.0, -12.0), (12.0, 12.0)]
-    done, _ = finish(queue_smooth(spiked(*corners), (12.0, 11.0), (12.0, 13.0), symmetry="XY"))
-    assert max(height_at(done, *corner) for corner in corners) < 0.6 * SPIKE
+    done = finish(queue_smooth(spiked(*corners), (12.0, 11.0), (12.0, 13.0), symmetry="XY"))
+    assert max(risen(done, *corner) for corner in corners) < 0.6 * SPIKE
     assert (done.finished_strokes, len(done.gestures)) == (1, 1)
-
-
-@pytest.mark.parametrize(
-    "path", [lay_line((-9e-3, 0.0), (9e-3, 0.0)), lay_ring((0.0, 0.0), (9e-3, 0.0))], ids=["line", "ring"]
-)
-def test_a_line_and_a_ring_smooth_all_their_way(path: Floats) -> None:
-    session, number = queue_stroke(spiked((-9.0, 0.0), (9.0, 0.0)), *path[0], 4e-3, brush=Brush.SMOOTH)
-    done, _ = finish(change_stroke(session, number, lambda one: lay_path(one, path)))
-    assert max(height_at(done, x, 0.0) for x in (-9.0, 9.0)) < 0.6 * SPIKE
 
 
 def test_a_place_that_is_held_is_smoothed_on_and_on() -> None:
@@ -204,7 +167,7 @@ def test_other_parameters_in_mid_stroke_leave_a_session_that_goes_on() -> None:
     control = replace(session.scene.control, position_gain=300.0)  # type: ignore[type-var]
     session, said = sculpting.change_scene(session, replace(session.scene, control=control))
     assert said == ""
-    done, _ = finish(session)
+    done = finish(session)
     assert (done.finished_strokes, done.strokes) == (1, ())
 
 

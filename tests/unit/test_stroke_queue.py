@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from digiclay.sessions import sculpting
@@ -11,36 +9,19 @@ from digiclay.sessions.running import Running
 from digiclay.sessions.stroke_queue import change_stroke, find_stroke, last_place, queue_stroke
 from digiclay.strokes.stroke import SYMMETRIES, draw
 
-from tests.hand import TICK, heights, started
+from tests.hand import finish, go_on, heights, let_go, risen, started
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
 DEPTH = 4e-3
-#: A pin that a finger of 4 mm depth has pressed is down by more than this, m.
-FORMED = 2e-3
+#: A pin that a finger of 4 mm depth has pressed is lower than this, m.
+FORMED = -2e-3
 
 
 def tap(session: Running, x: float, y: float) -> Running:
     """Queue a click, mm."""
     session, number = queue_stroke(session, 1e-3 * x, 1e-3 * y, DEPTH)
-    return change_stroke(session, number, lambda stroke: replace(stroke, held=False))
-
-
-def finish(session: Running, ticks: int = 200) -> Running:
-    """Let the session go on until its finger has finished; the fingertip stays where it is."""
-    now = session.clock.seen or 0.0
-    for _ in range(ticks):
-        if not session.strokes:
-            break
-        now += TICK
-        session = sculpting.advance(session, session.pose, now, 100)
-    return session
-
-
-def depth_at(session: Running, x: float, y: float) -> float:
-    """Return how far the pin at a place, mm, is down, m."""
-    cell = session.system.grid.at(np.array([1e-3 * x]), np.array([1e-3 * y]))
-    return 40e-3 - float(heights(session)[cell][0])
+    return let_go(session, number)
 
 
 def test_presses_in_quick_succession_all_form_and_count_one_gesture_each() -> None:
@@ -49,7 +30,7 @@ def test_presses_in_quick_succession_all_form_and_count_one_gesture_each() -> No
     for place in places:
         session = tap(session, *place)
     done = finish(session)
-    assert min(depth_at(done, *place) for place in places) > FORMED
+    assert max(risen(done, *place) for place in places) < FORMED
     assert (done.finished_strokes, len(done.gestures), done.strokes) == (3, 3, ())
 
 
@@ -59,14 +40,14 @@ def test_a_quick_stroke_forms_every_column_it_passes() -> None:
         session = change_stroke(
             session, number, lambda stroke, p=part: draw(stroke, 0.3 * p, (30 * p - 15) * 1e-3, 0.0, DEPTH)
         )
-    session = finish(change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
-    assert min(depth_at(session, x, 0.0) for x in range(-15, 16, 3)) > FORMED
+    session = finish(let_go(session, number))
+    assert max(risen(session, x, 0.0) for x in range(-15, 16, 3)) < FORMED
 
 
 def test_a_stroke_that_rests_and_goes_on_is_one_gesture() -> None:
     session, number = queue_stroke(started(), -9e-3, 0.0, DEPTH)
     session = change_stroke(session, number, lambda s: draw(s, 2.0, 9e-3, 0.0, DEPTH))
-    done = finish(change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
+    done = finish(let_go(session, number))
     assert len(done.gestures) == 1
 
 
@@ -83,10 +64,7 @@ def test_at_most_one_stroke_ends_in_a_tick_so_that_each_gets_an_undo_step() -> N
 def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the_earlier_ones_be() -> None:
     once = finish(tap(started(), -15.0, 0.0))
     before, touched = heights(once).copy(), len(once.gestures)
-    (session, _), now = queue_stroke(once, 15e-3, 0.0, DEPTH), once.clock.seen or 0.0
-    for _ in range(30):
-        now += TICK
-        session = sculpting.advance(session, session.pose, now, 100)
+    session = go_on(queue_stroke(once, 15e-3, 0.0, DEPTH)[0], 30)
     assert np.abs(heights(session) - before).max() > 1e-4
     back = sculpting.withdraw_stroke(session)
     np.testing.assert_array_equal(heights(back), before)
@@ -96,20 +74,17 @@ def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the
 def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
     session = tap(tap(started(), -15.0, 0.0), 15.0, 0.0)
     number = session.strokes[-1].number
+    assert sculpting.reset(session).strokes == ()
     back = sculpting.rewind(session)
     assert find_stroke(back, number) is None
     done = finish(back)
-    assert depth_at(done, -15.0, 0.0) > FORMED
-    assert depth_at(done, 15.0, 0.0) == 0.0
-
-
-def test_a_reset_forgets_what_the_finger_has_not_finished() -> None:
-    assert sculpting.reset(tap(started(), 0.0, 0.0)).strokes == ()
+    assert risen(done, -15.0, 0.0) < FORMED
+    assert risen(done, 15.0, 0.0) == 0.0
 
 
 def test_a_symmetric_stroke_forms_all_its_images_as_one_gesture() -> None:
     session, number = queue_stroke(started(), 12e-3, 12e-3, DEPTH, SYMMETRIES["XY"])
-    done = finish(change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
-    assert min(depth_at(done, x, y) for x in (-12.0, 12.0) for y in (-12.0, 12.0)) > FORMED
+    done = finish(let_go(session, number))
+    assert max(risen(done, x, y) for x in (-12.0, 12.0) for y in (-12.0, 12.0)) < FORMED
     assert (done.finished_strokes, len(done.gestures)) == (1, 1)
     assert last_place(done) == (12e-3, 12e-3)
