@@ -41,9 +41,7 @@ def add(**chosen: Any) -> Any:
         *(({"preset": name}, {"preset": name}) for name in PRESETS),
     ],
 )
-def test_a_bed_is_that_of_a_scene_file_but_for_the_ground_of_the_blister(
-    chosen: dict[str, str], table: dict[str, Any]
-) -> None:
+def test_a_bed_is_a_scene_files_but_for_the_ground(chosen: dict[str, str], table: dict[str, Any]) -> None:
     wanted = resolve(table)
     if wanted.method == "virtual_master":
         wanted = resolve({**table, "control": {"ground": "cell"}})
@@ -72,9 +70,7 @@ def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows: int, columns: i
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 2.5])
-def test_a_bed_of_any_scale_stands_on_the_cursor_selected_with_its_fingertip_above_the_pins(
-    scale: float,
-) -> None:
+def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale: float) -> None:
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     bed = add(rows=6, columns=6, scale=scale)
     assert bpy.context.selected_objects == [bed]

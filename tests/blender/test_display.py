@@ -89,18 +89,14 @@ def test_turning_the_heat_map_on_shows_the_forces_of_now(bed: Any, session: runn
     np.testing.assert_allclose(forces(bed), felt, rtol=2.0**-23)
 
 
-def test_turning_arrows_on_after_a_session_shows_the_forces_it_ended_with(
-    bed: Any, session: running.Running
-) -> None:
+def test_arrows_after_a_session_show_the_forces_it_ended_with(bed: Any, session: running.Running) -> None:
     bed_state.write(bed, session)
     running.drop(session.uid)
     bed.digiclay_display.arrows = True
     np.testing.assert_allclose(forces(bed), session.state.row(session.system.rows.force), rtol=2.0**-23)
 
 
-def test_the_overlay_and_its_timer_are_there_only_while_a_session_runs_whose_bed_wants_it(
-    bed: Any, session: running.Running
-) -> None:
+def test_the_overlay_and_its_timer_are_there_only_while_wanted(bed: Any, session: running.Running) -> None:
     def is_there() -> bool:
         assert bpy.app.timers.is_registered(views._again) is views.shown()
         return views.shown()
@@ -138,7 +134,7 @@ def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Runnin
 
 
 @pytest.mark.parametrize("errors", [None, Errors(2.1e-6, 4.6e-4, 9e-4), Errors(9e-12, 0.0, 0.0)])
-def test_panel_and_overlay_say_the_same_of_the_error(
+def test_panel_and_overlay_name_the_same_error(
     bed: Any, session: running.Running, errors: Errors | None
 ) -> None:
     known = replace(session, errors=errors)

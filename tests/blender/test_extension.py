@@ -72,7 +72,7 @@ def test_importing_the_package_imports_nothing_heavy_and_registers_nothing() -> 
 
 
 @pytest.mark.usefixtures("extension")
-def test_an_imported_run_shows_the_row_asked_for_with_the_settings_of_the_run(
+def test_an_imported_run_has_its_settings_and_shows_the_row_asked_for(
     tmp_path: Path, formed: Instant
 ) -> None:
     heights = np.stack([formed.height, formed.height[::-1]])

@@ -119,8 +119,6 @@ def test_in_a_blender_of_its_own(seen: dict[str, Any], wanted: dict[str, Any], w
         ("benchmark", "'python -m benchmarks --help'"),
     ],
 )
-def test_the_installed_command_says_in_a_line_what_is_not_part_of_it(
-    command: str, said: str, seen: dict[str, Any]
-) -> None:
+def test_the_command_says_in_a_line_what_it_lacks(command: str, said: str, seen: dict[str, Any]) -> None:
     code, told = seen[command]
     assert (code, told.count("\n"), said in told) == (2, 1, True)

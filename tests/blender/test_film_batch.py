@@ -47,9 +47,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_run_is_filmed_and_turned_from_the_command_line(
-    run: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_is_filmed_and_turned_by_commands(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     small = ["--size", "64x40", "--rate", "10", "--quiet"]
     assert main(["render", str(run), "--film", "--speed", "0.5", "--color", "force", *small]) == 0
     assert main(["render", str(run), "--turntable", "--frames", "2", *small]) == 0

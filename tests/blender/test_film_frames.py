@@ -55,9 +55,7 @@ def count_frames(film: Path) -> int:
         return int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)
 
 
-def test_frames_drawn_in_ranges_are_those_of_the_whole_film_and_make_it(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_frames_drawn_in_ranges_are_those_of_the_film(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder, whole = find_frames(RUN, "film"), here / "whole"
     whole.mkdir()
     assert main(["job", str(JOB), "--only", "film", "--frames", "2-3", "--quiet"]) == 0

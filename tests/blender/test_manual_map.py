@@ -93,9 +93,7 @@ def test_the_rest_of_blender_keeps_its_own_manual() -> None:
         ("Display.skin", "#display"),
     ],
 )
-def test_online_manual_opens_the_page_at_the_section_of_a_button(
-    button: str, anchor: str, opened: Path
-) -> None:
+def test_online_manual_opens_the_section_of_a_button(button: str, anchor: str, opened: Path) -> None:
     assert bpy.ops.wm.doc_view_manual(doc_id=button) == {"FINISHED"}
     assert opened.read_text().splitlines() == [manual_map.PAGE.as_uri() + anchor]
     assert manual_map.PAGE.is_file()

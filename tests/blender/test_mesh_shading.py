@@ -30,9 +30,7 @@ def bed(extension: None) -> bpy.types.Object:
 
 @pytest.mark.parametrize("kind", ["solid", "surface", "features"])
 @pytest.mark.parametrize("skin", ["bilinear", "smooth"])
-def test_the_skin_is_shaded_smooth_and_walls_and_base_are_flat(
-    bed: bpy.types.Object, kind: str, skin: str
-) -> None:
+def test_the_skin_is_smooth_and_walls_and_base_are_flat(bed: bpy.types.Object, kind: str, skin: str) -> None:
     bpy.ops.mesh.digital_clay_make(kind=kind, skin=skin)
     faces = bpy.context.object.data.polygons
     assert {face.use_smooth for face in faces if face.normal.z > 1e-3} == {True}
@@ -45,9 +43,7 @@ def test_pins_are_shaded_flat(bed: bpy.types.Object) -> None:
     assert not any(face.use_smooth for face in bpy.context.object.data.polygons)
 
 
-def test_the_rim_of_a_solid_is_sharp_and_nothing_within_its_skin_is_however_steep(
-    bed: bpy.types.Object,
-) -> None:
+def test_the_rim_of_a_solid_is_sharp_and_nothing_within_its_skin(bed: bpy.types.Object) -> None:
     bpy.ops.mesh.digital_clay_make(kind="solid")
     mesh = bpy.context.object.data
     beside: dict[tuple[int, int], set[bool]] = {key: set() for key in mesh.edge_keys}

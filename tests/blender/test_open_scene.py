@@ -87,9 +87,7 @@ def test_a_session_too_long_to_wait_for_is_left_to_the_command_line(tmp_path: Pa
         ('[shape]\nfile = "nowhere.stl"', "nowhere.stl: there is no such file"),
     ],
 )
-def test_a_file_that_is_no_scene_is_refused_and_nothing_is_added(
-    tmp_path: Path, content: str | None, said: str
-) -> None:
+def test_a_file_that_is_no_scene_is_refused_whole(tmp_path: Path, content: str | None, said: str) -> None:
     path = tmp_path / "odd.toml"
     if content is not None:
         path.write_text(content, encoding="utf-8")

@@ -80,9 +80,7 @@ def test_no_code_is_run_until_the_preferences_allow_it(chosen: Any, tmp_path: Pa
     assert own_folder.read_present() == ((), ())
 
 
-def test_a_folder_beside_the_open_file_is_stored_as_a_full_path_or_refused(
-    chosen: Any, tmp_path: Path
-) -> None:
+def test_a_folder_beside_the_file_is_stored_as_a_full_path_or_refused(chosen: Any, tmp_path: Path) -> None:
     def enter() -> None:
         """Enter the folder as in the preferences."""
         chosen.methods_folder = "//own"

@@ -97,9 +97,7 @@ def test_a_blister_is_shown_where_the_method_forms_one(method: str, bed: Any) ->
         ("delay", {"delay"}),
     ],
 )
-def test_what_is_left_out_is_grayed_with_all_that_belongs_to_it(
-    switch: str, grayed: set[str], bed: Any
-) -> None:
+def test_what_is_left_out_is_grayed_with_what_belongs_to_it(switch: str, grayed: set[str], bed: Any) -> None:
     settings = bed.digiclay
     used = {name for name in SECTIONS if in_use(settings, name)}
     setattr(settings, f"use_{switch}", False)

@@ -63,9 +63,7 @@ def test_the_ellipsoid_follows_the_size_and_the_blister_unless_it_is_set_by_itse
 
 
 @pytest.mark.parametrize(("name", "usual"), [("length", 20.0), ("width", 16.0), ("height", 16.0)])
-def test_the_panel_shows_whole_widths_and_what_is_stored_are_semi_axes(
-    bed: Any, name: str, usual: float
-) -> None:
+def test_the_panel_shows_whole_widths_and_stores_semi_axes(bed: Any, name: str, usual: float) -> None:
     group, lowest = bed.digiclay.fingertip, bridge.pose(view.fingertip_of(bed))
     assert getattr(group, f"whole_{name}") == usual
     setattr(group, f"whole_{name}", 12.6)
@@ -118,9 +116,7 @@ def test_without_a_bed_or_its_fingertip_the_size_cannot_be_changed(bed: Any) -> 
 
 
 @pytest.mark.parametrize("kind", list(FINGERS))
-def test_each_preset_finger_is_a_device_that_can_be_simulated_and_is_undone_in_one_step(
-    bed: Any, kind: str
-) -> None:
+def test_each_preset_finger_can_be_simulated_and_is_undone_in_one_step(bed: Any, kind: str) -> None:
     bpy.ops.ed.undo_push(message="Add")
     bed.digiclay.size = 30.0
     bpy.ops.ed.undo_push(message="Size")

@@ -41,9 +41,7 @@ def told(bed: Any, scene: Scene) -> Scene:
 
 
 @pytest.mark.parametrize(("section", "method"), EVERY)
-def test_every_parameter_of_a_part_has_a_property_with_its_unit_and_meaning(
-    section: str, method: str
-) -> None:
+def test_every_parameter_has_a_property_with_its_unit_and_meaning(section: str, method: str) -> None:
     settings = thing().digiclay
     settings.method = method
     shown = properties.part_group(settings, section).bl_rna.properties
@@ -122,7 +120,7 @@ def test_a_part_that_is_switched_off_is_left_out(section: str) -> None:
         ),
     ],
 )
-def test_a_choice_gives_the_scene_that_a_file_with_it_has(
+def test_a_choice_gives_the_scene_of_a_file(
     section: str, name: str, before: str, value: str, table: dict[str, Any]
 ) -> None:
     bed = thing()

@@ -58,7 +58,7 @@ def inventory() -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.FROZEN])
-def test_a_still_has_the_size_asked_for_and_shows_the_pins_in_the_color_of_their_mode(
+def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(
     mode: Mode, tmp_path: Path
 ) -> None:
     out = still.render_still(bed_in(mode), tmp_path / "pins.png", width=WIDTH, height=HEIGHT, samples=2)
@@ -111,9 +111,7 @@ def test_an_unknown_engine_is_refused_with_the_known_ones(tmp_path: Path, formed
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 40), (60, 60)])
-def test_every_bed_falls_inside_the_frame_and_touches_its_margins(
-    rows: int, columns: int, arrangement: str
-) -> None:
+def test_every_bed_is_inside_the_frame_and_at_its_margins(rows: int, columns: int, arrangement: str) -> None:
     scene = bpy.data.scenes.new("framing")
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     instant = Instant.at_rest(Layout(rows=rows, columns=columns, arrangement=arrangement))

@@ -158,7 +158,7 @@ def same_action(bed: Any) -> Any:
 
 @pytest.mark.parametrize("made", [same_action, lambda bed: bed.copy()], ids=["an action", "its curves"])
 @pytest.mark.parametrize("freed", [0, 1])
-def test_freeing_the_bake_of_one_of_two_beds_that_share_leaves_the_others(
+def test_freeing_one_of_two_bakes_that_share_leaves_the_other(
     bed: Any, made: Callable[[Any], Any], freed: int
 ) -> None:
     take, heights = taken()

@@ -86,9 +86,7 @@ def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand: bool) -> 
 
 
 @pytest.mark.parametrize("everything", [False, True], ids=["the bed", "all that can be selected"])
-def test_a_deleted_bed_takes_its_fingertip_along_and_undo_brings_both_back_in_one_step(
-    everything: bool,
-) -> None:
+def test_a_bed_is_deleted_with_its_fingertip_and_undo_brings_both_back(everything: bool) -> None:
     bed = added()
     bpy.ops.object.select_all(action="SELECT" if everything else "DESELECT")
     bed.select_set(True)

@@ -40,9 +40,7 @@ def bed(formed: Instant) -> Any:
     return view.build(formed, bpy.context.scene.collection)
 
 
-def test_the_pins_drawn_stand_where_the_arrays_say_in_the_material_of_their_mode(
-    bed: Any, formed: Instant
-) -> None:
+def test_the_pins_stand_where_the_arrays_say_in_the_material_of_their_mode(bed: Any, formed: Instant) -> None:
     later = replace(formed, height=formed.height[::-1], mode=formed.mode[::-1])
     for instant in (formed, later):
         view.show(bed, instant)
@@ -110,9 +108,7 @@ def test_the_fingertip_is_an_empty_and_the_ellipsoid_in_it_cannot_be_picked_by_m
     np.testing.assert_allclose(ball.scale, wanted, rtol=2.0**-23)
 
 
-def test_the_pose_of_a_fingertip_is_read_back_however_the_bed_stands_and_the_fingertip_is_scaled(
-    bed: Any, formed: Instant
-) -> None:
+def test_the_pose_of_a_fingertip_is_read_back_however_things_are_scaled(bed: Any, formed: Instant) -> None:
     fingertip = view.fingertip_of(bed)
     turn = np.array([0.8, 0.3, -0.4, 0.33])
     at = np.array([0.004, -0.002, 0.055, *(turn / np.linalg.norm(turn))])
@@ -137,7 +133,7 @@ def test_the_pose_of_a_fingertip_is_read_back_however_the_bed_stands_and_the_fin
         ((-1.0, -1.0, -1.0), "must not mirror it"),
     ],
 )
-def test_a_bed_that_is_not_uniformly_scaled_is_refused_with_the_reason(
+def test_a_bed_not_scaled_uniformly_is_refused(
     bed: Any, scale: tuple[float, float, float], said: str
 ) -> None:
     bed.scale = scale

@@ -25,7 +25,7 @@ def test_a_session_does_not_gather_memory_as_it_goes_on() -> None:
     assert viewport_cost.measured(12, 12, 25).growth < 200e3
 
 
-def test_the_command_prints_a_row_for_every_bed(
+def test_the_command_prints_a_row_a_bed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(viewport_cost, "BEDS", ((12, 12, 5e-3), (12, 14, 5e-3)))

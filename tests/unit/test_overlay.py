@@ -65,7 +65,7 @@ def test_letters_and_curves_stand_out_from_any_theme(back: tuple[float, float, f
 
 
 @given(COLOR, COLOR)
-def test_every_theme_gets_letters_that_can_be_read(
+def test_every_theme_gets_legible_letters(
     back: tuple[float, float, float], ink: tuple[float, float, float]
 ) -> None:
     assert contrast(choose_colors(back, ink).ink, back) >= LETTERS

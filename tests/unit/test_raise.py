@@ -105,9 +105,7 @@ def test_other_devices_and_methods_raise_as_high(tables: dict[str, object], boun
 
 
 @pytest.mark.parametrize(("name", "height"), [("design", 5.0), ("design", 15.0), ("fine", 15.0)])
-def test_a_finer_bed_with_quicker_pins_raises_as_high_and_leaves_no_pin_standing(
-    name: str, height: float
-) -> None:
+def test_a_finer_bed_raises_as_high_and_leaves_no_pin_standing(name: str, height: float) -> None:
     session = form(begin_bed(name, 25, 60), [(-15.0, 0.0), (15.0, 0.0)], Brush.RAISE, height)
     formed, half = relief(session), round(15e-3 / BEDS[name].pitch)
     np.testing.assert_allclose(formed[12, 30 - half : 30 + half], height, rtol=0, atol=1.0)

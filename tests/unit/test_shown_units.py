@@ -16,9 +16,7 @@ from hypothesis import strategies as some
     exponent=some.integers(-9, 6),
     unit=some.sampled_from(list(SHOWN)),
 )
-def test_a_number_of_six_digits_typed_in_blender_is_that_number_in_si(
-    digits: int, exponent: int, unit: str
-) -> None:
+def test_a_number_of_six_digits_typed_is_that_number_in_si(digits: int, exponent: int, unit: str) -> None:
     _, power = SHOWN[unit]
     meant = float(f"{digits}e{exponent}")
     assert to_si(float(np.float32(to_shown(meant, power))), power) == meant

@@ -77,9 +77,7 @@ def test_bed_and_fingertip_follow_the_poses(bed: Any, clock: Clock, server: sock
     assert exact(bed).min() < 39.9e-3
 
 
-def test_garbage_and_poses_that_are_none_change_nothing(
-    bed: Any, clock: Clock, server: socket.socket
-) -> None:
+def test_garbage_and_poses_that_are_none_do_nothing(bed: Any, clock: Clock, server: socket.socket) -> None:
     address = followed(bed, server, clock)
     arrived(server, address, state(*PRESS))
     clock.tick()
@@ -100,7 +98,7 @@ def test_what_others_send_is_not_taken(bed: Any, clock: Clock, server: socket.so
     assert pose_of(bed) != list(PRESS)
 
 
-def test_a_silent_server_is_told_once_and_again_when_it_is_heard(
+def test_a_silent_server_is_told_once_and_when_it_is_heard(
     bed: Any, clock: Clock, server: socket.socket
 ) -> None:
     address = followed(bed, server, clock)
@@ -111,7 +109,7 @@ def test_a_silent_server_is_told_once_and_again_when_it_is_heard(
 
 
 @pytest.mark.parametrize("deleted", [False, True])
-def test_the_subscription_is_renewed_and_ends_with_the_session_or_its_bed(
+def test_the_subscription_is_renewed_and_ends(
     bed: Any, clock: Clock, server: socket.socket, deleted: bool
 ) -> None:
     followed(bed, server, clock)
@@ -126,9 +124,7 @@ def test_the_subscription_is_renewed_and_ends_with_the_session_or_its_bed(
     assert follow.find(uid) is None
 
 
-def test_the_fingertip_is_the_hands_again_when_following_ends(
-    bed: Any, clock: Clock, server: socket.socket
-) -> None:
+def test_the_fingertip_is_the_hands_again_afterwards(bed: Any, clock: Clock, server: socket.socket) -> None:
     address = followed(bed, server, clock)
     arrived(server, address, state(*PRESS))
     clock.tick(3)
@@ -178,7 +174,7 @@ def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Pa
         (signal.SIGSTOP, "No pose from"),  # its port is open still
     ],
 )
-def test_the_end_of_a_server_is_told_within_two_seconds(
+def test_a_servers_end_is_told_in_two_seconds(
     bed: Any, clock: Clock, tmp_path: Path, number: int, words: str
 ) -> None:
     from tests.served import serve

@@ -75,9 +75,7 @@ def test_the_reasons_in_a_session_name_the_session(bed: Any, clock: Clock) -> No
     assert IN_A_SESSION.items() <= declining().items()
 
 
-def test_in_edit_mode_and_without_a_bed_nothing_is_changed_though_a_fingertip_is_active(
-    bed: Any, clock: Clock
-) -> None:
+def test_in_edit_mode_and_without_a_bed_nothing_can_be_changed(bed: Any, clock: Clock) -> None:
     started(bed)
     press(bed, clock)
     tick.stop(bed.session_uid)

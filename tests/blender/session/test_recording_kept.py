@@ -72,9 +72,7 @@ def test_disabling_the_extension_keeps_what_was_recorded_in_an_undo_step(recordi
         digiclay.register()
 
 
-def test_stopping_one_of_two_sessions_keeps_its_recording_and_leaves_the_other(
-    recording: Any, clock: Clock
-) -> None:
+def test_stopping_one_of_two_sessions_keeps_its_recording_alone(recording: Any, clock: Clock) -> None:
     name = recording.name
     bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
     other = bpy.context.object
@@ -86,7 +84,7 @@ def test_stopping_one_of_two_sessions_keeps_its_recording_and_leaves_the_other(
     assert handlers.reload_states in bpy.app.handlers.undo_post
 
 
-def test_a_file_that_is_saved_has_the_take_so_far_and_the_recording_goes_on(
+def test_a_saved_file_has_the_take_so_far_and_recording_goes_on(
     recording: Any, clock: Clock, tmp_path: Path
 ) -> None:
     save(tmp_path / "saved.blend")
@@ -131,9 +129,7 @@ def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording: Any, clock:
     assert seconds(only_bed()) == []
 
 
-def test_another_file_leaves_the_former_one_with_its_take_to_be_recovered(
-    recording: Any, clock: Clock, tmp_path: Path
-) -> None:
+def test_the_former_file_can_be_recovered_with_its_take(recording: Any, clock: Clock, tmp_path: Path) -> None:
     save(tmp_path / "saved.blend")
     recorded_on(recording, clock)
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -153,9 +149,7 @@ def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, t
     assert not handlers.file_path().exists()
 
 
-def test_a_copy_that_was_saved_does_not_count_as_the_file(
-    recording: Any, clock: Clock, tmp_path: Path
-) -> None:
+def test_a_saved_copy_does_not_count_as_the_file(recording: Any, clock: Clock, tmp_path: Path) -> None:
     save(tmp_path / "saved.blend")
     assert not handlers.has_unsaved()
     recorded_on(recording, clock)

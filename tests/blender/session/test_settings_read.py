@@ -50,7 +50,7 @@ def change(group: Any, name: str) -> None:
     assert getattr(group, name) != value, name
 
 
-def test_a_session_whose_settings_stay_makes_no_scene_of_them(
+def test_settings_that_stay_are_not_read_again(
     bed: Any, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[str] = []
@@ -84,7 +84,7 @@ def test_every_parameter_and_choice_that_is_changed_changes_the_stored_settings(
 
 
 @pytest.mark.parametrize("how", ["animation", "driver"])
-def test_a_setting_that_blender_moves_is_simulated_from_the_next_tick_on(
+def test_a_setting_that_blender_moves_is_simulated_from_the_next_tick(
     bed: Any, clock: Clock, how: str
 ) -> None:
     if how == "animation":
@@ -118,9 +118,7 @@ def test_a_session_whose_settings_change_in_every_tick_keeps_up_with_time(bed: A
     assert session.state.period - before >= 12 * TICK // session.system.period - 1
 
 
-def test_a_setting_that_undo_puts_back_is_simulated_with_the_state_it_puts_back(
-    bed: Any, clock: Clock
-) -> None:
+def test_a_setting_that_undo_puts_back_is_simulated_with_its_state(bed: Any, clock: Clock) -> None:
     bpy.ops.ed.undo_push(message="Add")
     started(bed)
     bed.digiclay.control.virtual_master.force_setpoint = 0.8

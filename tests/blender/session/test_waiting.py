@@ -63,7 +63,7 @@ def edit_through_a_linked_duplicate(bed: Any) -> None:
         (lambda bed: view.fingertip_of(bed).scale.zero(), "scaled to nothing", None),
     ],
 )
-def test_a_session_waits_and_goes_on_when_nothing_hinders_it(
+def test_a_session_waits_while_it_is_hindered(
     bed: Any, clock: Clock, hinder: Any, words: str, free: Any
 ) -> None:
     started(bed)
