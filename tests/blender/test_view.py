@@ -162,7 +162,7 @@ def test_a_display_that_draws_nothing_is_refused(bed: Any, change: Any, value: A
     bed.modifiers.clear()
     assert not view.wants_force(bed)
     with pytest.raises(DigiclayError, match="Digital Clay must have the geometry nodes modifier"):
-        change(bed, value)
+        view.color_by(bed, "force")
 
 
 def test_every_pin_wears_the_color_of_its_level_of_force(bed: Any, formed: Instant) -> None:

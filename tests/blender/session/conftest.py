@@ -10,9 +10,7 @@ import pytest
 from digiclay.live import handlers
 
 from tests.blender.at_hand import new_bed
-from tests.blender.session.live import (
-    Clock,
-)
+from tests.blender.session.live import Clock
 
 
 @pytest.fixture(autouse=True)

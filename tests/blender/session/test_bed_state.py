@@ -12,17 +12,7 @@ from digiclay.core.session import snapshot
 from digiclay.live import bed_state, handlers, tick
 from digiclay.sessions import running, sculpting
 
-from tests.blender.session.live import (
-    FLOAT32,
-    Clock,
-    exact,
-    move,
-    only_bed,
-    press,
-    shown,
-    started,
-    undone,
-)
+from tests.blender.session.live import FLOAT32, Clock, exact, move, only_bed, press, shown, started, undone
 
 
 def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, clock: Clock) -> None:

@@ -12,15 +12,7 @@ from digiclay.device import view
 from digiclay.live import bed_state
 from digiclay.sessions import running
 
-from tests.blender.session.live import (
-    FLOAT32,
-    Clock,
-    exact,
-    move,
-    press,
-    shown,
-    started,
-)
+from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
 
 
 def test_the_bed_forms_while_the_fingertip_moves(bed: Any, clock: Clock) -> None:

@@ -13,15 +13,7 @@ from digiclay.device import view
 from digiclay.live import tick
 from digiclay.sessions import running
 
-from tests.blender.session.live import (
-    FLOAT32,
-    Clock,
-    exact,
-    move,
-    press,
-    shown,
-    started,
-)
+from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
 
 
 def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:

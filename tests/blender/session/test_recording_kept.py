@@ -105,8 +105,7 @@ def test_a_file_that_cannot_be_saved_leaves_the_recording_as_it_was(recording: A
 
 
 @pytest.mark.parametrize(
-    ("how", "kept"),
-    [("the recording goes on", []), ("session_stop", ["Take 1"]), ("take_keep", ["Take 1"])],
+    ("how", "kept"), [("the recording goes on", []), ("session_stop", ["Take 1"]), ("take_keep", ["Take 1"])]
 )
 def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(
     recording: Any, clock: Clock, how: str, kept: list[str]
