@@ -38,12 +38,10 @@ def test_the_skin_is_smooth_and_walls_and_base_are_flat(bed: bpy.types.Object, k
     assert downwards == (set() if kind == "surface" else {False})
 
 
-def test_pins_are_shaded_flat(bed: bpy.types.Object) -> None:
+def test_the_rim_of_a_solid_is_sharp_and_nothing_within_its_skin(bed: bpy.types.Object) -> None:
     bpy.ops.mesh.digital_clay_make(kind="pins")
     assert not any(face.use_smooth for face in bpy.context.object.data.polygons)
-
-
-def test_the_rim_of_a_solid_is_sharp_and_nothing_within_its_skin(bed: bpy.types.Object) -> None:
+    bpy.context.view_layer.objects.active = bed
     bpy.ops.mesh.digital_clay_make(kind="solid")
     mesh = bpy.context.object.data
     beside: dict[tuple[int, int], set[bool]] = {key: set() for key in mesh.edge_keys}

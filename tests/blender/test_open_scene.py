@@ -57,18 +57,13 @@ def test_a_sample_s_session_is_a_take_that_replays_bit_for_bit(name: str) -> Non
     assert replayed(takes.read(bed, entry.number))
 
 
-def test_a_scene_file_opens_from_the_file_dialog(tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", ["EXEC_DEFAULT", "INVOKE_DEFAULT"], ids=["in the dialog", "dropped"])
+def test_a_scene_file_opens(tmp_path: Path, how: str) -> None:
     path = tmp_path / "mein Beet äöü.toml"
     path.write_text((SAMPLES / "tap.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    assert bpy.ops.digiclay.open_scene(filepath=str(path)) == {"FINISHED"}
+    assert bpy.ops.digiclay.open_scene(how, filepath=str(path)) == {"FINISHED"}
     assert view.is_bed(bpy.context.object)
     assert len(bpy.context.object.data.vertices) == 121
-
-
-def test_a_dropped_file_opens_without_a_dialog() -> None:
-    path = str(SAMPLES / "stamp.toml")
-    assert bpy.ops.digiclay.open_scene("INVOKE_DEFAULT", filepath=path) == {"FINISHED"}
-    assert bpy.context.object.name == "stamp"
 
 
 def test_a_session_too_long_to_wait_for_is_left_to_the_command_line(tmp_path: Path) -> None:

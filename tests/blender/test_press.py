@@ -111,27 +111,22 @@ def test_what_lies_behind_the_eye_is_nowhere_on_the_screen(bed: Any, context: An
     assert np.isnan(bridge.project(context, bed, behind)).all()
 
 
-def test_a_pixel_beside_the_bed_points_at_nothing(bed: Any, context: Any) -> None:
-    assert aim.find_target(context, (0.0, 0.0)) is None
-
-
-def test_an_unevenly_scaled_bed_is_looked_through_and_pressing_it_says_why(bed: Any, context: Any) -> None:
+def test_a_hidden_or_unevenly_scaled_bed_is_looked_through_and_says_why(bed: Any, context: Any) -> None:
     cells, height = aim.read_surface(bed)
     middle = np.array([[0.0, 0.0, float(height.max())]])
     xy = tuple(bridge.project(context, bed, middle)[0])
+    assert aim.find_target(context, (0.0, 0.0)) is None
     assert aim.find_target(context, xy) is not None
+    assert bpy.ops.digiclay.press.poll()
+    bed.hide_set(True)
+    assert not bpy.ops.digiclay.press.poll()
+    assert aim.find_target(context, xy) is None
+    bed.hide_set(False)
     bed.scale.z *= 1.2
     bpy.context.view_layer.update()
     assert aim.find_target(context, xy) is None
     with pytest.raises(DigiclayError, match="the same along x, y and z"):
         aim.hit_point(context, bed, cells, height, xy)
-
-
-def test_a_hidden_bed_is_looked_through(bed: Any, context: Any) -> None:
-    _, height = aim.read_surface(bed)
-    xy = tuple(bridge.project(context, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
-    bed.hide_set(True)
-    assert aim.find_target(context, xy) is None
 
 
 def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
@@ -149,13 +144,6 @@ def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_presse
     across = np.ptp(rim[:, :2], axis=0) / 2
     np.testing.assert_allclose(across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6)
     np.testing.assert_array_equal(rim, drape(cells, height, rim[:, :2]))
-
-
-@pytest.mark.usefixtures("extension")
-def test_pressing_wants_a_bed_in_a_view_in_object_mode(context: Any, bed: Any) -> None:
-    assert bpy.ops.digiclay.press.poll()
-    bed.hide_set(True)
-    assert not bpy.ops.digiclay.press.poll()
 
 
 def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit() -> None:

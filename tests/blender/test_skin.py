@@ -87,28 +87,26 @@ def assert_skin(bed: Any, wanted: np.ndarray) -> None:
 def test_blender_draws_the_skin_that_numpy_works_out(bed: Any, kind: str) -> None:
     bed.digiclay_display.form, bed.digiclay_display.skin = "skin", kind
     assert_skin(bed, expected(bed, kind))
+    bed.digiclay.layout.rows = 5
+    bpy.ops.digiclay.rebuild()
     shape(bed, 2)
     assert_skin(bed, expected(bed, kind))
 
 
 @pytest.mark.parametrize(
-    ("shown", "pins", "skin"),
-    [("pins", 72, False), ("skin", 0, True), ("both", 72, True), ("automatic", 72, False)],
-)
-def test_what_is_not_to_be_seen_is_not_drawn(bed: Any, shown: str, pins: int, skin: bool) -> None:
+    ("shown", "far", "pins", "skin"),
+    [
+        ("pins", False, 72, False), ("skin", False, 0, True), ("both", False, 72, True),
+        ("automatic", False, 72, False), ("automatic", True, 0, True),
+    ],
+)  # fmt: skip
+def test_what_is_not_to_be_seen_is_not_drawn(bed: Any, shown: str, far: bool, pins: int, skin: bool) -> None:
+    assert bed.digiclay_display.form == "automatic"
     bed.digiclay_display.form = shown
+    form.set_far(bed, far)
     points, count = drawn(bed)
     assert count == pins
-    assert bool(len(points)) == skin
-
-
-def test_automatic_draws_the_skin_for_pins_that_are_too_small(bed: Any) -> None:
-    assert bed.digiclay_display.form == "automatic"
-    form.set_far(bed, True)
-    assert form.is_skin_shown(bed)
-    points, count = drawn(bed)
-    assert count == 0
-    assert len(points)
+    assert bool(len(points)) == form.is_skin_shown(bed) == skin
 
 
 def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Path) -> None:
@@ -198,15 +196,6 @@ def test_a_file_keeps_the_skin_and_an_append_brings_it(bed: Any, tmp_path: Path)
     assert_skin(appended, expected(appended, "membrane"))
 
 
-def test_a_rebuilt_bed_has_the_skin_of_its_new_pins(bed: Any) -> None:
-    bed.digiclay_display.form = "skin"
-    bed.digiclay.layout.rows = 5
-    bpy.ops.digiclay.rebuild()
-    shape(bed, 4)
-    assert bed.digiclay_display.form == "skin"
-    assert_skin(bed, expected(bed, "smooth"))
-
-
 def test_a_bake_plays_with_the_skin(bed: Any) -> None:
     tip = view.fingertip_of(bed)
     tip.keyframe_insert("location", frame=1)
@@ -222,7 +211,10 @@ def test_a_bake_plays_with_the_skin(bed: Any) -> None:
     assert depths[1] > depths[0] + 1e-4
 
 
-def test_a_bed_without_a_skin_says_so(bed: Any) -> None:
+def test_another_word_or_a_bed_without_a_skin_is_refused(bed: Any) -> None:
+    for word in ("", "Skin", "nan"):
+        with pytest.raises(DigiclayError, match=r"Display\.form must be one of automatic, pins, skin, both"):
+            form.set_form(bed, word)
     tree = bed.modifiers[0].node_group
     tree.interface.remove(tree.interface.items_tree["Form"])
     assert not form.can_show_skin(bed)
@@ -230,9 +222,3 @@ def test_a_bed_without_a_skin_says_so(bed: Any) -> None:
     with pytest.raises(DigiclayError, match=r"has no skin\. Rebuild it in the panel Device"):
         form.set_form(bed, "skin")
     assert bed.digiclay_display.form == "pins"
-
-
-@pytest.mark.parametrize("word", ["", "Skin", "nan"])
-def test_another_word_is_refused(bed: Any, word: str) -> None:
-    with pytest.raises(DigiclayError, match=r"Display\.form must be one of automatic, pins, skin, both"):
-        form.set_form(bed, word)

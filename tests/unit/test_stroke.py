@@ -68,6 +68,7 @@ def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(duration: f
     assert stroke.done
     down = pressed(poses)
     assert (down[0, 0], down[-1, 0]) == pytest.approx((0.0, 0.02), abs=1e-12)
+    assert draw(stroke, 9.0, 0.03, 0.0, 4e-3) is stroke, "the hand has let go"
     # No column is skipped: a control period is DRAG times its length at the most.
     assert np.diff(down[:, 0]).max() <= DRAG * PERIOD + 1e-12
 
@@ -144,16 +145,16 @@ def test_a_hand_that_has_rested_does_not_creep_before_it_goes_on() -> None:
     assert stroke.samples[1].time >= 4.0
 
 
-def test_nothing_is_drawn_after_the_hand_let_go() -> None:
-    stroke = line(0.3)
-    assert draw(stroke, 1.0, 0.03, 0.0, 4e-3) is stroke
-
-
-def test_a_click_is_a_whole_press_and_ends_above_all_pins() -> None:
-    stroke, poses = path(replace(start(1, 0.01, 0.005, 4e-3), held=False))
+@pytest.mark.parametrize(("bed", "lowest", "end"), [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)])
+def test_a_click_presses_no_deeper_than_the_floor_and_ends_above_all_pins(
+    bed: NDArray[np.float64], lowest: float, end: float | None
+) -> None:
+    click = replace(start(1, 0.01, 0.005, 4e-3), held=False)
+    stroke, poses = follow(click, CELLS, bed, Fingertip(), AT, 1000, PERIOD, 0.0)
     assert stroke.done
-    assert poses[:, 2].min() == pytest.approx(0.036, abs=1e-9)
-    assert poses[-1, 2] == pytest.approx(0.055 + 4e-3, abs=1e-9)
+    z = np.array(poses)[:, 2]
+    assert z.min() == pytest.approx(lowest, abs=1e-9)
+    assert end is None or z[-1] == pytest.approx(end, abs=1e-9)
 
 
 def test_depth_counts_from_the_surface_as_it_was_when_the_finger_began() -> None:
@@ -161,13 +162,6 @@ def test_depth_counts_from_the_surface_as_it_was_when_the_finger_began() -> None
     stroke, poses = follow(held, CELLS, HEIGHT, Fingertip(), AT, 200, PERIOD, 0.0)
     _, after = follow(stroke, CELLS, HEIGHT - 0.01, Fingertip(), poses[-1], 200, PERIOD, 0.0)
     assert after[-1, 2] == pytest.approx(0.036, abs=1e-9)
-
-
-def test_the_finger_never_goes_below_the_beds_floor() -> None:
-    low = np.full(CELLS.count, 0.001)
-    stroke = replace(start(1, 0.0, 0.0, 4e-3), held=False)
-    _, poses = follow(stroke, CELLS, low, Fingertip(), AT, 1000, PERIOD, 0.0)
-    assert poses[:, 2].min() == 0.0
 
 
 @pytest.mark.parametrize(("by", "depth"), [(-1.0, 0.1e-3), (1.0, DEEPEST), (1e-3, 5e-3)])
@@ -237,9 +231,7 @@ def test_a_ring_keeps_its_radius_and_is_closed() -> None:
     np.testing.assert_allclose(points[0], points[-1], atol=1e-15)
     np.testing.assert_allclose(points[0], [2e-3, 9e-3], atol=1e-15)
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= 1e-3 + 1e-12
-
-
-def test_a_ring_without_a_radius_is_a_place() -> None:
+    # Without a radius it is a place.
     np.testing.assert_array_equal(lay_ring((1e-3, 2e-3), (1e-3, 2e-3)), [[1e-3, 2e-3]])
 
 
@@ -266,9 +258,6 @@ def test_the_top_of_the_finger_goes_where_it_leans_by_the_angle(lean: tuple[floa
     top = matrix(lean_finger(UPRIGHT, lean))[:, 2]
     angle = np.hypot(*lean)
     np.testing.assert_allclose(top[:2], np.array(lean) / angle * np.sin(angle), atol=1e-12)
-
-
-def test_a_finger_that_does_not_lean_keeps_its_orientation_bit_for_bit() -> None:
     np.testing.assert_array_equal(lean_finger(TWISTED, (0.0, 0.0)), TWISTED)
 
 
