@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,21 @@ def whole(*found: Any) -> bool:
     parts = {*found, *tips, *balls}
     of_balls = [ball.parent for ball in balls] == tips
     return len(parts) == 3 * len(found) and of_balls and set(bpy.context.scene.objects) == parts
+
+
+def instances(bed: Any) -> Iterator[Any]:
+    """Give what Blender draws for a bed: pins, arrows, the skin; each until the next is asked for."""
+    for item in bpy.context.evaluated_depsgraph_get().object_instances:
+        if item.is_instance and item.parent.original == bed:
+            yield item
+
+
+def inventory() -> dict[str, list[str]]:
+    """Name everything in the open file, but the slots Blender shows its results in."""
+    slots = {"Render Result", "Viewer Node"}
+    kinds = {name: getattr(bpy.data, name) for name in dir(bpy.data)}
+    found = {name: kind for name, kind in kinds.items() if isinstance(kind, bpy.types.bpy_prop_collection)}
+    return {name: sorted({item.name for item in kind} - slots) for name, kind in found.items()}
 
 
 def housings() -> int:

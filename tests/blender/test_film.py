@@ -21,6 +21,8 @@ from digiclay.device.instant import Instant
 from digiclay.pictures import film, still
 from digiclay.pictures import film as films
 
+from tests.blender.at_hand import inventory
+
 WIDTH, HEIGHT = 160, 100
 SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 8}
 
@@ -68,13 +70,6 @@ def looks_like(pixels: np.ndarray, mode: Mode) -> int:
     cosine = bed @ wanted / np.maximum(np.linalg.norm(bed, axis=1) * np.linalg.norm(wanted), 1e-6)
     # Blue and vermilion are 70 degrees apart; gray is 25 degrees or more from both.
     return int((cosine > 0.97).sum())
-
-
-def inventory() -> dict[str, int]:
-    """Count what is in the open file, by kind."""
-    kinds = {name: getattr(bpy.data, name) for name in dir(bpy.data)}
-    found = {k: len(v) for k, v in kinds.items() if isinstance(v, bpy.types.bpy_prop_collection)}
-    return {kind: count for kind, count in found.items() if kind != "images"}  # Blender's own Render Result
 
 
 def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path: Path, history: Any) -> None:

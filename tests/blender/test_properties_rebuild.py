@@ -15,7 +15,7 @@ from digiclay.device import view
 from digiclay.live import bed_state
 from digiclay.settings import properties
 
-from tests.blender.at_hand import new_bed
+from tests.blender.at_hand import instances, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
 #: Positions are float32 and drawn ten times as large.
@@ -41,12 +41,6 @@ def identity(bed: Any) -> tuple[Any, ...]:
     return bed.session_uid, tip.session_uid, *places, *counts, view.color_source(bed)
 
 
-def drawn_pins(bed: Any) -> int:
-    """Count the pins drawn of a bed."""
-    graph = bpy.context.evaluated_depsgraph_get()
-    return sum(item.is_instance and item.parent.original == bed for item in graph.object_instances)
-
-
 def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_says(bed: Any) -> None:
     view.color_by(bed, "force")
     bed[bed_state.STATE], before, settings = b"of 48 pins", identity(bed), bed.digiclay
@@ -58,7 +52,7 @@ def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_sa
     np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
     np.testing.assert_allclose(cells["height"], 0.030, rtol=0, atol=FLOAT32)
     assert set(cells["mode"]) == {Mode.REST}
-    assert (identity(bed), bed_state.read_snapshot(bed), drawn_pins(bed)) == (before, None, 180)
+    assert (identity(bed), bed_state.read_snapshot(bed), len([*instances(bed)])) == (before, None, 180)
     # The housing is about all of them.
     shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
     housing, pins = (max(vertex.co.x for vertex in one.data.vertices) for one in (shown, bed))
@@ -101,4 +95,4 @@ def test_a_copy_of_the_bed_keeps_its_pins_when_the_other_is_rebuilt(bed: Any) ->
     bed.digiclay.layout.columns = 11
     bpy.ops.digiclay.rebuild()
     bpy.context.view_layer.update()
-    assert drawn_pins(copy) == 48
+    assert len([*instances(copy)]) == 48

@@ -18,6 +18,7 @@ from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
 from digiclay.pictures import stage, still
 
+from tests.blender.at_hand import inventory
 from tests.timeouts import TIMEOUT
 
 WIDTH, HEIGHT = 240, 150
@@ -44,17 +45,6 @@ def bed_in(mode: Mode) -> Instant:
     rest = Instant.at_rest(Layout(rows=8, columns=8))
     far = np.array([0.0, 0.0, 0.060, 1.0, 0.0, 0.0, 0.0])
     return Instant(rest.position, rest.height, np.full(64, mode), rest.force, far)
-
-
-def inventory() -> dict[str, list[str]]:
-    """Name everything in the open file, but the slots Blender shows its results in."""
-    slots = {"Render Result", "Viewer Node"}
-    kinds = {name: getattr(bpy.data, name) for name in dir(bpy.data)}
-    return {
-        name: sorted(item.name for item in kind if item.name not in slots)
-        for name, kind in kinds.items()
-        if isinstance(kind, bpy.types.bpy_prop_collection)
-    }
 
 
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.FROZEN])

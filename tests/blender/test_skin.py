@@ -15,7 +15,7 @@ from digiclay.device.instant import Instant
 from digiclay.device.skin_lattice import KINDS, choose_parts, interpolate, make_lattice
 from digiclay.settings import properties
 
-from tests.blender.at_hand import done, new_bed
+from tests.blender.at_hand import done, instances, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -42,9 +42,7 @@ def shape(bed: Any, seed: int) -> None:
 def drawn(bed: Any) -> tuple[np.ndarray, int]:
     """Return the points of the skin that is drawn, m, and how many pins are drawn."""
     points, pins = np.empty((0, 3)), 0
-    for item in bpy.context.evaluated_depsgraph_get().object_instances:
-        if not item.is_instance or item.parent.original != bed:
-            continue
+    for item in instances(bed):
         roles = [material.get(view.ROLE) for material in item.object.data.materials if material]
         if not {"skin", "skin_clear"}.intersection(roles):
             pins += 1
@@ -56,15 +54,9 @@ def drawn(bed: Any) -> tuple[np.ndarray, int]:
 def baked_heights(bed: Any) -> np.ndarray:
     """Return the heights at which a bake's pins are drawn, m."""
     shown, bed.digiclay_display.form = bed.digiclay_display.form, "pins"
-    graph = bpy.context.evaluated_depsgraph_get()
-    floor = bed.matrix_world.translation.z
-    tops = [
-        item.matrix_world.translation.z
-        for item in graph.object_instances
-        if item.is_instance and item.parent.original == bed
-    ]
+    tops = np.array([item.matrix_world.translation.z for item in instances(bed)])
     bed.digiclay_display.form = shown
-    return (np.array(tops) - floor) / bridge.SCALE
+    return (tops - bed.matrix_world.translation.z) / bridge.SCALE
 
 
 def expected(bed: Any, kind: str, height: np.ndarray | None = None) -> np.ndarray:

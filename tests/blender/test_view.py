@@ -19,18 +19,18 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.device import heat, view
 from digiclay.device.instant import Instant
 
+from tests.blender.at_hand import instances
+
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
 
 
 def drawn_pins(bed: Any) -> tuple[np.ndarray, list[str]]:
     """Return what Blender draws for a bed: pin tops (n, 3), m, and each one's material."""
-    graph = bpy.context.evaluated_depsgraph_get()
     tops, materials = [], []
-    for item in graph.object_instances:
-        if item.is_instance and item.parent.original == bed:
-            tops.append(np.array(item.matrix_world.translation) / bridge.SCALE)
-            materials.append(item.object.material_slots[0].material[view.ROLE])
+    for item in instances(bed):
+        tops.append(np.array(item.matrix_world.translation) / bridge.SCALE)
+        materials.append(item.object.material_slots[0].material[view.ROLE])
     return np.array(tops), materials
 
 
@@ -84,14 +84,12 @@ def test_a_tilted_fingertip_touches_down_at_its_lowest_point(bed: Any, formed: I
 
 
 def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed: Any, formed: Instant) -> None:
-    graph = bpy.context.evaluated_depsgraph_get()
     feet = [
         min((item.matrix_world @ vertex.co).z for vertex in item.object.data.vertices)
-        for item in graph.object_instances
-        if item.is_instance and item.parent.original == bed
+        for item in instances(bed)
     ]
     assert len(feet) == 48
-    housing = bed.evaluated_get(graph)
+    housing = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
     deck = housing.data.vertices[-1].co.z  # the housing is drawn from its underside to the deck inside
     # float32 on lengths below one unit.
     np.testing.assert_allclose(feet, deck, rtol=0, atol=1e-6)
@@ -177,18 +175,12 @@ def test_every_pin_wears_the_color_of_its_level_of_force(bed: Any, formed: Insta
 
 def arrows(bed: Any) -> np.ndarray:
     """Return tip (3) and length of every arrow drawn, m."""
-    graph = bpy.context.evaluated_depsgraph_get()
     found = [
-        [
-            *np.array(item.matrix_world.translation) / bridge.SCALE,
-            item.matrix_world.to_scale().z / bridge.SCALE,
-        ]
-        for item in graph.object_instances
-        if item.is_instance
-        and item.parent.original == bed
-        and item.object.material_slots[0].material[view.ROLE] == "force_arrow"
+        [*item.matrix_world.translation, item.matrix_world.to_scale().z]
+        for item in instances(bed)
+        if item.object.material_slots[0].material[view.ROLE] == "force_arrow"
     ]
-    return np.array(found).reshape(-1, 4)
+    return np.array(found).reshape(-1, 4) / bridge.SCALE
 
 
 def test_arrows_stand_on_the_pressed_pins_as_long_as_their_force(bed: Any, formed: Instant) -> None:
