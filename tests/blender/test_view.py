@@ -207,8 +207,12 @@ def test_forces_are_written_only_while_something_drawn_tells_them(bed: Any) -> N
     system = assemble(scene)
     state = begin(system)
     state.rows[system.rows.force] = 0.5
-    before = bridge.read_cells(bed.data)["force"]
+    before, tip = bridge.read_cells(bed.data)["force"], view.fingertip_of(bed)
+    tip.location.x += 1.0
     view.show_state(bed, system, state)
+    tops, _ = drawn_pins(bed)  # pins move, and the fingertip is left to the user
+    np.testing.assert_allclose(tops[:, 2], system.cell.actuator.rest_height, rtol=0, atol=FLOAT32)
+    assert tip.location.x > 0.9
     np.testing.assert_array_equal(bridge.read_cells(bed.data)["force"], before)
     for switch_on in (lambda: view.show_arrows(bed, True), lambda: view.color_by(bed, "force")):
         view.show_arrows(bed, False)
