@@ -25,7 +25,9 @@ def extension(factory_file: None) -> Iterator[None]:
 @pytest.fixture
 def bed() -> Any:
     """A small bed in the open scene."""
-    return new_bed(rows=13, columns=13)
+    made = new_bed(rows=13, columns=13)
+    handlers.watch()  # to open a file ends it
+    return made
 
 
 @pytest.fixture
