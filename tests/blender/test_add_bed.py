@@ -105,10 +105,10 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name: str) -> None:
 
 
 def test_a_bed_of_a_kind_may_have_another_plan() -> None:
-    scene = properties.scene_of(add(bed="design", rows=6, columns=30, pitch=2.7))
+    scene = properties.scene_of(add(bed="design", rows=6, columns=30, pitch=2.7, arrangement="staggered"))
     # The pitch is the number typed, and not its 32 bits.
     assert (scene.layout.rows, scene.layout.columns, scene.layout.pitch) == (6, 30, 2.7e-3)
-    assert scene.fingers[0].fingertip.length == 5e-3
+    assert (scene.layout.arrangement, scene.fingers[0].fingertip.length) == ("staggered", 5e-3)
 
 
 def test_a_pitch_at_which_cylinders_would_overlap_makes_them_narrower() -> None:
