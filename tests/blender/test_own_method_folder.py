@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 import pytest
-from digiclay import preferences
+from digiclay import preferences, translations
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.methods import METHODS, list_added
 from digiclay.core.scene.toml_table import format_scene
@@ -164,3 +164,9 @@ def test_a_file_without_its_method_says_so_and_uses_no_other(chosen: Any, tmp_pa
     bpy.context.view_layer.objects.active = bed
     chosen.run_own_methods = True
     assert format_scene(properties.scene_of(bed)) == format_scene(scene)  # its class is a new one
+
+
+def test_what_it_adds_to_the_preferences_is_translated() -> None:
+    texts = ("Every Python file in this folder is run with all your rights:",
+             "choose a folder that only you can write to, with code that you have read.")  # fmt: skip
+    assert [text for text in texts if translations.translate(text, "de") is None] == []
