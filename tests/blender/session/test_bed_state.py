@@ -134,6 +134,7 @@ def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock:
     np.testing.assert_allclose(exact(bed), before, rtol=0, atol=0.1e-3)
     # Pressed 6 mm beside the first place: 0.9 mm.
     assert np.abs(exact(copy) - exact(bed)).max() > 0.5e-3
+    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
 
 
 def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Path) -> None:
