@@ -39,7 +39,8 @@ KEYS: tuple[tuple[tuple[str, str], str, str, dict[str, bool]], ...] = (
 )
 
 
-def write_recovery() -> None:
+@bpy.app.handlers.persistent
+def write_recovery(*_: Any) -> None:
     """Write each recording into its bed, as a take: the file is about to be saved."""
     clear_recovery()
     for session in running.list_sessions():
@@ -48,7 +49,8 @@ def write_recovery() -> None:
             running.put(replace(session, saved_take=takes.add(bed, take).number))
 
 
-def clear_recovery(path: str = "") -> None:
+@bpy.app.handlers.persistent
+def clear_recovery(path: str = "", *_: Any) -> None:
     """Remove these takes, since the recordings continue; `path` of the saved file, empty if that failed."""
     for session in running.list_sessions():
         number, later = session.saved_take, replace(session, saved_take="")
@@ -91,18 +93,6 @@ def reload_states(*_: Any) -> None:
 
 
 @bpy.app.handlers.persistent
-def write_recordings(*_: Any) -> None:
-    """Write the recordings into the file that is about to be saved."""
-    write_recovery()
-
-
-@bpy.app.handlers.persistent
-def finish_saving(path: str, *_: Any) -> None:
-    """Continue the recordings after the file was saved to a path."""
-    clear_recovery(path)
-
-
-@bpy.app.handlers.persistent
 def cancel_saving(*_: Any) -> None:
     """Continue the recordings after the file could not be saved."""
     clear_recovery()
@@ -134,8 +124,8 @@ def _handler_pairs() -> list[tuple[Any, Any]]:
     return [
         (lists.undo_post, reload_states),
         (lists.redo_post, reload_states),
-        (lists.save_pre, write_recordings),
-        (lists.save_post, finish_saving),
+        (lists.save_pre, write_recovery),
+        (lists.save_post, clear_recovery),
         (lists.save_post_fail, cancel_saving),
         (lists.load_pre, end_for_loading),
     ]

@@ -46,15 +46,14 @@ def is_running() -> bool:
     return LOOP.timer is not None and time.perf_counter() - LOOP.ticked < GONE
 
 
-def begin(context: Any) -> int:
-    """Begin a loop with a timer in the window of the context; return its token."""
+def begin(context: Any) -> None:
+    """Begin a loop with a timer in the window of the context."""
     end()
     LOOP.timer = _add_timer(context)
     LOOP.window, LOOP.token = context.window.as_pointer(), LOOP.token + 1
     LOOP.ticked, LOOP.numbers = time.perf_counter(), 0.0
     bpy.types.STATUSBAR_HT_header.prepend(draw)
     redraw_status()
-    return LOOP.token
 
 
 def _add_timer(context: Any) -> Any:
@@ -67,16 +66,6 @@ def time_window(context: Any) -> Any | None:
     """Return a timer for the window of the context, to be removed; None where the loop has one."""
     has_loop = LOOP.timer is not None and LOOP.window == context.window.as_pointer()
     return None if has_loop else _add_timer(context)
-
-
-def step_aside() -> None:
-    """Note that for the moment no operator drives the loop, nor takes the keys."""
-    LOOP.aside = True
-
-
-def take_over() -> None:
-    """Note that an operator drives the loop."""
-    LOOP.aside = False
 
 
 def is_aside() -> bool:
@@ -107,12 +96,10 @@ def redraw_numbers(context: Any, now: float) -> None:
     if now - LOOP.numbers < NUMBERS:
         return
     LOOP.numbers = now
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
+    for region in (region for area in areas if area.type == "VIEW_3D" for region in area.regions):
+        if region.type == "UI":
+            region.tag_redraw()
 
 
 def redraw_status() -> None:

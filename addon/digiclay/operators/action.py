@@ -2,7 +2,7 @@
 
 # No postponed annotations in this package: Blender reads an operator's properties from them.
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import wraps
 from typing import Any
 
@@ -79,9 +79,8 @@ class Polled:
 class Action(Polled):
     """Mixin of an operator without a modal part: a DigiclayError is reported and ends it."""
 
-    def perform(self, context: Any) -> set[str] | None:
-        """Do it; return the operator's result where that is not FINISHED."""
-        raise NotImplementedError
+    #: Does it; returns the operator's result where that is not FINISHED.
+    perform: Callable[..., set[str] | None]
 
     def execute(self, context: Any) -> set[str]:
         """Do it, and report what stands in its way."""
@@ -90,6 +89,23 @@ class Action(Polled):
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+
+
+def action(
+    idname: str, label: str, *needs: Callable[[Any], str], options: Iterable[str] = ("REGISTER", "UNDO"),
+    base: type = Action, in_any_mode: bool = False,
+) -> Callable[[Callable[[Any, Any], set[str] | None]], Any]:  # fmt: skip
+    """Return a decorator that makes an operator of its `perform`, whose docstring is the description."""
+
+    def make(perform: Callable[[Any, Any], set[str] | None]) -> Any:
+        entries = {
+            "bl_idname": idname, "bl_label": label, "bl_options": set(options), "needs": needs,
+            "in_any_mode": in_any_mode, "perform": perform, "__doc__": perform.__doc__,
+            "__module__": perform.__module__,
+        }  # fmt: skip
+        return type(perform.__name__, (base, bpy.types.Operator), entries)
+
+    return make
 
 
 class FileAction(Action):
@@ -104,9 +120,8 @@ class FileAction(Action):
 class Drawing(Polled):
     """Mixin of a modal operator that draws in the view in which it was called."""
 
-    def draw_view(self, area: Any) -> None:
-        """Draw, in each region of each view; `area` is the one in which the operator was called."""
-        raise NotImplementedError
+    #: Draws, in each region of each view; given the area in which the operator was called.
+    draw_view: Callable[[Any], None]
 
     def begin(self, context: Any) -> set[str]:
         """Become modal, and draw from now on."""

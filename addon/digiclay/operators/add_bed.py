@@ -1,7 +1,6 @@
 """Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip; Rebuild: a bed from its settings."""
 
 from collections.abc import Iterable
-from functools import partial
 from typing import Any
 
 from .. import bridge, preferences
@@ -22,7 +21,7 @@ from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, millimeters
+from .action import Action, action, millimeters
 from .poll_messages import baked, edited, inside_edit, no_bed, session_runs
 
 DEFAULT = Layout()
@@ -143,22 +142,16 @@ class AddBed(Placed, Action, bpy.types.Operator):
         self.place(context, bed)
 
 
-class Rebuild(Action, bpy.types.Operator):
+@action(
+    "digiclay.rebuild", "Rebuild", no_bed,
+    session_runs.reworded("Stop the session first: its pins cannot be exchanged"),
+    baked.reworded("Free the bake in the Takes panel first: it moves the pins there are now"),
+    edited.reworded("Leave Edit Mode first"),
+)  # fmt: skip
+def rebuild_bed(operator: Any, context: Any) -> None:
     """Make pins and housing from the settings; the formed surface is lost, the fingertip stays"""
-
-    bl_idname = "digiclay.rebuild"
-    bl_label = "Rebuild"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = (
-        no_bed,
-        partial(session_runs, message="Stop the session first: its pins cannot be exchanged"),
-        partial(baked, message="Free the bake in the Takes panel first: it moves the pins there are now"),
-        partial(edited, message="Leave Edit Mode first"),
-    )
-
-    def perform(self, context: Any) -> None:
-        layout = rebuild(bed_of(context)).layout
-        self.report({"INFO"}, localize("The bed has {} x {} pins now", layout.rows, layout.columns))
+    layout = rebuild(bed_of(context)).layout
+    operator.report({"INFO"}, localize("The bed has {} x {} pins now", layout.rows, layout.columns))
 
 
 def add(context: Any, scene: Scene) -> Any:

@@ -1,8 +1,7 @@
 """Bake of a take, or of an animated fingertip, into the bed; removal of a bake."""
 
 import time
-from collections.abc import Generator
-from functools import partial
+from collections.abc import Callable, Generator
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..roles import bed_of
 from ..settings import properties
 from ..ui_text import localize
 from . import status
-from .action import Action
+from .action import Action, action
 from .poll_messages import no_bake, no_bed, session_runs
 from .take_actions import ChosenTake
 
@@ -35,9 +34,8 @@ class LongWork(Action):
 
     bl_label: str
 
-    def work(self, context: Any) -> Generator[float, None, None]:
-        """Give the share done after each step; raises DigiclayError when the work cannot be done."""
-        raise NotImplementedError
+    #: Gives the share done after each step; raises DigiclayError when the work cannot be done.
+    work: Callable[[Any], Generator[float, None, None]]
 
     def perform(self, context: Any) -> None:
         """Do all of the work at once."""
@@ -87,7 +85,7 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
     bl_idname = "digiclay.bake"
     bl_label = "Bake Session"
     bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, partial(session_runs, message="Stop the session on this bed first")
+    needs = no_bed, session_runs.reworded("Stop the session on this bed first")
 
     source: bpy.props.EnumProperty(
         name="Source",
@@ -141,13 +139,7 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
         self.report({"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, last))
 
 
-class FreeBake(Action, bpy.types.Operator):
+@action("digiclay.bake_free", "Free Bake", no_bed, no_bake)
+def free_bake(operator: Any, context: Any) -> None:
     """Remove the bake: the bed shows its own state again. Keyframes of the fingertip stay"""
-
-    bl_idname = "digiclay.bake_free"
-    bl_label = "Free Bake"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, no_bake
-
-    def perform(self, context: Any) -> None:
-        bake.free(bed_of(context))
+    bake.free(bed_of(context))

@@ -17,7 +17,7 @@ from ..panels.shape_exchange import LISTED
 from ..roles import bed_of
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, millimeters
+from .action import Action, action, millimeters
 from .add_bed import select_only
 from .poll_messages import from_rest, no_surface
 
@@ -192,25 +192,13 @@ class FindFeatures(FindingOptions, bpy.types.Operator):
         self.report({"INFO"}, lines[0])
 
 
-class KeepSurface(Action, bpy.types.Operator):
+@action("digiclay.keep_surface", "Measure from Here", no_surface)
+def keep_surface(operator: Any, context: Any) -> None:
     """Measure features from the current surface"""
-
-    bl_idname = "digiclay.keep_surface"
-    bl_label = "Measure from Here"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = (no_surface,)
-
-    def perform(self, context: Any) -> None:
-        formed_bed.set_reference(chosen_bed(context))
+    formed_bed.set_reference(chosen_bed(context))
 
 
-class ForgetSurface(Action, bpy.types.Operator):
+@action("digiclay.forget_surface", "Measure from Rest", no_surface, from_rest)
+def forget_surface(operator: Any, context: Any) -> None:
     """Measure features from the bed at rest again"""
-
-    bl_idname = "digiclay.forget_surface"
-    bl_label = "Measure from Rest"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = no_surface, from_rest
-
-    def perform(self, context: Any) -> None:
-        formed_bed.clear_reference(chosen_bed(context))
+    formed_bed.clear_reference(chosen_bed(context))

@@ -1,7 +1,6 @@
 """Operators on what is seen of a bed: pins picked for the overlay, and the live skin."""
 
 from collections.abc import Iterable
-from functools import partial
 from typing import Any
 
 from ..compat import bpy
@@ -13,8 +12,8 @@ from ..press import aim
 from ..roles import bed_of
 from ..ui_text import localize
 from . import status
-from .action import Action, Polled
-from .poll_messages import linked, no_bed, no_skin
+from .action import Polled, action
+from .poll_messages import linked, no_bed, no_pins, no_skin, no_view
 
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
 
@@ -31,16 +30,7 @@ def pick_pins(bed: Any, pins: Iterable[int]) -> None:
     views.redraw()
 
 
-def _no_pins(context: Any) -> str:
-    return "" if view.picked_pins(bed_of(context)) else "No pins are picked"
-
-
-def _no_view(context: Any) -> str:
-    in_view = context.area is not None and context.area.type == "VIEW_3D"
-    return "" if in_view else "Pins are picked in a 3D view"
-
-
-NO_BED = partial(no_bed, message="Select a bed of pins first")
+NO_BED = no_bed.reworded("Select a bed of pins first")
 
 
 class PickPins(Polled, bpy.types.Operator):
@@ -49,7 +39,7 @@ class PickPins(Polled, bpy.types.Operator):
     bl_idname = "digiclay.pick_pins"
     bl_label = "Pick Pins"
     bl_options = {"UNDO"}
-    needs = NO_BED, _no_view
+    needs = NO_BED, no_view
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for clicks."""
@@ -102,34 +92,22 @@ def _under(screen: Any, event: Any) -> tuple[Any, Any] | tuple[None, None]:
     return None, None
 
 
-class ClearPins(Action, bpy.types.Operator):
+@action("digiclay.clear_pins", "Clear", NO_BED, no_pins, options=("UNDO",))
+def clear_pins(operator: Any, context: Any) -> None:
     """Remove all picked pins of the active bed"""
-
-    bl_idname = "digiclay.clear_pins"
-    bl_label = "Clear"
-    bl_options = {"UNDO"}
-    needs = NO_BED, _no_pins
-
-    def perform(self, context: Any) -> None:
-        pick_pins(bed_of(context), ())
+    pick_pins(bed_of(context), ())
 
 
-class ToggleSkin(Action, bpy.types.Operator):
+@action("digiclay.skin_toggle", "Toggle Skin", no_bed, linked, no_skin)
+def toggle_skin(operator: Any, context: Any) -> None:
     """Show the surface of the pins as a skin, or the pins again"""
-
-    bl_idname = "digiclay.skin_toggle"
-    bl_label = "Toggle Skin"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, linked, no_skin
-
-    def perform(self, context: Any) -> None:
-        """Show pins where a skin is seen, else the skin; by the form there was before, if that does it."""
-        bed = bed_of(context)
-        seen, before = form.is_skin_shown(bed), bed.get(form.BEFORE)
-        if before in form.FORMS:
-            form.set_form(bed, before)
-            detail.follow()
-        if before not in form.FORMS or form.is_skin_shown(bed) == seen:
-            before = before or form.read_form(bed)
-            form.set_form(bed, "pins" if seen else "skin")
-            bed[form.BEFORE] = before
+    bed = bed_of(context)
+    seen, before = form.is_skin_shown(bed), bed.get(form.BEFORE)
+    # The form there was before, if that changes what is seen.
+    if before in form.FORMS:
+        form.set_form(bed, before)
+        detail.follow()
+    if before not in form.FORMS or form.is_skin_shown(bed) == seen:
+        before = before or form.read_form(bed)
+        form.set_form(bed, "pins" if seen else "skin")
+        bed[form.BEFORE] = before

@@ -12,7 +12,7 @@ from ..settings import own_folder, own_presets, properties
 from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
 from ..ui_text import localize
-from .action import Action
+from .action import Action, action
 from .poll_messages import no_bed, no_own_methods, no_own_preset
 
 
@@ -89,17 +89,11 @@ class RemovePreset(Action, bpy.types.Operator):
         settings.own_preset = ""
 
 
-class ReloadMethods(Action, bpy.types.Operator):
+@action("digiclay.methods_reload", "Reload Methods", no_own_methods, options=(), in_any_mode=True)
+def reload_methods(operator: Any, context: Any) -> None:
     """Run the Python files of the folder of own control methods again; running sessions keep their method"""
-
-    bl_idname = "digiclay.methods_reload"
-    bl_label = "Reload Methods"
-    in_any_mode = True
-    needs = (no_own_methods,)
-
-    def perform(self, context: Any) -> None:
-        preferences.take_methods(preferences.get(context), context)
-        present = own_folder.read_present()
-        for line in present.refused:
-            self.report({"WARNING"}, line)
-        self.report({"INFO"}, localize("{} control methods loaded", len(present.names)))
+    preferences.take_methods(preferences.get(context), context)
+    present = own_folder.read_present()
+    for line in present.refused:
+        operator.report({"WARNING"}, line)
+    operator.report({"INFO"}, localize("{} control methods loaded", len(present.names)))

@@ -3,6 +3,7 @@
 The mouse goes sideways, or a value is typed; outlines on the pins show it at true size.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,6 @@ from .poll_messages import no_finger, no_tool_in_view
 PRECISE = 0.1
 #: Events that are Blender's: timers, on which sessions go on, and the ways to turn the view.
 PASSED = ("TIMER", "MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF")
-#: Change of the depth, m, and of the strength, for a pixel at a UI scale of 1.
-DEPTH_PIXEL, STRENGTH_PIXEL = 0.05e-3, 0.005
 KEYS = (
     "{}  |  Move sideways or type a value  |  Ctrl: steps, Shift: precise  |  "
     "Enter or click: confirm  |  Esc or right click: cancel"
@@ -39,18 +38,18 @@ class AdjustMixin(Drawing):
     """
 
     needs = no_tool_in_view, no_finger
-    #: Range of the number, and the steps it takes with Ctrl held down.
+    #: Range of the number, the steps it takes with Ctrl held down, and its change a pixel at a UI scale of 1.
     low: float
     high: float
     snap: float
-
-    def read(self, bed: Any, settings: Any) -> float:
-        """Return the number now."""
-        raise NotImplementedError
-
-    def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Set the number."""
-        raise NotImplementedError
+    pixel: float
+    #: Returns the number of a bed and the tool's settings, and sets it.
+    read: Callable[[Any, Any], float]
+    write: Callable[[Any, Any, float], None]
+    #: Returns the number with its name and unit.
+    describe: Callable[[float], str]
+    #: Returns outlines (k, 2), m, about the place pointed at, by fingertip, its turn (wxyz), depth, value.
+    outlines: Callable[[Fingertip, Any, float, float], list[Any]]
 
     def parse(self, text: str) -> float:
         """Return the number of a typed text; a ValueError tells that it is none."""
@@ -58,15 +57,7 @@ class AdjustMixin(Drawing):
 
     def rate(self, context: Any, bed: Any) -> float:
         """Return the change of the number for a pixel."""
-        raise NotImplementedError
-
-    def describe(self, value: float) -> str:
-        """Return the number with its name and unit."""
-        raise NotImplementedError
-
-    def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
-        """Return outlines (k, 2), m, about the place pointed at, of a fingertip; `turn`: quaternion wxyz."""
-        raise NotImplementedError
+        return self.pixel / float(context.preferences.system.ui_scale)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin at the place under the mouse; beside a bed, in the middle of the one it is about."""
@@ -171,11 +162,9 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
     low, high, snap = finger_size.SMALLEST, finger_size.LARGEST, 1e-3
 
     def read(self, bed: Any, settings: Any) -> float:
-        """Return the width of the fingertip, m."""
         return finger_size.read_size(bed.digiclay)
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Scale the fingertip; its blister follows."""
         finger_size.set_size(bed.digiclay, value)
 
     def rate(self, context: Any, bed: Any) -> float:
@@ -202,7 +191,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
     bl_idname = "digiclay.press_depth"
     bl_label = "Press Depth"
     bl_options = {"BLOCKING"}
-    low, high, snap = SHALLOWEST, DEEPEST, 0.5e-3
+    low, high, snap, pixel = SHALLOWEST, DEEPEST, 0.5e-3, 0.05e-3
 
     def read(self, bed: Any, settings: Any) -> float:
         """Return the depth, or height, of the tool's brush, m."""
@@ -210,11 +199,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
         return 1e-3 * float(getattr(settings, self.amount))
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Set the depth, or height, of the tool's brush."""
-        setattr(settings, brush.amount_name(Brush(settings.brush)), 1e3 * value)
-
-    def rate(self, context: Any, bed: Any) -> float:
-        return DEPTH_PIXEL / float(context.preferences.system.ui_scale)
+        setattr(settings, self.amount, 1e3 * value)
 
     def describe(self, value: float) -> str:
         return f"{self.amount.title()} {1e3 * value:.2f} mm"
@@ -230,7 +215,7 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
     bl_idname = "digiclay.press_strength"
     bl_label = "Press Strength"
     bl_options = {"BLOCKING"}
-    low, high, snap = 0.01, 1.0, 0.1
+    low, high, snap, pixel = 0.01, 1.0, 0.1, 0.005
 
     def read(self, bed: Any, settings: Any) -> float:
         return float(settings.strength)
@@ -242,9 +227,6 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
         """Return the share typed: a number of per cent has their sign, or is above 1."""
         value = float(bpy.utils.units.to_value("NONE", "NONE", text.rstrip("% ")))
         return value / 100.0 if "%" in text or value > 1.0 else value
-
-    def rate(self, context: Any, bed: Any) -> float:
-        return STRENGTH_PIXEL / float(context.preferences.system.ui_scale)
 
     def describe(self, value: float) -> str:
         return localize("Strength {:.0f} %", 100.0 * value)

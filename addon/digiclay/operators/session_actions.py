@@ -18,81 +18,51 @@ from ..sessions import running, sculpting
 from ..sessions.running import Running
 from ..settings import properties
 from ..ui_text import localize
-from .action import Action, Needs
+from .action import Action, action
 from .poll_messages import no_gesture, no_server, no_session, nothing_to_reset, session_waits
 
 
-class OfSession(Action):
-    """Mixin of an action on the session that `active_session` finds."""
-
-    needs: Needs = (no_session,)
-
-    def perform(self, context: Any) -> set[str] | None:
-        active = active_session(context)
-        assert active is not None  # by the poll
-        self.change(context, *active)
-        return None
-
-    def change(self, context: Any, bed: Any, session: Running) -> None:
-        """Change the session of a bed."""
-        raise NotImplementedError
+def _session(context: Any) -> tuple[Any, Running]:
+    """Return the bed and the session that an action is about, which its poll has found."""
+    active = active_session(context)
+    assert active is not None
+    return active
 
 
-class PauseSession(OfSession, bpy.types.Operator):
+@action("digiclay.session_pause", "Pause or Resume", no_session, options=(), in_any_mode=True)
+def pause_session(operator: Any, context: Any) -> None:
     """Pause or resume the bed; on resume the fingertip path is straight to its current position"""
-
-    bl_idname = "digiclay.session_pause"
-    bl_label = "Pause or Resume"
-    in_any_mode = True
-
-    def change(self, context: Any, bed: Any, session: Running) -> None:
-        running.put(replace(session, paused=not session.paused))
-        loop.redraw_status()
+    _, session = _session(context)
+    running.put(replace(session, paused=not session.paused))
+    loop.redraw_status()
 
 
-class StepSession(OfSession, bpy.types.Operator):
+@action("digiclay.session_step", "Single Step", no_session, options=(), in_any_mode=True)
+def step_session(operator: Any, context: Any) -> None:
     """Simulate one control period; a running session is paused"""
-
-    bl_idname = "digiclay.session_step"
-    bl_label = "Single Step"
-    in_any_mode = True
-
-    def change(self, context: Any, bed: Any, session: Running) -> None:
-        """Request one more; the next tick simulates it."""
-        running.put(sculpting.request_step(session))
-        loop.redraw_status()
+    running.put(sculpting.request_step(_session(context)[1]))
+    loop.redraw_status()
 
 
-class StopSession(OfSession, bpy.types.Operator):
+@action("digiclay.session_stop", "Stop Session", no_session, options=("UNDO",), in_any_mode=True)
+def stop_session(operator: Any, context: Any) -> None:
     """Stop the session of the bed; the bed keeps its state, from which another session continues"""
-
-    bl_idname = "digiclay.session_stop"
-    bl_label = "Stop Session"
-    bl_options = {"UNDO"}
-    in_any_mode = True
-
-    def change(self, context: Any, bed: Any, session: Running) -> None:
-        handlers.end(handlers.STOPPED, session)
+    handlers.end(handlers.STOPPED, _session(context)[1])
 
 
-class RewindSession(OfSession, bpy.types.Operator):
+@action("digiclay.session_rewind", "Take Back a Gesture", session_waits, no_gesture, options=("UNDO",))
+def rewind_session(operator: Any, context: Any) -> None:
     """Undo the last gesture: bed and fingertip return to its start"""
-
-    bl_idname = "digiclay.session_rewind"
-    bl_label = "Take Back a Gesture"
-    bl_options = {"UNDO"}
-    needs = session_waits, no_gesture
-
-    def change(self, context: Any, bed: Any, session: Running) -> None:
-        back = sculpting.rewind(session)
-        if session.recording is not None and back.recording is None:
-            words = takes.keep_recording(bed, session)
-            self.report({"INFO"}, words or localize("The recording ended: the gesture began before it"))
-        tick.show(bed, back)
-        tick.place_finger(context, bed, back)
+    bed, session = _session(context)
+    back = sculpting.rewind(session)
+    if session.recording is not None and back.recording is None:
+        words = takes.keep_recording(bed, session)
+        operator.report({"INFO"}, words or localize("The recording ended: the gesture began before it"))
+    tick.show(bed, back)
+    tick.place_finger(context, bed, back)
 
 
-class ResetSession(OfSession, bpy.types.Operator):
+class ResetSession(Action, bpy.types.Operator):
     """Return all pins to rest and lift the fingertip off them"""
 
     bl_idname = "digiclay.session_reset"
@@ -107,22 +77,21 @@ class ResetSession(OfSession, bpy.types.Operator):
     )
 
     def perform(self, context: Any) -> set[str] | None:
-        """Begin anew; what a session has done can be taken back."""
-        if active_session(context) is not None:
-            return super().perform(context)
-        if self.running_only:
-            return {"PASS_THROUGH"}
-        _bring_to_rest(bed_of(context))
-        return None
-
-    def change(self, context: Any, bed: Any, session: Running) -> None:
-        """Begin anew, the recording stored as a take."""
+        """Begin anew, the recording stored as a take; what a session has done can be taken back."""
+        active = active_session(context)
+        if active is None:
+            if self.running_only:
+                return {"PASS_THROUGH"}
+            _bring_to_rest(bed_of(context))
+            return None
+        bed, session = active
         words = takes.keep_recording(bed, session)
         back = sculpting.reset(session)
         tick.show(bed, back)
         tick.place_finger(context, bed, back)
         if words:
             self.report({"INFO"}, words)
+        return None
 
 
 def _bring_to_rest(bed: Any) -> None:
@@ -138,12 +107,13 @@ def _bring_to_rest(bed: Any) -> None:
         bridge.place_fingertip(tip, pose, find_ellipsoid(scene))
 
 
-class FollowServer(OfSession, bpy.types.Operator):
+class FollowServer(Action, bpy.types.Operator):
     """Move the fingertip with that of a server, digiclay serve, by OSC; the bed forms as under the hand"""
 
     bl_idname = "digiclay.follow_server"
     bl_label = "Follow a Server"
     in_any_mode = True
+    needs = (no_session,)
 
     address: bpy.props.StringProperty(
         name="Address",
@@ -159,22 +129,16 @@ class FollowServer(OfSession, bpy.types.Operator):
         result: set[str] = context.window_manager.invoke_props_dialog(self)
         return result
 
-    def change(self, context: Any, bed: Any, session: Running) -> None:
+    def perform(self, context: Any) -> None:
+        uid = _session(context)[1].uid
         try:
-            follow.begin(session.uid, self.address, self.token, online=bool(bpy.app.online_access))
+            follow.begin(uid, self.address, self.token, online=bool(bpy.app.online_access))
         except OSError as error:
             words = localize("{} cannot be reached: {}", self.address, error.strerror or error)
             raise DigiclayError(words) from None
 
 
-class LeaveServer(OfSession, bpy.types.Operator):
+@action("digiclay.leave_server", "Stop Following", no_server, options=(), in_any_mode=True)
+def leave_server(operator: Any, context: Any) -> None:
     """Move the fingertip by hand again"""
-
-    bl_idname = "digiclay.leave_server"
-    bl_label = "Stop Following"
-    in_any_mode = True
-    needs = (no_server,)
-
-    def change(self, context: Any, bed: Any, session: Running) -> None:
-        """Follow no more; the fingertip stays."""
-        follow.end(session.uid)
+    follow.end(_session(context)[1].uid)

@@ -5,7 +5,6 @@ would be lost in a crash. The operator therefore ends for a moment every so ofte
 """
 
 import time
-from functools import partial
 from typing import Any
 
 from .. import preferences
@@ -16,7 +15,7 @@ from ..press import tool
 from ..roles import bed_of
 from ..sessions import running
 from ..ui_text import localize
-from .action import Action, Polled
+from .action import Action, Polled, action
 from .poll_messages import (
     baked,
     driven,
@@ -41,7 +40,7 @@ class LoopMixin(Polled):
 
     def drive(self, context: Any) -> set[str]:
         """Begin to drive the loop."""
-        loop.take_over()
+        loop.LOOP.aside = False
         self.token, self.since = loop.token(), time.perf_counter()
         self.newer = _other_operators(context)
         # Of the window alone: an area that it is started from goes when a view is maximized.
@@ -106,17 +105,10 @@ class GoOn(LoopMixin, bpy.types.Operator):
         return self.drive(context)
 
 
-class Escape(Action, bpy.types.Operator):
+@action("digiclay.session_escape", "Stop Sessions", driven, options=("INTERNAL",), in_any_mode=True)
+def escape(operator: Any, context: Any) -> None:
     """Stop the sessions while none of their operators receives the key"""
-
-    bl_idname = "digiclay.session_escape"
-    bl_label = "Stop Sessions"
-    bl_options = {"INTERNAL"}
-    in_any_mode = True
-    needs = (driven,)
-
-    def perform(self, context: Any) -> None:
-        _stop(context)
+    _stop(context)
 
 
 def _count_strokes() -> int:
@@ -161,7 +153,7 @@ def _other_operators(context: Any) -> frozenset[int]:
 
 def _resume_later(token: int, window: Any) -> None:
     """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile."""
-    loop.step_aside()
+    loop.LOOP.aside = True
     handlers.write_recovery()  # in case Blender saves the file in this moment
     pointer = window.as_pointer()
 
@@ -186,25 +178,18 @@ def leave_mode(context: Any) -> None:
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-class LeaveMode(Action, bpy.types.Operator):
+@action("digiclay.leave_mode", "Back to Object Mode", no_bed, in_object_mode, in_any_mode=True)
+def to_object_mode(operator: Any, context: Any) -> None:
     """Leave this mode for Object Mode, in which beds are sculpted, with the Press tool in hand"""
-
-    bl_idname = "digiclay.leave_mode"
-    bl_label = "Back to Object Mode"
-    bl_options = {"REGISTER", "UNDO"}
-    in_any_mode = True
-    needs = no_bed, in_object_mode
-
-    def perform(self, context: Any) -> None:
-        leave_mode(context)
-        if context.window is not None:
-            tool.take_up(context)
+    leave_mode(context)
+    if context.window is not None:
+        tool.take_up(context)
 
 
 def leave_entry(menu: Any, context: Any) -> None:
     """Offer the way back after the menus of a 3D view's header, as in the Sculpting workspace."""
-    if not LeaveMode.poll_message(context):
-        menu.layout.operator(LeaveMode.bl_idname, icon="LOOP_BACK")
+    if not to_object_mode.poll_message(context):
+        menu.layout.operator(to_object_mode.bl_idname, icon="LOOP_BACK")
 
 
 class Session(LoopMixin, Action, bpy.types.Operator):
@@ -214,7 +199,7 @@ class Session(LoopMixin, Action, bpy.types.Operator):
     bl_label = "Start Session"
     needs = (
         no_bed,
-        partial(session_runs, message="A session runs on this bed already: Esc stops it"),
+        session_runs.reworded("A session runs on this bed already: Esc stops it"),
         linked,
         baked,
         no_window,

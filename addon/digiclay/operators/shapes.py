@@ -1,7 +1,7 @@
 """Shape of a bed: from an object, a file, a sample, or the formed surface; its removal."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from ..settings import properties
 from ..settings.declared import title
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, FileAction, Needs, millimeters
+from .action import Action, FileAction, Needs, action, millimeters
 from .poll_messages import baked, linked, no_bed, no_shape, session_runs
 
 DEFAULT = Shape()
@@ -42,11 +42,13 @@ class Shaped(Action):
     bl_options = {"REGISTER", "UNDO"}
     needs: Needs = (
         no_bed,
-        partial(session_runs, message="Stop the session first: the bed is going to be shaped anew"),
+        session_runs.reworded("Stop the session first: the bed is going to be shaped anew"),
         baked,
         linked,
     )
 
+    #: Displays the shape on a bed; returns what `shape_show` does.
+    display: Callable[[Any, Any], Any]
     fit: bpy.props.EnumProperty(
         name="Size", description="Placement on the bed", items=FITS, default=DEFAULT.fit
     )
@@ -72,10 +74,6 @@ class Shaped(Action):
         words = localize("{}; displayed to within {:.2g} µm", laid.describe(), off * 1e6)
         running.set_message(words, bed.session_uid)
         self.report({"WARNING" if lost else "INFO"}, words)
-
-    def display(self, context: Any, bed: Any) -> Any:
-        """Display the shape; return what `shape_show` does."""
-        raise NotImplementedError
 
     def shape(self, file: str, bed: Any, **more: Any) -> Shape:
         """Return how the shape of a file or an object is laid onto the bed, with more fields of `Shape`."""
@@ -149,34 +147,22 @@ class ShapeSample(Shaped, bpy.types.Operator):
         return shape_show.show_file(bed, self.shape(self.sample, bed))
 
 
-class KeepShape(Action, bpy.types.Operator):
+@action("digiclay.shape_keep", "Keep Formed as Shape", no_bed, session_runs, options=("UNDO",))
+def keep_shape(operator: Any, context: Any) -> None:
     """Make the formed surface the bed's shape: sessions begin with it, elastic and viscous beds keep to it"""
-
-    bl_idname = "digiclay.shape_keep"
-    bl_label = "Keep Formed as Shape"
-    bl_options = {"UNDO"}
-    needs = no_bed, session_runs
-
-    def perform(self, context: Any) -> None:
-        bed = bed_of(context)
-        scene = properties.scene_of(bed)
-        heights = bridge.read_cells(bed.data)["height"]
-        shape = replace(scene.shape or DEFAULT, file="Formed", fit="placed", heights=pack(heights))
-        properties.write_scene(bed, replace(scene, shape=shape))
-        words = localize("{} has a shape of {} heights: sessions begin with it", bed.name, heights.size)
-        self.report({"INFO"}, words)
+    bed = bed_of(context)
+    scene = properties.scene_of(bed)
+    heights = bridge.read_cells(bed.data)["height"]
+    shape = replace(scene.shape or DEFAULT, file="Formed", fit="placed", heights=pack(heights))
+    properties.write_scene(bed, replace(scene, shape=shape))
+    words = localize("{} has a shape of {} heights: sessions begin with it", bed.name, heights.size)
+    operator.report({"INFO"}, words)
 
 
-class RemoveShape(Action, bpy.types.Operator):
+@action("digiclay.shape_remove", "Remove Shape", no_bed, session_runs, no_shape, options=("UNDO",))
+def remove_shape(operator: Any, context: Any) -> None:
     """Remove the bed's shape: sessions begin at rest; the formed surface stays until then"""
-
-    bl_idname = "digiclay.shape_remove"
-    bl_label = "Remove Shape"
-    bl_options = {"UNDO"}
-    needs = no_bed, session_runs, no_shape
-
-    def perform(self, context: Any) -> None:
-        settings = bed_of(context).digiclay
-        settings.use_shape = False
-        settings.shape.heights = ""
-        settings.shape.file = DEFAULT.file
+    settings = bed_of(context).digiclay
+    settings.use_shape = False
+    settings.shape.heights = ""
+    settings.shape.file = DEFAULT.file

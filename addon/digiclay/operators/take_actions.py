@@ -14,7 +14,7 @@ from ..recorded.pointer_strokes import play_strokes, read_strokes
 from ..roles import bed_of
 from ..sessions import running, sculpting
 from ..ui_text import localize
-from .action import Action, FileAction
+from .action import Action, FileAction, action
 from .poll_messages import baked, cannot_record, linked, no_bed, no_recording, no_take, session_runs
 
 
@@ -28,18 +28,12 @@ class ChosenTake:
         return takes.find(bed_of(context), self.take)
 
 
-class RecordTake(Action, bpy.types.Operator):
+@action("digiclay.take_record", "Record Take", cannot_record)
+def record_take(operator: Any, context: Any) -> None:
     """Record the fingertip's path from now on, to replay, bake or export it"""
-
-    bl_idname = "digiclay.take_record"
-    bl_label = "Record Take"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = (cannot_record,)
-
-    def perform(self, context: Any) -> None:
-        session = running.find(bed_of(context))
-        assert session is not None  # by the poll
-        running.put(sculpting.set_recording(session, True))
+    session = running.find(bed_of(context))
+    assert session is not None  # by the poll
+    running.put(sculpting.set_recording(session, True))
 
 
 class KeepTake(Action, bpy.types.Operator):

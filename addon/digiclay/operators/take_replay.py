@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,7 +40,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     bl_idname = "digiclay.take_replay"
     bl_label = "Replay Take"
     bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, partial(session_runs, message="Stop the session on this bed first"), no_take
+    needs = no_bed, session_runs.reworded("Stop the session on this bed first"), no_take
 
     parts: bpy.props.IntProperty(
         name="Finer Steps",

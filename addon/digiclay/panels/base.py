@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Callable
 from typing import Any
 
+from ..compat import bpy
 from ..device.view import bed_of, is_edited
 
-__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_property", "is_edited"]
+__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_property", "is_edited", "panel"]
 
 CATEGORY = "Digital Clay"
 #: Letters a line of the sidebar holds at its usual width.
@@ -29,6 +31,22 @@ class Panel:
     def poll(cls, context: Any) -> bool:
         """Show the panel when there is a bed it can be about."""
         return bed_of(context) is not None
+
+
+def panel(
+    idname: str, label: str, order: int, *, closed: bool = True
+) -> Callable[[Callable[[Any, Any], None]], Any]:
+    """Return a decorator that makes a panel of its `draw`."""
+
+    def make(draw: Callable[[Any, Any], None]) -> Any:
+        entries = {
+            "bl_idname": idname, "bl_label": label, "bl_order": order, "draw": draw,
+            "bl_options": {"DEFAULT_CLOSED"} if closed else set(), "__doc__": draw.__doc__,
+            "__module__": draw.__module__,
+        }  # fmt: skip
+        return type(draw.__name__, (Panel, bpy.types.Panel), entries)
+
+    return make
 
 
 def draw_lines(layout: Any, words: str, icon: str) -> None:

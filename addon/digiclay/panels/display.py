@@ -20,7 +20,7 @@ from ..overlay import views
 from ..sessions import running
 from ..settings import properties
 from ..ui_text import localize
-from .base import Panel, bed_of, draw_property, is_edited
+from .base import bed_of, draw_property, is_edited, panel
 
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
@@ -149,44 +149,39 @@ class Display(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
-class DisplayPanel(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_display", "Display", 30, closed=False)
+def display(sidebar: Any, context: Any) -> None:
     """Display of the bed; a disabled item takes no time."""
-
-    bl_label = "Display"
-    bl_idname = "DIGICLAY_PT_display"
-    bl_order = 30
-
-    def draw(self, context: Any) -> None:
-        bed, layout = bed_of(context), self.layout
-        layout.enabled = not is_edited(context)
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        shown, drawn = bed.digiclay_display, view.is_drawn(bed)
-        if not drawn:
-            layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
-        column = layout.column()
-        column.enabled = drawn
-        skin = column.column()
-        skin.enabled = form.can_show_skin(bed)
-        draw_property(skin, shown, "form")
-        draw_property(skin, shown, "skin", shown.form != "pins", expand=True)
-        draw_property(column, shown, "color", expand=True)
-        draw_property(column, shown, "top_force", shown.color == "force")
-        draw_property(column, shown, "arrows")
-        draw_property(column, shown, "arrow_length", shown.arrows)
-        draw_property(layout, shown, "overlay")
-        column = layout.column()
-        column.active = shown.overlay
-        draw_property(column, shown, "overlay_full")
-        draw_property(column, shown, "seconds", shown.overlay_full)
-        pins = ", ".join(map(str, view.picked_pins(bed)))
-        column.label(text=localize("Picked pins: {}", pins or localize("none")))
-        row = column.row(align=True)
-        row.operator("digiclay.pick_pins")
-        row.operator("digiclay.clear_pins")
+    bed, layout = bed_of(context), sidebar.layout
+    layout.enabled = not is_edited(context)
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    shown, drawn = bed.digiclay_display, view.is_drawn(bed)
+    if not drawn:
+        layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
+    column = layout.column()
+    column.enabled = drawn
+    skin = column.column()
+    skin.enabled = form.can_show_skin(bed)
+    draw_property(skin, shown, "form")
+    draw_property(skin, shown, "skin", shown.form != "pins", expand=True)
+    draw_property(column, shown, "color", expand=True)
+    draw_property(column, shown, "top_force", shown.color == "force")
+    draw_property(column, shown, "arrows")
+    draw_property(column, shown, "arrow_length", shown.arrows)
+    draw_property(layout, shown, "overlay")
+    column = layout.column()
+    column.active = shown.overlay
+    draw_property(column, shown, "overlay_full")
+    draw_property(column, shown, "seconds", shown.overlay_full)
+    pins = ", ".join(map(str, view.picked_pins(bed)))
+    column.label(text=localize("Picked pins: {}", pins or localize("none")))
+    row = column.row(align=True)
+    row.operator("digiclay.pick_pins")
+    row.operator("digiclay.clear_pins")
 
 
-CLASSES = (DisplayPanel,)
+CLASSES = (display,)
 
 
 def register() -> None:

@@ -15,7 +15,7 @@ from ..settings.declared import WHOLE, title
 from ..settings.groups import method_of, method_property
 from ..settings.properties import part_group
 from ..ui_text import localize
-from .base import Panel, bed_of, draw_lines, is_edited
+from .base import Panel, bed_of, draw_lines, is_edited, panel
 
 #: Kinds of properties whose label stands beside the field.
 BESIDE = {"ENUM", "STRING"}
@@ -58,61 +58,42 @@ class Presets(bpy.types.Menu):
             self.layout.operator("digiclay.preset_apply", text=name).preset = name
 
 
-class Device(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_device", "Device", 70)
+def device(sidebar: Any, context: Any) -> None:
     """Type of device."""
-
-    bl_idname = "DIGICLAY_PT_device"
-    bl_label = "Device"
-    bl_order = 70
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: Any) -> None:
-        """Draw the presets, and the remedy for a bed that differs from its settings."""
-        bed = bed_of(context)
-        settings = bed.digiclay
-        row = self.layout.row(align=True)
-        row.menu(Presets.bl_idname, text=settings.own_preset or title(settings.preset))
-        row.operator("digiclay.preset_save", text="", icon="ADD")
-        row.operator("digiclay.preset_remove", text="", icon="REMOVE")
-        reason = properties.rebuild_reason(bed)
-        if reason:
-            column = self.layout.column()
-            column.alert = True
-            column.label(text=reason, icon="ERROR")
-        self.layout.operator("digiclay.rebuild", icon="FILE_REFRESH")
+    bed = bed_of(context)
+    settings = bed.digiclay
+    row = sidebar.layout.row(align=True)
+    row.menu(Presets.bl_idname, text=settings.own_preset or title(settings.preset))
+    row.operator("digiclay.preset_save", text="", icon="ADD")
+    row.operator("digiclay.preset_remove", text="", icon="REMOVE")
+    reason = properties.rebuild_reason(bed)
+    if reason:
+        column = sidebar.layout.column()
+        column.alert = True
+        column.label(text=reason, icon="ERROR")
+    sidebar.layout.operator("digiclay.rebuild", icon="FILE_REFRESH")
 
 
-class Finger(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_finger", "Finger", 20, closed=False)
+def finger(sidebar: Any, context: Any) -> None:
     """Fingertip parameters."""
-
-    bl_idname = "DIGICLAY_PT_finger"
-    bl_label = "Finger"
-    bl_order = 20
-
-    def draw(self, context: Any) -> None:
-        """Draw a hint if there is none."""
-        if not bed_of(context).digiclay.use_fingertip:
-            self.layout.label(text="Omitted: nothing touches the bed", icon="INFO")
+    if not bed_of(context).digiclay.use_fingertip:
+        sidebar.layout.label(text="Omitted: nothing touches the bed", icon="INFO")
 
 
-class Control(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_control", "Control", 80)
+def control(sidebar: Any, context: Any) -> None:
     """Control of the cells."""
-
-    bl_idname = "DIGICLAY_PT_control"
-    bl_label = "Control"
-    bl_order = 80
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: Any) -> None:
-        settings = bed_of(context).digiclay
-        row = self.layout.row()
-        row.active, row.enabled = settings.use_control, not is_edited(context)
-        row.prop(settings, method_property(settings))
-        method = method_of(settings)
-        if method not in list_methods():
-            draw_lines(
-                self.layout, localize("{}: no such method is loaded. See the preferences", method), "ERROR"
-            )
+    settings = bed_of(context).digiclay
+    row = sidebar.layout.row()
+    row.active, row.enabled = settings.use_control, not is_edited(context)
+    row.prop(settings, method_property(settings))
+    method = method_of(settings)
+    if method not in list_methods():
+        draw_lines(
+            sidebar.layout, localize("{}: no such method is loaded. See the preferences", method), "ERROR"
+        )
 
 
 def section_panel(section: str, parent: str, order: int, words: str = "", closed: bool = True) -> type:
@@ -179,14 +160,14 @@ PARTS = (
 CLASSES = (
     Presets,
     Start,
-    Device,
-    *(section_panel(section, Device.bl_idname, order) for order, section in enumerate(PARTS)),
-    Finger,
-    section_panel("fingertip", Finger.bl_idname, 0, words="Size", closed=False),
-    Control,
-    section_panel("control", Control.bl_idname, 0, words="Gains and Thresholds"),
-    section_panel("blister", Control.bl_idname, 1),
-    section_panel("sensors", Control.bl_idname, 2),
-    section_panel("simulation", Control.bl_idname, 3, words="Time Steps"),
-    section_panel("recorder", Control.bl_idname, 4),
+    device,
+    *(section_panel(section, device.bl_idname, order) for order, section in enumerate(PARTS)),
+    finger,
+    section_panel("fingertip", finger.bl_idname, 0, words="Size", closed=False),
+    control,
+    section_panel("control", control.bl_idname, 0, words="Gains and Thresholds"),
+    section_panel("blister", control.bl_idname, 1),
+    section_panel("sensors", control.bl_idname, 2),
+    section_panel("simulation", control.bl_idname, 3, words="Time Steps"),
+    section_panel("recorder", control.bl_idname, 4),
 )

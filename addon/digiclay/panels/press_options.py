@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from ..compat import bpy
@@ -9,59 +10,46 @@ from ..press.brush import tool_settings
 from ..press.tool import draw_presets
 
 
-class Popover:
-    """Mixin of a panel that opens from the tool's header."""
+def popover(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], Any]:
+    """Return a decorator that makes a panel, opened from the tool's header, of what draws its settings."""
 
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "HEADER"
-    bl_ui_units_x = 12
+    def make(draw_settings: Callable[[Any, Any], None]) -> Any:
+        def draw(panel: Any, context: Any) -> None:
+            panel.layout.use_property_split = True
+            panel.layout.use_property_decorate = False
+            settings = tool_settings(context)
+            if settings is not None:
+                draw_settings(panel.layout.column(), settings)
 
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Show it while the tool is in hand."""
-        return tool_settings(context) is not None
+        entries = {
+            "bl_idname": idname, "bl_label": label, "bl_space_type": "VIEW_3D", "bl_region_type": "HEADER",
+            "bl_ui_units_x": 12, "draw": draw, "__doc__": draw_settings.__doc__, "__module__": __name__,
+            "poll": classmethod(lambda cls, context: tool_settings(context) is not None),
+        }  # fmt: skip
+        return type(draw_settings.__name__, (bpy.types.Panel,), entries)
 
-    def draw(self, context: Any) -> None:
-        """Draw its settings in a column."""
-        layout: Any = self.layout  # type: ignore[attr-defined]
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        settings = tool_settings(context)
-        if settings is not None:
-            self.draw_settings(layout.column(), settings)
-
-    def draw_settings(self, column: Any, settings: Any) -> None:
-        """Draw the tool's settings that it holds."""
-        raise NotImplementedError
+    return make
 
 
-class StrokeOptions(Popover, bpy.types.Panel):
+@popover("DIGICLAY_PT_press_stroke", "Stroke")
+def stroke_options(column: Any, settings: Any) -> None:
     """Path, stabilizer and symmetry of a stroke."""
-
-    bl_label = "Stroke"
-    bl_idname = "DIGICLAY_PT_press_stroke"
-
-    def draw_settings(self, column: Any, settings: Any) -> None:
-        draw_presets(column)  # a narrow header has them here alone
-        column.prop(settings, "path")
-        row = column.column()
-        row.enabled = settings.path == "FREE"
-        row.prop(settings, "stabilizer")
-        column.prop(settings, "symmetry")
+    draw_presets(column)  # a narrow header has them here alone
+    column.prop(settings, "path")
+    row = column.column()
+    row.enabled = settings.path == "FREE"
+    row.prop(settings, "stabilizer")
+    column.prop(settings, "symmetry")
 
 
-class PenOptions(Popover, bpy.types.Panel):
+@popover("DIGICLAY_PT_press_pen", "Pen")
+def pen_options(column: Any, settings: Any) -> None:
     """Effects of a pen's pressure and tilt."""
-
-    bl_label = "Pen"
-    bl_idname = "DIGICLAY_PT_press_pen"
-
-    def draw_settings(self, column: Any, settings: Any) -> None:
-        column.prop(settings, "use_pressure")
-        row = column.column()
-        row.enabled = settings.use_pressure
-        row.prop(settings, "pressure_curve")
-        column.prop(settings, "use_tilt")
+    column.prop(settings, "use_pressure")
+    row = column.column()
+    row.enabled = settings.use_pressure
+    row.prop(settings, "pressure_curve")
+    column.prop(settings, "use_tilt")
 
 
-CLASSES = (StrokeOptions, PenOptions)
+CLASSES = (stroke_options, pen_options)

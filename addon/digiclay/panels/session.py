@@ -4,48 +4,42 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..compat import bpy
 from ..live import bed_state, follow
 from ..overlay.sections import error_message
 from ..recorded import bake, takes
 from ..sessions import running
 from ..sessions.running import Running
 from ..ui_text import localize
-from .base import Panel, bed_of, draw_lines
+from .base import bed_of, draw_lines, panel
 
 
-class Session(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_session", "Session", 10, closed=False)
+def session_panel(sidebar: Any, context: Any) -> None:
     """Live sculpting."""
-
-    bl_idname = "DIGICLAY_PT_session"
-    bl_label = "Session"
-    bl_order = 10
-
-    def draw(self, context: Any) -> None:
-        bed = bed_of(context)
-        session, column = running.find(bed), self.layout.column(align=True)
-        if session is None:
-            kept = bed_state.read_snapshot(bed) is not None
-            words = "Go On Sculpting" if kept else "Start Sculpting"
-            row = column.row(align=True)
+    bed = bed_of(context)
+    session, column = running.find(bed), sidebar.layout.column(align=True)
+    if session is None:
+        kept = bed_state.read_snapshot(bed) is not None
+        words = "Go On Sculpting" if kept else "Start Sculpting"
+        row = column.row(align=True)
+        row.scale_y = 1.4
+        row.operator("digiclay.session", text=words, icon="PLAY")
+        column.operator("digiclay.session_reset", icon="LOOP_BACK")
+    else:
+        if context.mode != "OBJECT":
+            row = column.row()
             row.scale_y = 1.4
-            row.operator("digiclay.session", text=words, icon="PLAY")
-            column.operator("digiclay.session_reset", icon="LOOP_BACK")
-        else:
-            if context.mode != "OBJECT":
-                row = column.row()
-                row.scale_y = 1.4
-                row.operator("digiclay.leave_mode", icon="LOOP_BACK")
-            _buttons(column, session)
-            _server(self.layout, session)
-            _numbers(self.layout, session)
-        said = (
-            session.blocking_reason and localize("Waits: {}", session.blocking_reason)
-            if session
-            else running.last_message(bed)
-        )
-        if said:
-            draw_lines(self.layout, said, "ERROR" if session else "INFO")
+            row.operator("digiclay.leave_mode", icon="LOOP_BACK")
+        _buttons(column, session)
+        _server(sidebar.layout, session)
+        _numbers(sidebar.layout, session)
+    said = (
+        session.blocking_reason and localize("Waits: {}", session.blocking_reason)
+        if session
+        else running.last_message(bed)
+    )
+    if said:
+        draw_lines(sidebar.layout, said, "ERROR" if session else "INFO")
 
 
 def _buttons(column: Any, session: Running) -> None:
@@ -97,39 +91,32 @@ def error_line(session: Running) -> str:
     return error_message((errors.height, errors.force) if errors else None)
 
 
-class Takes(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_takes", "Takes", 50)
+def takes_panel(sidebar: Any, context: Any) -> None:
     """Takes of the bed, and its bake."""
-
-    bl_label = "Takes"
-    bl_idname = "DIGICLAY_PT_takes"
-    bl_order = 50
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: Any) -> None:
-        """Draw the recording, the list of takes, strokes from a file, and the bake."""
-        layout, bed = self.layout, bed_of(context)
-        session = running.find(bed)
-        if session is not None and session.recording is not None:
-            seconds = (len(session.recording.path) - 1) * session.system.period
-            layout.operator(
-                "digiclay.take_keep", text=localize("Keep Take ({:.1f} s)", seconds), icon="CHECKMARK"
-            )
-        else:
-            layout.operator("digiclay.take_record", icon="RECORD_ON")
-        for entry in takes.list_takes(bed):
-            row = layout.row(align=True)
-            row.label(text=f"{entry.name} ({entry.seconds:.1f} s)", icon="TRACKING")
-            row.operator("digiclay.take_replay", text="", icon="PLAY").take = entry.number
-            baking = row.operator("digiclay.bake", text="", icon="RENDER_ANIMATION")
-            baking.source, baking.take = "TAKE", entry.number
-            row.operator("digiclay.take_export", text="", icon="EXPORT").take = entry.number
-            row.operator("digiclay.take_remove", text="", icon="X").take = entry.number
-        layout.operator("digiclay.play_strokes", icon="CURVE_PATH")
-        layout.separator()
-        if bake.is_baked(bed):
-            layout.operator("digiclay.bake_free", icon="TRASH")
-        else:
-            layout.operator("digiclay.bake", text="Bake Animated Fingertip").source = "FINGERTIP"
+    layout, bed = sidebar.layout, bed_of(context)
+    session = running.find(bed)
+    if session is not None and session.recording is not None:
+        seconds = (len(session.recording.path) - 1) * session.system.period
+        layout.operator(
+            "digiclay.take_keep", text=localize("Keep Take ({:.1f} s)", seconds), icon="CHECKMARK"
+        )
+    else:
+        layout.operator("digiclay.take_record", icon="RECORD_ON")
+    for entry in takes.list_takes(bed):
+        row = layout.row(align=True)
+        row.label(text=f"{entry.name} ({entry.seconds:.1f} s)", icon="TRACKING")
+        row.operator("digiclay.take_replay", text="", icon="PLAY").take = entry.number
+        baking = row.operator("digiclay.bake", text="", icon="RENDER_ANIMATION")
+        baking.source, baking.take = "TAKE", entry.number
+        row.operator("digiclay.take_export", text="", icon="EXPORT").take = entry.number
+        row.operator("digiclay.take_remove", text="", icon="X").take = entry.number
+    layout.operator("digiclay.play_strokes", icon="CURVE_PATH")
+    layout.separator()
+    if bake.is_baked(bed):
+        layout.operator("digiclay.bake_free", icon="TRASH")
+    else:
+        layout.operator("digiclay.bake", text="Bake Animated Fingertip").source = "FINGERTIP"
 
 
-CLASSES = (Session, Takes)
+CLASSES = (session_panel, takes_panel)

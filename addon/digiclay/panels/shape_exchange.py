@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..compat import bpy
 from ..exchange import formed_bed
-from .base import Panel, bed_of, is_edited
+from .base import bed_of, is_edited, panel
 
 #: Property of a bed that holds the list of its features; the operator that lists them writes it.
 LISTED = "digiclay_features"
@@ -14,75 +13,62 @@ LISTED = "digiclay_features"
 MOST = 24
 
 
-class Shapes(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_shapes", "Shapes", 40)
+def shapes(sidebar: Any, context: Any) -> None:
     """Initial shape of the bed."""
-
-    bl_idname = "DIGICLAY_PT_shapes"
-    bl_label = "Shapes"
-    bl_order = 40
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: Any) -> None:
-        """Draw the ways in, what is displayed, and the way out."""
-        settings = bed_of(context).digiclay
-        self.layout.enabled = not is_edited(context)
-        column = self.layout.column(align=True)
-        column.operator("digiclay.shape_from_object", icon="OBJECT_DATA")
-        column.operator_context = "INVOKE_DEFAULT"
-        column.operator("digiclay.shape_from_file", text="Shape from File...", icon="FILE_FOLDER")
-        column.operator_menu_enum("digiclay.shape_sample", "sample", text="Sample Shape", icon="RNDCURVE")
-        if not settings.use_shape:
-            self.layout.label(text="No shape: sessions begin at rest", icon="INFO")
-        else:
-            self._displayed(settings)
-        column = self.layout.column(align=True)
-        column.operator("digiclay.shape_keep", icon="PINNED")
-        column.operator("mesh.digital_clay_make", icon="OUTLINER_OB_MESH")
-
-    def _displayed(self, settings: Any) -> None:
-        """Draw what is displayed, and how the surface gets there."""
-        shape, box = settings.shape, self.layout.box()
-        row = box.row()
-        row.label(text=shape.file or "Formed", icon="RNDCURVE")
-        row.operator("digiclay.shape_remove", text="", icon="X")
-        column = box.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
-        column.prop(shape, "refresh")
-        if shape.refresh != "one_time":
-            column.prop(shape, "surfaces")
+    settings = bed_of(context).digiclay
+    sidebar.layout.enabled = not is_edited(context)
+    column = sidebar.layout.column(align=True)
+    column.operator("digiclay.shape_from_object", icon="OBJECT_DATA")
+    column.operator_context = "INVOKE_DEFAULT"
+    column.operator("digiclay.shape_from_file", text="Shape from File...", icon="FILE_FOLDER")
+    column.operator_menu_enum("digiclay.shape_sample", "sample", text="Sample Shape", icon="RNDCURVE")
+    if not settings.use_shape:
+        sidebar.layout.label(text="No shape: sessions begin at rest", icon="INFO")
+    else:
+        _draw_shape(sidebar.layout, settings.shape)
+    column = sidebar.layout.column(align=True)
+    column.operator("digiclay.shape_keep", icon="PINNED")
+    column.operator("mesh.digital_clay_make", icon="OUTLINER_OB_MESH")
 
 
-class Export(Panel, bpy.types.Panel):
+def _draw_shape(layout: Any, shape: Any) -> None:
+    """Draw what is displayed, and how the surface gets there."""
+    box = layout.box()
+    row = box.row()
+    row.label(text=shape.file or "Formed", icon="RNDCURVE")
+    row.operator("digiclay.shape_remove", text="", icon="X")
+    column = box.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.prop(shape, "refresh")
+    if shape.refresh != "one_time":
+        column.prop(shape, "surfaces")
+
+
+@panel("DIGICLAY_PT_export", "Export", 60)
+def export(sidebar: Any, context: Any) -> None:
     """Formed surface as meshes."""
-
-    bl_idname = "DIGICLAY_PT_export"
-    bl_label = "Export"
-    bl_order = 60
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: Any) -> None:
-        """Draw the list of features, and what can be done."""
-        bed, layout = bed_of(context), self.layout
-        column = layout.column(align=True)
-        column.operator("digiclay.find_features", icon="VIEWZOOM")
-        lines = str(bed.get(LISTED, "")).splitlines()
-        if lines:
-            listed = column.box().column(align=True)
-            listed.scale_y = 0.8
-            for line in lines[:MOST]:
-                listed.label(text=line)
-            if len(lines) > MOST:
-                listed.label(text="...")
-        kept = formed_bed.has_reference(bed)
-        column = layout.column(align=True)
-        column.label(text="Measured from the kept surface" if kept else "Measured from the bed at rest")
-        row = column.row(align=True)
-        row.operator("digiclay.keep_surface")
-        row.operator("digiclay.forget_surface")
-        column = layout.column(align=True)
-        column.operator_menu_enum("mesh.digital_clay_make", "kind", text="Make Mesh", icon="MESH_DATA")
-        column.menu("DIGICLAY_MT_export", text="Export", icon="EXPORT")
+    bed, layout = bed_of(context), sidebar.layout
+    column = layout.column(align=True)
+    column.operator("digiclay.find_features", icon="VIEWZOOM")
+    lines = str(bed.get(LISTED, "")).splitlines()
+    if lines:
+        listed = column.box().column(align=True)
+        listed.scale_y = 0.8
+        for line in lines[:MOST]:
+            listed.label(text=line)
+        if len(lines) > MOST:
+            listed.label(text="...")
+    kept = formed_bed.has_reference(bed)
+    column = layout.column(align=True)
+    column.label(text="Measured from the kept surface" if kept else "Measured from the bed at rest")
+    row = column.row(align=True)
+    row.operator("digiclay.keep_surface")
+    row.operator("digiclay.forget_surface")
+    column = layout.column(align=True)
+    column.operator_menu_enum("mesh.digital_clay_make", "kind", text="Make Mesh", icon="MESH_DATA")
+    column.menu("DIGICLAY_MT_export", text="Export", icon="EXPORT")
 
 
-CLASSES = (Shapes, Export)
+CLASSES = (shapes, export)
