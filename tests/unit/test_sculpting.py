@@ -97,6 +97,13 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
     assert (heights(back) == 40e-3).all()
 
 
+def test_gestures_kept_do_not_grow_in_number() -> None:
+    hand, session = Hand(), started()
+    for _ in range(sculpting.GESTURES + 3):
+        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
+    assert len(session.gestures) == sculpting.GESTURES
+
+
 def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
     hand = Hand()
     session = hand.press(started())
@@ -144,9 +151,6 @@ def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
     session = hand.move(session, [*circle * 16])  # longer than the trace's ten seconds, so that it is full
     assert session.errors is not None
     assert 0.0 < session.errors.height < 1e-4
-    for _ in range(sculpting.GESTURES + 3):
-        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
-    assert len(session.gestures) == sculpting.GESTURES
     tracemalloc.start()
     try:
         floors = []
