@@ -112,7 +112,6 @@ class FileAction(Action):
     """Mixin of an action with a file browser for its `filepath`."""
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Open the file browser."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

@@ -38,7 +38,6 @@ class LongWork(Action):
     work: Callable[[Any], Generator[float, None, None]]
 
     def perform(self, context: Any) -> None:
-        """Do all of the work at once."""
         for _ in self.work(context):
             pass
 

@@ -125,7 +125,6 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         self.layout.prop(self, "beside")
 
     def perform(self, context: Any) -> None:
-        """Make the objects, and select them."""
         bed = chosen_bed(context)
         formed = formed_bed.read_formed(bed)
         bodies = make_bodies(formed, self.model(bed), self.finding())

@@ -42,7 +42,6 @@ class PickPins(Polled, bpy.types.Operator):
     needs = NO_BED, no_view
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Wait for clicks."""
         self.changed = False
         status.show(context, localize(KEYS))
         context.window_manager.modal_handler_add(self)

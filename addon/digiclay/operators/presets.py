@@ -57,10 +57,8 @@ class SavePreset(Action, bpy.types.Operator):
     )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Open the dialog for the name."""
         self.name = bed_of(context).digiclay.own_preset
-        result: set[str] = context.window_manager.invoke_props_dialog(self)
-        return result
+        return set(context.window_manager.invoke_props_dialog(self))
 
     def perform(self, context: Any) -> None:
         bed = bed_of(context)
@@ -77,9 +75,7 @@ class RemovePreset(Action, bpy.types.Operator):
     needs = no_bed, no_own_preset
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Ask for confirmation."""
-        result: set[str] = context.window_manager.invoke_confirm(self, event)
-        return result
+        return set(context.window_manager.invoke_confirm(self, event))
 
     def perform(self, context: Any) -> None:
         """Remove it; the bed keeps its parameters."""

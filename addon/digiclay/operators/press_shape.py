@@ -42,7 +42,6 @@ class PressShape(Drawing, bpy.types.Operator):
     needs = (_no_shape,)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Begin where the mouse points."""
         target = find_pressed(self, context, brush.find_press(context, event))
         if target is None:
             return NOT_PRESSED
@@ -86,7 +85,6 @@ class PressShape(Drawing, bpy.types.Operator):
         self.region.tag_redraw()
 
     def draw_view(self, area: Any) -> None:
-        """Draw the path and its mirror images on the pins."""
         context = bpy.context
         bed, settings = brush.find_bed(context, self.uid), brush.tool_settings(context)
         if bed is None or settings is None or context.area != area:

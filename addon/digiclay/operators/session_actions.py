@@ -125,9 +125,7 @@ class FollowServer(Action, bpy.types.Operator):
     )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Ask for address and token."""
-        result: set[str] = context.window_manager.invoke_props_dialog(self)
-        return result
+        return set(context.window_manager.invoke_props_dialog(self))
 
     def perform(self, context: Any) -> None:
         uid = _session(context)[1].uid

@@ -56,7 +56,6 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         self._finish(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Play it in the window."""
         self._begin(context)
         manager, rate = context.window_manager, preferences.get(context).redraw_rate
         self._timer = manager.event_timer_add(1.0 / rate, window=context.window)

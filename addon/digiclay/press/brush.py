@@ -56,25 +56,16 @@ def _same(one: Fingertip, other: Fingertip) -> bool:
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.
 ADJUSTING = frozenset({"DIGICLAY_OT_press_size", "DIGICLAY_OT_press_depth", "DIGICLAY_OT_press_strength"})
-LABELS = {Brush.LOWER: "Lower", Brush.RAISE: "Raise", Brush.LEVEL: "Level", Brush.SMOOTH: "Smooth"}
-BRUSH_ITEMS = (
-    ("LOWER", LABELS[Brush.LOWER], "Press a valley of the given depth. With Ctrl: Raise"),
-    (
-        "RAISE",
-        LABELS[Brush.RAISE],
-        "Press lightly, lift the blister by the given height, and draw it along: a ridge. With Ctrl: Lower",
-    ),
-    (
-        "LEVEL",
-        LABELS[Brush.LEVEL],
-        "Bring hills and hollows to the height of the surface under the first touch",
-    ),
-    (
-        "SMOOTH",
-        LABELS[Brush.SMOOTH],
-        "Drive the pins in the ring to smoothed heights, without a touch. Shift and drag: with any brush",
-    ),
-)
+LABELS = {brush: brush.value.title() for brush in Brush}
+BRUSH_WORDS = {
+    Brush.LOWER: "Press a valley of the given depth. With Ctrl: Raise",
+    Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge. "
+    "With Ctrl: Lower",
+    Brush.LEVEL: "Bring hills and hollows to the height of the surface under the first touch",
+    Brush.SMOOTH: "Drive the pins in the ring to smoothed heights, without a touch. "
+    "Shift and drag: with any brush",
+}
+BRUSH_ITEMS = tuple((brush.value, LABELS[brush], words) for brush, words in BRUSH_WORDS.items())
 SYMMETRY_ITEMS = (
     ("NONE", "No Symmetry", "Form the stroke alone"),
     ("X", "X", "Form the stroke, then its mirror image across the bed's YZ plane"),
