@@ -85,7 +85,7 @@ def prepare(file: str, odd: str, live: bool) -> Any:
     if live:
         tick.start(bpy.context, bed)
         running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
-        clock.tick(4)
+        clock.tick(2)
         assert running.find(bed).strokes[0].height is not None  # it has begun
     ODD[odd](bed)
     clock.tick(2)
