@@ -73,14 +73,11 @@ def test_there_are_samples_of_each_format() -> None:
 
 
 @pytest.mark.parametrize("path", WRITTEN, ids=lambda path: f"{path.parent.name}/{path.stem}")
-def test_a_scene_of_an_older_version_is_what_it_was(path: Path) -> None:
-    spelled_out = tomllib.loads(path.read_text(encoding="utf-8"))
-    assert values(load(path)) == spelled_out
-
-
-@pytest.mark.parametrize("path", WRITTEN, ids=lambda path: f"{path.parent.name}/{path.stem}")
-def test_a_scene_of_one_finger_is_written_as_older_versions_read_it(path: Path) -> None:
-    assert without_notes(format_scene(load(path))) == without_notes(path.read_text(encoding="utf-8"))
+def test_a_scene_of_an_older_version_is_what_it_was_and_written_as_older_versions_read_it(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    scene = load(path)
+    assert values(scene) == tomllib.loads(text)
+    assert without_notes(format_scene(scene)) == without_notes(text)
 
 
 @pytest.mark.parametrize("path", BY_HAND, ids=lambda path: path.stem)
@@ -95,26 +92,19 @@ def test_a_scene_written_by_hand_still_resolves_to_the_same_values(path: Path) -
 
 
 @pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
-def test_a_kept_state_of_an_older_version_is_what_it_was(path: Path) -> None:
+def test_a_kept_state_of_an_older_version_is_what_it_was_and_the_session_goes_on_as_it_did(
+    path: Path,
+) -> None:
     system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
     state = snapshot.load(system, path.read_bytes())
-    rows = np.array([state.row(index) for index in range(len(state.rows))])
     assert state.period == known["period"]
-    np.testing.assert_array_equal(rows, known["rows"])
+    np.testing.assert_array_equal([state.row(index) for index in range(len(state.rows))], known["rows"])
     np.testing.assert_array_equal(state.mode(), known["mode"])
     np.testing.assert_array_equal(state.aged, known["aged"])
-
-
-@pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
-def test_a_session_goes_on_from_a_kept_state_of_an_older_version_as_it_did(path: Path) -> None:
-    found, stored = go_on(path), np.load(path.with_suffix(".npz"))
-    np.testing.assert_allclose(found["height"], stored["height"], rtol=0.0, atol=ROUNDING)
-    np.testing.assert_allclose(found["force"], stored["force"], rtol=RELATIVE, atol=ROUNDING)
-
-
-@pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
-def test_the_heights_of_a_kept_state_of_an_older_version_are_taken_up_by_another_session(path: Path) -> None:
-    system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
+    found = go_on(path)
+    np.testing.assert_allclose(found["height"], known["height"], rtol=0.0, atol=ROUNDING)
+    np.testing.assert_allclose(found["force"], known["force"], rtol=RELATIVE, atol=ROUNDING)
+    # Its heights are taken up by another session.
     state = snapshot.transfer_heights(system, path.read_bytes())
     np.testing.assert_array_equal(state.row(0), known["carried_height"])
     np.testing.assert_array_equal(state.mode(), known["carried_mode"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -48,29 +49,27 @@ def test_an_older_sweep_that_is_done_is_shown_as_it_was() -> None:
     assert sorted(path.stem for path in Path("sweep").glob("*.png")) == ["height_error", "lag_mean", "rfd"]
 
 
-def test_an_older_sweep_of_another_scene_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_older_sweep_of_another_scene_is_refused(refused: Any) -> None:
     before = times("sweep/points/*")
-    assert main([*SWEEP, "--set", "contact.stiffness=300"]) == 2
-    assert "sweep holds another sweep (10 points over" in capsys.readouterr().err
+    refused([*SWEEP, "--set", "contact.stiffness=300"], "sweep holds another sweep (10 points over")
     assert times("sweep/points/*") == before
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
-def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table(workers: str) -> None:
-    assert main([*SWEEP, "--out", "anew"]) == 0
+def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table() -> None:
+    assert main([*SWEEP, "--workers", "1", "--out", "anew"]) == 0
     anew, stored = numbers(Path("anew/sweep.csv")), numbers(Path("sweep/sweep.csv"))
     for index in range(1, 10, 2):  # the beds of four rows, which make one stack
         Path(f"sweep/points/{index:06d}.json").unlink()
     Path("sweep/sweep.csv").unlink()
     before = times("sweep/points/*")
-    assert main([*SWEEP, "--workers", workers]) == 0
+    assert main([*SWEEP, "--workers", "2"]) == 0
     assert before.items() <= times("sweep/points/*").items()
     expected = [(anew if index % 2 else stored)[index] for index in range(10)]
     for row, values in zip(numbers(Path("sweep/sweep.csv")), expected, strict=True):
         assert row == pytest.approx(values, rel=1e-9, abs=1e-12)
 
 
-def test_an_older_batch_that_is_done_is_shown_and_none_of_its_jobs_is_done_again() -> None:
+def test_an_older_batch_that_is_done_is_shown_and_one_that_was_stopped_goes_on() -> None:
     before = times("batch/runs/*/*")
     Path("batch/index.html").unlink()
     assert main(BATCH) == 0
@@ -78,13 +77,11 @@ def test_an_older_batch_that_is_done_is_shown_and_none_of_its_jobs_is_done_again
     page = Path("batch/index.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 2
     assert 'href="runs/my-soft/surface.stl"' in page
-
-
-def test_an_older_batch_that_was_stopped_goes_on(here: Path) -> None:
-    shutil.rmtree(here / "batch" / "runs" / "my-firm")
+    shutil.rmtree("batch/runs/my-firm")
     before = times("batch/runs/my-soft/*")
     assert main(BATCH) == 0
     assert times("batch/runs/my-soft/*") == before
-    assert {path.name for path in Path("batch/runs/my-firm").iterdir()} == {
-        path.name for path in Path("batch/runs/my-soft").iterdir()
-    }
+    soft, firm = (
+        {path.name for path in Path("batch/runs", name).iterdir()} for name in ("my-soft", "my-firm")
+    )
+    assert soft == firm

@@ -11,6 +11,7 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.state import State
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, recent_trace, snapshot
 from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
@@ -27,10 +28,8 @@ def pose(x: float = 0.0, z: float = 0.05) -> Floats:
     return np.array([[x, 0.0, z, *LEVEL]])
 
 
-def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
-    """Return the errors a session's monitor finds."""
-    table = {"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}}
-    scene = resolve(table)
+def watched(scene: Scene, finger: Floats) -> tuple[State, list[Errors]]:
+    """Follow a path with a monitor; return the last state and the errors it finds."""
     system, monitor, found = assemble(scene), accuracy.start(scene), []
     assert monitor is not None
     start = begin(system)
@@ -39,8 +38,12 @@ def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
         monitor = accuracy.note(monitor, state, finger[index : index + 2])
         monitor, errors = accuracy.catch_up(monitor, state, 1)
         found += [errors] if errors else []
-    assert index == count - 1
-    return found
+    return state, found
+
+
+def stepped(step: str) -> Scene:
+    """Return the scene with a physics step."""
+    return resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}})
 
 
 def go_on(finger: Floats) -> Floats:
@@ -80,50 +83,32 @@ def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(
         assert SPREAD * sum(number <= tick for number in done) <= sum(sizes[: tick + 1])
 
 
-def test_a_monitor_follows_for_a_stretch_now_and_then() -> None:
-    count = 2 * (STRETCH + PAUSE) + STRETCH * SPREAD
-    assert len(monitored(count, interpolate_path(pose(), pose(z=0.05), count))) == 3
-
-
-def test_the_monitor_finds_the_error_of_a_stretch() -> None:
+def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_ones() -> None:
     # The truth: the same periods at a twentieth of the step. The commands differ by what the errors
     # before them changed, so it is no more than the right size that is asked for.
     finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
-    (found,) = monitored(STRETCH * SPREAD, go_on(finger))
-    fine = assemble(
-        resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "0.05 ms"}})
-    )
-    coarse = assemble(
-        resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "1 ms"}})
-    )
-    *_, exact = simulate_path(fine, begin(fine), finger)
-    *_, state = simulate_path(coarse, begin(coarse), finger)
-    error = np.abs(exact.row(0) - state.row(0)).max()
+    (_, (found,)), (_, (fine, *_)) = (watched(stepped(step), go_on(finger)) for step in ("1 ms", "0.25 ms"))
+    ends = []
+    for step in ("0.05 ms", "1 ms"):
+        system = assemble(stepped(step))
+        *_, state = simulate_path(system, begin(system), finger)
+        ends.append(state.row(0))
+    error = np.abs(ends[0] - ends[1]).max()
     assert 0.3 * error < found.height < 3.0 * error
     assert error > 1e-9
-
-
-def test_a_finer_step_has_smaller_errors() -> None:
-    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
-    coarse, fine = (monitored(STRETCH * SPREAD, go_on(finger), step)[0] for step in ("1 ms", "0.25 ms"))
     # Second order: a quarter of the step has a sixteenth of the error, contact events aside.
-    assert fine.height < coarse.height / 8
-    assert fine.force < coarse.force / 8
+    assert fine.height < found.height / 8
+    assert fine.force < found.force / 8
 
 
-def test_a_monitor_leaves_the_session_alone() -> None:
-    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH * SPREAD)
+def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alone() -> None:
+    count = 2 * (STRETCH + PAUSE) + STRETCH * SPREAD
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), count)
     *_, alone = simulate_path(SYSTEM, begin(SYSTEM), finger)
-    monitor, start = accuracy.start(SCENE), begin(SYSTEM)
-    assert monitor is not None
-    monitor = accuracy.begin_stretch(monitor, start)
-    for index, state in enumerate(simulate_path(SYSTEM, start, finger)):
-        monitor = accuracy.note(monitor, state, finger[index : index + 2])
-        monitor, _ = accuracy.catch_up(monitor, state, 1)
+    state, found = watched(SCENE, finger)
+    assert len(found) == 3
     assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, alone)
     assert recent_trace.measure_total_force(SYSTEM, state) > 0.0
-
-
-def test_a_step_that_cannot_be_halved_has_no_monitor() -> None:
+    # A step that cannot be halved has no monitor.
     table = {"simulation": {"control_period": "1 s", "physics_step": "1 ms"}, "control": "absent"}
     assert accuracy.start(resolve(table)) is None

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,17 +12,10 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.files.file_lock import find_host, find_start, hold_lock, hold_record, may_have_made
 from digiclay.core.files.run_folder import is_unfinished, name_unfinished, remove_abandoned
 
-from tests.other_process import dead
+from tests.other_process import dead, finish, start
 from tests.timeouts import TIMEOUT, wait_until
 
-ADDON = Path(__file__).parents[2] / "addon"
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def names(folder: Path = Path()) -> list[str]:
@@ -33,8 +24,8 @@ def names(folder: Path = Path()) -> list[str]:
 
 
 def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_away() -> None:
-    gone = dead()
-    left = [f".o.{gone}.part", f".o.{gone}@{find_host()}.part"]
+    gone, since = dead(), find_start(os.getpid())
+    left = [f".o.{gone}.part", f".o.{gone}@{find_host()}.part", f".o.{os.getpid()}.part"]
     kept = [
         f".o.{os.getpid()}@{find_host()}.part",  # this one lives
         f".o.{gone}@elsewhere.part",  # nobody knows
@@ -43,23 +34,20 @@ def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_aw
     ]  # fmt: skip
     for name in left + kept:
         Path("d", name).mkdir(parents=True)
+    assert since is not None
+    os.utime(
+        Path("d", left[-1]), (since - 3600.0, since - 3600.0)
+    )  # another process has got its number since
     remove_abandoned(Path("d"), "o")
     assert names(Path("d")) == sorted(kept)
-
-
-def test_a_number_that_another_process_has_got_since_counts_as_gone() -> None:
-    path = Path(f".o.{os.getpid()}.part")
-    path.mkdir()
-    since = find_start(os.getpid())
-    assert since is not None
-    os.utime(path, (since - 3600.0, since - 3600.0))  # before this process was started
-    remove_abandoned(Path(), "o")
-    assert not path.exists()
+    assert not is_unfinished(Path("a/.b.stl"))
+    for kind in ("part", "old", "frames"):
+        assert is_unfinished(name_unfinished(Path("a/b c.stl"), kind))
 
 
 def test_a_process_is_known_by_the_time_it_was_started() -> None:
     before = time.time()
-    process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1000)"])
+    process = start("import time; time.sleep(1000)")
     try:
         since = find_start(process.pid)
         assert since is not None
@@ -69,15 +57,9 @@ def test_a_process_is_known_by_the_time_it_was_started() -> None:
         assert not may_have_made(process.pid, since - 3600.0)
     finally:
         process.kill()
-        process.wait(TIMEOUT)
-    assert find_start(process.pid) is None
+        wait_until(lambda: find_start(process.pid) is None)  # although nobody has asked how it ended
+        finish(process)
     assert not may_have_made(process.pid, time.time())
-
-
-def test_a_process_that_nobody_has_asked_how_it_ended_is_gone() -> None:
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    wait_until(lambda: find_start(process.pid) is None)
-    process.wait(TIMEOUT)
 
 
 def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None:
@@ -105,7 +87,7 @@ def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None
 
 
 def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
-    # Of hundreds of owners in four processes there is one at a time: a file tells who is inside.
+    # Of hundreds of owners in three processes there is one at a time: a file tells who is inside.
     script = (
         "import os\n"
         "from pathlib import Path\n"
@@ -115,18 +97,8 @@ def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
         "        os.close(os.open('inside', os.O_CREAT | os.O_EXCL))\n"
         "        os.unlink('inside')\n"
     )
-    several = [
-        subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": str(ADDON)})
-        for _ in range(3)
-    ]
-    assert [process.wait(TIMEOUT) for process in several] == [0, 0, 0]
+    assert [finish(process)[0] for process in [start(script) for _ in range(3)]] == [0, 0, 0]
     assert names(Path("d")) == []
-
-
-def test_what_is_unfinished_is_known_by_its_name() -> None:
-    for kind in ("part", "old", "frames"):
-        assert is_unfinished(name_unfinished(Path("a/b c.stl"), kind))
-    assert not is_unfinished(Path("a/.b.stl"))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
@@ -139,11 +111,7 @@ def test_a_lock_is_free_as_soon_as_its_process_is_killed() -> None:
         "    print('here', flush=True)\n"
         "    sys.stdin.readline()\n"
     )
-    other = subprocess.Popen(
-        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONPATH": str(ADDON)},
-    )  # fmt: skip
-    assert other.stdout is not None
+    other = start(script)
     assert other.stdout.readline() == "here\n"
     with pytest.raises(OutputError, match="taken"), hold_lock(Path("lock"), "taken"):
         pass

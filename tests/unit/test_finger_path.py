@@ -22,17 +22,16 @@ def errors(final: Floats, rows: NDArray[np.bool_] = ALL, tip: Floats = TIP, away
     return measure_ridge_errors(PLACE, final, tip, rows, away) * 1e3
 
 
-def test_a_ridge_has_its_height_over_the_path() -> None:
+def test_a_ridge_has_its_height_over_the_path_at_each_pin() -> None:
     np.testing.assert_array_equal(errors(np.full(21, 50e-3)), 0.0)
     np.testing.assert_allclose(errors(np.full(21, 51.5e-3)), 1.5, rtol=1e-12)
-
-
-def test_each_pin_is_judged_by_the_height_the_finger_had_there() -> None:
     climbing = TIP.copy()
     climbing[:, 2] += 0.1 * np.linspace(-30e-3, 30e-3, 201)
-    final = 50e-3 + 0.1 * LINE
     # The finger is nearest for 3 mm of its way and 1.5 mm past the pin when it was so last: 0.15 mm higher.
-    np.testing.assert_allclose(errors(final, tip=climbing), -0.15, atol=0.031)
+    np.testing.assert_allclose(errors(50e-3 + 0.1 * LINE, tip=climbing), -0.15, atol=0.031)
+    # 2001 rows are looked at in eight parts alike.
+    fine = np.repeat(TIP, 10, axis=0)
+    np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
 
 
 def test_pins_the_finger_did_not_go_on_from_do_not_count() -> None:
@@ -57,12 +56,6 @@ def test_going_on_after_the_finger_was_lost_does_not_count() -> None:
     counted = measure_ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
     # Of pins 0 to 10, passed before, 11 mm of way must follow before the middle: up to pin 6, at -12 mm.
     assert [int(pin) for pin in np.rint(counted) if pin < 10] == list(range(7))
-
-
-def test_many_rows_are_looked_at_in_parts_alike() -> None:
-    # 2001 rows are eight parts.
-    fine = np.repeat(TIP, 10, axis=0)
-    np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
 
 
 #: Two rows of two cells, at (1, 2) and (4, 6) mm.

@@ -18,7 +18,7 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.snapshot import START
-from digiclay.core.session.take import Take, from_bytes, to_bytes, to_scene
+from digiclay.core.session.take import Take, from_bytes, to_bytes
 
 BED = "[layout]\nrows = 6\ncolumns = 6\n[control]\nmethod = 'elastic'\n"
 #: A thumb and a finger without relaxation.
@@ -57,30 +57,21 @@ def test_a_scene_may_have_two_fingers_and_lasts_as_long_as_the_longest_path() ->
     assert (thumb.trajectory.interpolation, other.trajectory.interpolation) == ("smooth", "linear")
 
 
-@pytest.mark.parametrize("words", [TWO, "finger = []\nsimulation.duration = 1.0\n"])
-def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(words: str) -> None:
-    made = resolve(
-        parse_tables(words + BED) if words.startswith("finger") else parse_tables(BED + words), "bed"
-    )
+@pytest.mark.parametrize("text", [BED + TWO, "finger = []\nsimulation.duration = 1.0\n" + BED])
+def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(text: str) -> None:
+    made = resolve(parse_tables(text), "bed")
     assert resolve(parse_tables(format_scene(made))) == made
 
 
-def test_one_finger_in_a_list_is_the_same_as_one_beside_the_other_sections() -> None:
+def test_a_setting_names_the_only_finger_of_a_list_as_any_other_and_none_of_two(tmp_path: Path) -> None:
     beside = ONE.replace("[[finger]]", "").replace("[finger.", "[")
     assert scene(ONE) == scene(beside)
     assert "[[finger]]" not in format_scene(scene(ONE))
-
-
-def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path: Path) -> None:
     file = tmp_path / "one.toml"
     file.write_text(BED + ONE, encoding="utf-8")
     (finger,) = load(file, [Setting("fingertip.length", "0.009"), Setting("relaxation", "absent")]).fingers
     assert finger.fingertip is not None
     assert (finger.fingertip.length, finger.relaxation) == (9e-3, None)
-
-
-def test_a_setting_for_one_of_two_fingers_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "two.toml"
     file.write_text(BED + TWO, encoding="utf-8")
     with pytest.raises(SceneError, match=r"^--set: fingertip must be left out where there is \[\[finger\]\]"):
         load(file, [Setting("fingertip.length", "9 mm")])
@@ -139,10 +130,3 @@ def test_a_take_keeps_the_path_of_every_finger(words: str) -> None:
     back = from_bytes(to_bytes(take))
     assert np.array_equal(back.poses, take.poses)
     assert (back.scene, back.start, back.end) == (take.scene, take.start, take.end)
-
-
-def test_a_take_from_rest_is_a_scene_with_its_path() -> None:
-    made = scene(ONE)
-    system = assemble(made)
-    (finger,) = to_scene(replace(take_of(made), start=snapshot.dump(system, begin(system))), "take").fingers
-    assert [point.time for point in finger.trajectory.waypoints] == [0.0, pytest.approx(0.015)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import format_scene, resolve
 
-from tests.timeouts import TIMEOUT
+from tests.other_process import finish, start
 
 SMALL = {"layout": {"rows": 5, "columns": 5}, "control": "absent", "simulation": {"duration": "50 ms"}}
 
@@ -29,6 +27,8 @@ def test_a_scene_is_of_tables_of_a_file_a_name_or_nothing(tmp_path: Path) -> Non
 
 
 def test_a_run_has_heights_metrics_and_a_summary() -> None:
+    program = "import sys, digiclay; print({'numpy', 'digiclay.core'} & {*sys.modules})"
+    assert finish(start(program))[1] == "set()\n"  # importing it imports no part of the simulation
     periods: list[tuple[int, int]] = []
     done = digiclay.run(digiclay.scene(SMALL), lambda *counts: periods.append(counts))
     assert periods == [(count, 10) for count in range(1, 11)]
@@ -53,9 +53,3 @@ def test_a_wrong_scene_is_refused_in_one_line(content: Any, message: str) -> Non
         digiclay.scene(content)
     assert str(caught.value).startswith(message)
     assert "\n" not in str(caught.value)
-
-
-def test_importing_it_imports_no_part_of_the_simulation() -> None:
-    program = "import sys, digiclay; print({'numpy', 'digiclay.core'} & {*sys.modules})"
-    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=TIMEOUT)
-    assert said.stdout == "set()\n", said.stderr

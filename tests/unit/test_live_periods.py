@@ -60,12 +60,12 @@ def test_as_much_is_simulated_as_time_goes_by() -> None:
     # Less than a period is owed at the end, whatever has been rounded on the way.
     assert 0.0 <= times[-1] - times[0] - sum(counts) * PERIOD < PERIOD * 1.001
     assert clock.factor == pytest.approx(1.0, abs=2 * PERIOD)
-
-
-def test_more_than_the_most_is_dropped_and_not_made_up_for() -> None:
+    assert len(looked(np.arange(0.0, 100.0, 0.01).tolist())[1].ticks) <= 101  # a second of looks
+    # More than the most is dropped and not made up for; the time of a pause does not count.
     counts, clock = looked([0.0, 10.0, 10.01], most=20)
-    assert counts == [0, 20, 2]
-    assert clock.factor == pytest.approx(0.011, abs=1e-3)
+    assert (counts, clock.factor) == ([0, 20, 2], pytest.approx(0.011, abs=1e-3))
+    _, clock = looked([0.0, 0.02])
+    assert looked([100.0, 100.01], clock=clock.stopped())[0] == [0, 2]
 
 
 def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
@@ -78,23 +78,9 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
         looks.append(took)
     assert max(looks[5:]) < 0.1
     assert 0.1 < clock.factor < 0.25
-
-
-def test_a_machine_too_slow_simulates_for_seven_tenths_of_the_time_and_draws_in_the_rest() -> None:
     _, clock = looked([0.0])
-    count, _ = periods_due(update_cost(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)
     # 101 periods have gone by, and each takes five to simulate: 14 take 70, 15 would take 75.
-    assert count == 14
-
-
-def test_the_time_of_a_pause_does_not_count() -> None:
-    _, clock = looked([0.0, 0.02])
-    assert looked([100.0, 100.01], clock=clock.stopped())[0] == [0, 2]
-
-
-def test_the_clock_does_not_grow() -> None:
-    _, clock = looked(np.arange(0.0, 100.0, 0.01).tolist())
-    assert len(clock.ticks) <= 101  # a second of looks
+    assert periods_due(update_cost(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)[0] == 14
 
 
 def pose(x: float = 0.0, z: float = 0.05) -> Floats:
@@ -109,11 +95,8 @@ def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
     assert np.array_equal(path[0], start)
     np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
     np.testing.assert_allclose(np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16)
-
-
-def test_ways_worked_out_together_are_those_worked_out_one_by_one() -> None:
-    random = np.random.default_rng(2)
-    poses = random.normal(size=(40, 2, 7))
+    # Several ways together are those one by one.
+    poses = np.random.default_rng(2).normal(size=(40, 2, 7))
     poses[..., 3:] /= np.linalg.norm(poses[..., 3:], axis=-1)[..., None]
     parts = np.array([0.0, 0.2, 0.21, 0.7, 1.0])
     alone = [interpolate_poses(np.array(pair), parts)[0] for pair in pairwise(poses)]
@@ -121,12 +104,8 @@ def test_ways_worked_out_together_are_those_worked_out_one_by_one() -> None:
 
 
 def test_a_path_gives_the_same_states_however_many_periods_are_done_at_a_time() -> None:
-    poses = np.concatenate(
-        [
-            interpolate_path(pose(), pose(z=0.035), 40),
-            interpolate_path(pose(z=0.035), pose(0.01, 0.035), 50)[1:],
-        ]
-    )
+    drag = interpolate_path(pose(z=0.035), pose(0.01, 0.035), 50)
+    poses = np.concatenate([interpolate_path(pose(), pose(z=0.035), 40), drag[1:]])
     *_, together = simulate_path(SYSTEM, begin(SYSTEM), poses)
     state = begin(SYSTEM)
     for first in range(0, 90, 7):
@@ -134,33 +113,24 @@ def test_a_path_gives_the_same_states_however_many_periods_are_done_at_a_time() 
     assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, together)
 
 
-@pytest.mark.parametrize(
-    ("given", "wanted"),
-    [
-        ((0.0, 0.0, -50.0), (0.0, 0.0, 0.0)),
-        ((1e9, -1e9, 1e9), (100.0, -100.0, 100.0)),
-        ((0.01, 0.02, 0.03), (0.01, 0.02, 0.03)),
-    ],
-)
-def test_a_finger_stays_where_a_finger_can_be(given: tuple[float, ...], wanted: tuple[float, ...]) -> None:
+def test_a_finger_stays_where_a_finger_can_be() -> None:
     (at,) = pose()
-    at[:3] = given
-    assert clamp_pose(at, 0.1)[:3].tolist() == list(wanted)
+    for given, wanted in (
+        ([0.0, 0.0, -50.0], [0.0, 0.0, 0.0]), ([1e9, -1e9, 1e9], [100.0, -100.0, 100.0]),
+        ([0.01, 0.02, 0.03], [0.01, 0.02, 0.03]),
+    ):  # fmt: skip
+        at[:3] = given
+        assert clamp_pose(at, 0.1)[:3].tolist() == wanted
 
 
-def test_a_trace_never_holds_more_than_its_rows() -> None:
-    trace = recent_trace.start(PERIOD)
-    state = begin(SYSTEM)
+def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it_along() -> None:
+    trace, line = recent_trace.start(PERIOD), [0.0] * 8
     for time in range(5 * ROWS):
-        line = recent_trace.sample(SYSTEM, state, SetPoint(0.4), ())
-        line[0] = time
-        trace = recent_trace.extend(trace, [line])
-    assert len(trace.rows) == ROWS
-    assert trace.time[0] == 4 * ROWS
-
-
-def test_a_trace_spans_ten_seconds_also_with_a_short_control_period() -> None:
-    assert recent_trace.start(1e-4).every * 1e-4 * ROWS >= 10.0
+        trace = recent_trace.extend(trace, [[float(time), *line]])
+    assert (len(trace.rows), trace.time[0]) == (ROWS, 4 * ROWS)
+    assert recent_trace.start(1e-4).every * 1e-4 * ROWS >= 10.0  # seconds
+    trace = recent_trace.extend(recent_trace.start(PERIOD), [[float(time), *line] for time in range(10)])
+    assert recent_trace.extend(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
 def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
@@ -197,8 +167,3 @@ def test_a_pin_that_stays_picked_keeps_its_past() -> None:
     assert other.pins == (9, 4)
     assert np.isnan(other.heights[0, 0])
     assert other.heights[0, 1] == trace.heights[0, 1]
-
-
-def test_time_that_goes_back_takes_the_trace_along() -> None:
-    trace = recent_trace.extend(recent_trace.start(PERIOD), [[float(time)] + [0.0] * 8 for time in range(10)])
-    assert recent_trace.extend(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -49,40 +50,32 @@ def packed_parts(state: State) -> list[Any]:
     return [*(array.tobytes() for array in (*arrays, *kept)), *rest, memory]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str) -> None:
-    system = system_of(method)
+SENSORS = {"sensors": {"delay": 3, "observer": "valve", "height_noise": "1 um"}}  # that remember
+
+
+@pytest.mark.parametrize(
+    ("method", "tables"), [*((method, {}) for method in METHODS), ("virtual_master", SENSORS)], ids=str
+)
+def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str, tables: dict[str, Any]) -> None:
+    system = system_of(method, **tables)
     half = run(system, begin(system), 70)
     data = snapshot.dump(system, half)
+    # 10 rows of float64, the time of aging and a mode for each of 99 cells, and a header.
+    assert len(data) < 2 * 99 * (8 * system.rows.count + 9) + 4000
     taken_up = snapshot.load(system, data)
     assert same(taken_up, half)
     assert same(run(system, taken_up, 90), run(system, half, 90))
 
 
-def test_sensors_that_remember_are_kept_as_well() -> None:
-    system = system_of(sensors={"delay": 3, "observer": "valve", "height_noise": "1 um"})
-    half = run(system, begin(system), 70)
-    taken_up = snapshot.load(system, snapshot.dump(system, half))
-    assert same(run(system, taken_up, 50), run(system, half, 50))
-
-
 def test_kept_bytes_and_the_state_taken_up_are_independent() -> None:
-    system = system_of()
-    state = run(system, begin(system), 70)
-    data = snapshot.dump(system, state)
+    system, data = kept()
     before = bytes(data)
-    run(system, state, 10)
-    assert data == before
     first = run(system, snapshot.load(system, data), 20)
+    assert data == before
     assert same(run(system, snapshot.load(system, data), 20), first)
 
 
-def test_the_bytes_of_a_default_bed_are_few() -> None:
-    system = assemble(resolve({}))
-    # 10 rows of float64, the time of aging and a mode for each of 625 cells, and a header.
-    assert len(snapshot.dump(system, begin(system))) < 625 * (8 * system.rows.count + 9) + 1000
-
-
+@cache
 def kept() -> tuple[System, bytes]:
     """Return a small bed and its state in the middle of a press."""
     system = system_of()
@@ -111,13 +104,10 @@ def test_a_state_of_another_bed_is_refused(tables: dict[str, Any], said: str) ->
 def test_bytes_that_are_no_state_are_refused(data: Any) -> None:
     with pytest.raises(StateError, match="Reset the session"):
         snapshot.load(system_of(), data)
-
-
-@pytest.mark.parametrize("cut", [1, 8, 1000, -1])
-def test_a_state_that_was_cut_short_or_added_to_is_refused(cut: int) -> None:
-    system, data = kept()
-    with pytest.raises(StateError):
-        snapshot.load(system, data[:-cut] if cut > 0 else data + b"\0")
+    system, whole = kept()
+    for cut in (whole[:-1], whole[:-8], whole[:-1000], whole + b"\0"):
+        with pytest.raises(StateError):
+            snapshot.load(system, cut)
 
 
 def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
@@ -130,113 +120,78 @@ def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
     return START + len(text).to_bytes(4, "little") + text + data[first + length :]
 
 
+LONG = b"0" * 400
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        (b'"cells": 99', b'"cells": -99'),
-        (b'"cells": 99', b'"cells": 1e99'),
-        (b'"cells": 99', b'"cells": 99999999999999'),
-        (b'"near": ', b'"near": 1'),
-        (b'"peak": ', b'"peak": NaN, "p": '),
+        *((b'"cells": 99', b'"cells": ' + wrong) for wrong in (b"-99", b"1e99", b"99999999999999")),
+        (b'"near": ', b'"near": 1'), (b'"peak": ', b'"peak": NaN, "p": '), (b'"memory"', b'"m"'),
         (b'"memory": ["Master"', b'"memory": ["State"'),
         (b'"memory": ["Master", ', b'"memory": ["Master", 9'),
         (b'"memory": ["Master", ', b'"memory": ["Master", null, '),
-        (b'"arrays": []', b'"arrays": [["O", [1]]]'),
-        (b'"rows": [', b'"rows": ["a", '),
-        (b'"reach": [', b'"reach": [1, '),
-        (b'"memory"', b'"m"'),
-        (b'"memory": ', b'"memory": ' + b"[" * 100_000),
-        (b'"period": 70', b'"period": 1' + b"0" * 400),
-        (b'"peak": ', b'"peak": 1' + b"0" * 400 + b', "p": '),
-        (b'"reach": [', b'"reach": [1' + b"0" * 400 + b', 0, 0], "r": ['),
-        (b'"reach": [', b'"reach": [2e9, 0, 0], "r": ['),
-        (b'"reach": [', b'"reach": [0, 0, 2e9], "r": ['),
+        (b'"arrays": []', b'"arrays": [["O", [1]]]'), (b'"rows": [', b'"rows": ["a", '),
+        (b'"reach": [', b'"reach": [1, '), (b'"memory": ', b'"memory": ' + b"[" * 100_000),
+        (b'"period": 70', b'"period": 1' + LONG), (b'"peak": ', b'"peak": 1' + LONG + b', "p": '),
+        *((b'"reach": [', b'"reach": [' + wrong + b'], "r": [') for wrong in (
+            b"1" + LONG + b", 0, 0", b"2e9, 0, 0", b"0, 0, 2e9",
+        )),
     ],
-)
+)  # fmt: skip
 def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
     system, data = kept()
     with pytest.raises(StateError):
         snapshot.load(system, header_replaced(data, old, new))
 
 
-def put(state: State, name: str, index: Any, value: float) -> None:
-    """Write a number into an array of a state."""
-    (state.active.cells if name == "cells" else getattr(state, name))[index] = value
+IMPOSSIBLE = [("rows", (0, 3), np.nan), ("rows", (0, 3), np.inf), ("rows", (0, 3), -np.inf)]
+IMPOSSIBLE += [("modes", 5, len(Mode)), ("cells", slice(2), 40)]  # gathered twice
+#: Rows: height, opening, command, force.
+IMPOSSIBLE += [
+    (part, (row, 1), value)
+    for part in ("rows", "block")
+    for row, value in ((0, -1e-3), (0, 0.11), (1, 1.1), (1, -1.1), (2, 1.1), (3, 1e154))
+]
 
 
-@pytest.mark.parametrize(
-    ("name", "index", "value"),
-    [
-        *(("rows", (0, 3), value) for value in (np.nan, np.inf, -np.inf)),
-        ("modes", 5, len(Mode)),
-        ("cells", slice(2), 40),  # gathered twice
-    ],
-)
-def test_numbers_no_state_has_are_refused(name: str, index: Any, value: float) -> None:
-    system = system_of()
-    state = run(system, begin(system), 70)
-    put(state, name, index, value)
-    with pytest.raises(StateError, match="no state has"):
-        snapshot.load(system, snapshot.dump(system, state))
-
-
-@pytest.mark.parametrize(
-    ("row", "value"),
-    [
-        ("height", -1e-3),
-        ("height", 0.11),
-        ("opening", 1.1),
-        ("opening", -1.1),
-        ("command", 1.1),
-        ("force", 1e154),
-    ],
-)
-@pytest.mark.parametrize("gathered", [False, True])
-def test_numbers_no_device_can_have_are_refused(row: str, value: float, gathered: bool) -> None:
-    system = system_of()
-    state, rows = run(system, begin(system), 70), system.rows
-    lag = system.cell.lag_rows.start
-    index = {"height": 0, "opening": lag, "command": rows.command, "force": rows.force}[row]
-    (state.active.block if gathered else state.rows)[index, 1] = value
+@pytest.mark.parametrize(("name", "index", "value"), IMPOSSIBLE)
+def test_numbers_no_state_or_device_can_have_are_refused(name: str, index: Any, value: float) -> None:
+    system, data = kept()
+    state = snapshot.load(system, data)
+    if isinstance(index, tuple) and index[1] == 1:
+        rows = (0, system.cell.lag_rows.start, system.rows.command, system.rows.force)
+        index = rows[index[0]], 1
+    array = getattr(state, name) if name in state._fields else getattr(state.active, name)
+    array[index] = value
     with pytest.raises(StateError, match="no state has"):
         snapshot.load(system, snapshot.dump(system, state))
 
 
 def test_pins_at_their_ends_and_valves_fully_open_are_taken_up() -> None:
-    system = system_of()
-    state = run(system, begin(system), 70)
+    system, data = kept()
+    state = snapshot.load(system, data)
     state.rows[0, :2] = 0.0, system.cell.actuator.stroke
     state.rows[system.cell.lag_rows, :2] = state.rows[system.rows.commands, :2] = -1.0, 1.0
     assert same(snapshot.load(system, snapshot.dump(system, state)), state)
+    # A field that is added to a state must be added to what is kept, and to `packed_parts`.
+    assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "active", "memory"}
 
 
-@pytest.mark.parametrize(
-    "tables",
-    [
-        {"control": {"method": "plastic"}},
-        {"relaxation": "absent"},
-        {"simulation": {"control_period": "10 ms"}},
-    ],
-)
-def test_heights_are_carried_over_to_other_parts(tables: dict[str, Any]) -> None:
+def test_heights_are_carried_over_to_other_parts_within_the_stroke() -> None:
     system, data = kept()
     before = snapshot.load(system, data).row(0)
-    other = assemble(resolve({"layout": SIZES, **tables}))
-    state = snapshot.transfer_heights(other, data)
-    assert np.array_equal(state.row(0), before)
-    # Nothing calls the pins back: without a finger they stay where they are.
-    *_, later = periods(other, [path((0.0, 0, 0, 500))], state, 40)
-    assert np.array_equal(later.row(0), before)
-
-
-def test_carried_heights_stay_within_the_stroke_and_with_their_number_of_cells() -> None:
-    _, data = kept()
+    for tables in (
+        {"control": {"method": "plastic"}}, {"relaxation": "absent"},
+        {"simulation": {"control_period": "10 ms"}},
+    ):  # fmt: skip
+        other = assemble(resolve({"layout": SIZES, **tables}))
+        state = snapshot.transfer_heights(other, data)
+        assert np.array_equal(state.row(0), before)
+        # Nothing calls the pins back: without a finger they stay where they are.
+        *_, later = periods(other, [path((0.0, 0, 0, 500))], state, 40)
+        assert np.array_equal(later.row(0), before)
     low = assemble(resolve({"layout": SIZES, "actuator": {"stroke": "38 mm", "rest_height": "20 mm"}}))
     assert snapshot.transfer_heights(low, data).row(0).max() == 38e-3
     with pytest.raises(StateError, match="number of cells"):
         snapshot.transfer_heights(assemble(resolve({})), data)
-
-
-def test_every_field_of_a_state_is_kept() -> None:
-    # A field that is added to a state must be added to what is kept, and to `packed_parts`.
-    assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "active", "memory"}

@@ -61,27 +61,24 @@ def test_the_rfd_is_the_rms_deviation_in_contact(total, wanted):
     assert compute_rfd(TIME, total, 0.4) == wanted
 
 
-def test_the_rfd_of_the_whole_session_counts_the_time_without_contact():
-    # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
-    total = np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4)
-    found = compute_metrics(history(total), WHOLE)
-    assert found["rfd_session"] == pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3)
-    assert found["rfd"] == 0.0
-
-
-def test_the_rfd_weighs_rows_by_their_time():
+def test_the_rfd_weighs_rows_by_their_time_and_by_session_and_shaping():
     # A force of 0.5 for 1 s in 101 rows and of 0.4 for 9 s in 10: rows counted alike would give 0.095.
     time = np.concatenate([np.linspace(0.0, 1.0, 101), np.arange(2.0, 11.0)])
     total = np.where(time <= 1.0, 0.5, 0.4)
     # The row at 1 s stands for half a second after it as well: 1.5 s in all.
     assert compute_rfd(time, total, 0.4) == pytest.approx(0.1 * np.sqrt(1.5 / 10.0), rel=1e-9)
-
-
-def test_the_rfd_while_shaping_leaves_out_touching_down():
+    uneven = np.array([0.0, 0.1, 0.5, 2.0, 2.5])
+    assert compute_weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
+    # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
+    found = compute_metrics(history(np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4)), WHOLE)
+    assert (found["rfd"], found["rfd_session"]) == (0.0, pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3))
     case = history(np.where(TIME < 5.0, 0.2, 0.4))
-    case["mode"][TIME < 5.0] = Mode.SPRING
-    assert compute_metrics(case, WHOLE)["rfd_shaping"] == 0.0
-    assert compute_metrics(case, WHOLE)["rfd"] > 0.1
+    case["mode"][TIME < 5.0] = Mode.SPRING  # touching down is no shaping
+    found = compute_metrics(case, WHOLE)
+    assert found["rfd_shaping"] == 0.0 < 0.1 < found["rfd"]
+    # The deviation from the mean leaves out a constant offset.
+    found = compute_metrics(history(0.5 + 0.1 * np.sin(2.0 * np.pi * TIME)), WHOLE)
+    assert found["force_deviation"] == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-6)
 
 
 def test_a_force_asked_of_each_cell_is_judged_by_how_many_follow_in_that_row():
@@ -95,27 +92,15 @@ def test_a_force_asked_of_each_cell_is_judged_by_how_many_follow_in_that_row():
     assert found["set_point"] == pytest.approx(0.5 * (0.36 + 0.16), abs=1e-4)
     case["total_force"] = case["total_force"] + 0.05
     assert compute_metrics(case, EACH)["rfd"] == pytest.approx(0.05, rel=1e-10)
-
-
-def test_rows_in_which_no_cell_follows_ask_for_nothing_of_a_method_that_asks_each_cell():
-    case = history(np.where(TIME < 5.0, 0.2, 0.36))
-    case["mode"][TIME < 5.0] = Mode.SPRING
+    # Rows in which no cell follows ask for nothing.
+    case = history(np.where(early, 0.2, 0.36))
+    case["mode"][early] = Mode.SPRING
     found = compute_metrics(case, EACH)
     assert found["rfd"] == found["rfd_session"] == pytest.approx(0.0, abs=ROUNDING)
     case["mode"][:] = Mode.SPRING
     found = compute_metrics(case, EACH)
     names = ("set_point", "rfd", "rfd_session", "force_overshoot", "settling_time")
     assert [found[name] for name in names] == [None] * 5
-
-
-def test_the_first_touch_of_a_method_that_asks_each_cell_is_judged_by_what_it_asks_for():
-    # No cell follows before 2 s; a quarter too much then, falling below a tenth at ln 2.5 = 0.916 s more.
-    total = np.where(TIME < 1.0, 0.0, 0.36 * (1.0 + 0.25 * np.exp(-(TIME - 2.0))))
-    case = history(total)
-    case["mode"][TIME < 2.0] = Mode.SPRING
-    found = compute_metrics(case, EACH)
-    assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
-    assert found["settling_time"] == pytest.approx(1.0 + np.log(2.5), abs=0.011)
 
 
 def test_without_a_set_point_there_is_none_and_no_deviation_from_it():
@@ -134,18 +119,10 @@ def test_shaping_wants_contact_and_a_cell_that_follows_the_force():
     np.testing.assert_array_equal(sum_cells(case).shaping, [True, False, False])
 
 
-def test_the_weights_add_up_to_the_duration():
-    uneven = np.array([0.0, 0.1, 0.5, 2.0, 2.5])
-    assert compute_weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
-
-
 def test_the_contact_loss_is_the_share_of_the_gap_between_first_and_last_contact():
     touching = ((TIME >= 2.0) & (TIME <= 4.0)) | ((TIME >= 5.0) & (TIME <= 7.0))
     # 1 s of 5; the gap is 199 rows of 5 ms, and the ends of the window 2 half rows more.
     assert compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
-
-
-def test_the_contact_loss_weighs_the_first_and_the_last_row_of_contact():
     # A row a second: one between two others stands for 1 s, the first and the last for half of it.
     for force, share in (([1, 0, 0, 1], 2 / 3), ([0, 1, 0, 1, 1], 2 / 7), ([0, 1, 1, 0], 0.0), ([1], 0.0)):
         assert compute_contact_loss_share(range(len(force)), force) == pytest.approx(share, rel=ROUNDING)
@@ -204,63 +181,36 @@ def test_a_session_without_contact_has_no_rfd_lag_or_loss():
     assert found["contact_share"] == 0.0
 
 
-def test_the_first_touch_ends_where_contact_does_and_begins_a_row_before_it():
-    total = np.array([0.0, 0.0, 0.3, 0.5, 0.0, 0.4])
-    assert find_first_touch(total) == slice(1, 4)
-
-
 def test_the_first_touch_overshoots_by_its_peak_and_settles_within_a_tenth_of_the_set_point():
+    assert find_first_touch(np.array([0.0, 0.0, 0.3, 0.5, 0.0, 0.4])) == slice(1, 4)
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
     found = compute_metrics(history(total), WHOLE)
     assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
     # 0.1 exp(-t) falls below 0.04 at ln 2.5 = 0.916 s; a row is 5 ms, and the row before counts as well.
     assert found["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
+    # Asked of each cell, of which none follows before 2 s; a quarter too much then, falling as above.
+    case = history(np.where(TIME < 1.0, 0.0, 0.36 * (1.0 + 0.25 * np.exp(-(TIME - 2.0)))))
+    case["mode"][TIME < 2.0] = Mode.SPRING
+    found = compute_metrics(case, EACH)
+    assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
+    assert found["settling_time"] == pytest.approx(1.0 + np.log(2.5), abs=0.011)
 
 
-def test_the_force_deviation_leaves_out_a_constant_offset():
-    total = 0.5 + 0.1 * np.sin(2.0 * np.pi * TIME)
-    assert compute_metrics(history(total), WHOLE)["force_deviation"] == pytest.approx(
-        0.1 / np.sqrt(2.0), rel=1e-6
-    )
-
-
-def test_a_single_pin_has_no_area_to_form_a_volume_over():
-    case = {
-        name: value[:, :1] if value.shape[1:] == (9,) else value
-        for name, value in history(np.full(2001, 0.4)).items()
-    }
-    case["position"] = np.zeros((1, 2))
-    assert compute_metrics(case, WHOLE)["raised_volume"] is None
-
-
-def test_a_history_of_one_row_is_summed_up():
-    found = compute_metrics(history(np.array([0.5]), np.array([0.0])), WHOLE)
-    assert found["rfd"] == pytest.approx(0.1, rel=1e-10)
-    assert found["duration"] == 0.0
-
-
-def test_numbers_that_are_not_finite_become_none():
+def test_the_summary_is_json_and_has_every_key_at_extremes_as_well():
     case = history(np.full(2001, 0.4))
-    case["height"][-1, 0] = np.nan
-    assert compute_metrics(case, WHOLE)["height_range"] is None
-
-
-def test_forces_that_give_a_lag_beyond_all_numbers_give_none_and_no_warning():
-    case = history(np.full(2001, 1e-300))
-    case["force"][:, 4] = 0.4
-    case["position"] = case["position"] + 1.0
-    assert compute_metrics(case, WHOLE)["lag_max"] is None
-
-
-def test_a_history_without_rows_is_refused():
-    case = {
-        name: value if name == "position" else value[:0] for name, value in history(np.zeros(2001)).items()
-    }
-    with pytest.raises(ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"):
-        compute_metrics(case, WHOLE)
-
-
-def test_the_summary_is_json_and_has_every_key():
-    found = compute_metrics(history(np.full(2001, 0.4)), WHOLE)
+    found = compute_metrics(case, WHOLE)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert list(found) == list(METRICS)
+    one = compute_metrics(history(np.array([0.5]), np.array([0.0])), WHOLE)
+    assert (one["rfd"], one["duration"]) == (pytest.approx(0.1, rel=1e-10), 0.0)
+    # A single pin has no area to form a volume over.
+    single = {name: value[:, :1] if value.shape[1:] == (9,) else value for name, value in case.items()}
+    assert compute_metrics({**single, "position": np.zeros((1, 2))}, WHOLE)["raised_volume"] is None
+    # Forces that give a lag beyond all numbers give none and no warning.
+    far = {**history(np.full(2001, 1e-300)), "force": case["force"], "position": case["position"] + 1.0}
+    assert compute_metrics(far, WHOLE)["lag_max"] is None
+    case["height"][-1, 0] = np.nan
+    assert compute_metrics(case, WHOLE)["height_range"] is None
+    nothing = {name: value if name == "position" else value[:0] for name, value in case.items()}
+    with pytest.raises(ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"):
+        compute_metrics(nothing, WHOLE)

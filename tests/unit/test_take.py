@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,10 +49,11 @@ def gesture(count: int = COUNT) -> Floats:
     return np.column_stack([np.interp(at, read, column) for column in poses.T])[:, None]
 
 
-def taken(start: State | None = None) -> tuple[System, Take, State]:
-    """Live through the gesture; return the system, the take and the last state."""
+@cache
+def taken(again: bool = False) -> tuple[System, Take, State]:
+    """Live through the gesture, or through it again on what it formed; return system, take and last state."""
     system = assemble(scene())
-    state = start or begin(system)
+    state = taken()[2] if again else begin(system)
     first, poses = snapshot.dump(system, state), gesture()
     *_, last = simulate_path(system, state.copy(), poses)
     return system, Take(scene(), first, poses, snapshot.dump(system, last)), last
@@ -63,31 +66,24 @@ def difference(take: Take, parts: int) -> float:
 
 
 def test_a_replay_from_rest_or_a_formed_bed_ends_in_the_same_state_bit_for_bit() -> None:
-    _, take, formed = taken()
-    assert replayed(take)
-    assert replayed(taken(formed)[1])
-    assert [state.period for state in replay(take)] == list(range(1, COUNT + 1))
-
-
-def test_a_replay_on_another_path_does_not_pass_for_the_take() -> None:
     _, take, _ = taken()
+    assert replayed(take)
+    assert replayed(taken(True)[1])
+    assert [state.period for state in replay(take)] == list(range(1, COUNT + 1))
     poses = take.poses.copy()
-    poses[COUNT // 2, 0, 2] += 1e-9
+    poses[COUNT // 2, 0, 2] += 1e-9  # another path does not pass for the take
     assert not replayed(replace(take, poses=poses))
 
 
-def test_bytes_bring_a_take_back_as_it_was() -> None:
+def test_bytes_bring_a_take_back_as_it_was_and_damaged_ones_are_refused_in_one_line() -> None:
     _, take, _ = taken()
-    back = from_bytes(to_bytes(take))
+    data = to_bytes(take)
+    back = from_bytes(data)
     assert np.array_equal(back.poses, take.poses)
     assert (back.scene, back.start, back.end) == (take.scene, take.start, take.end)
-
-
-@pytest.mark.parametrize("harm", [lambda data: data[:-50], lambda data: b"", lambda data: b"no take"])
-def test_damaged_bytes_are_refused_in_one_line(harm: object) -> None:
-    _, take, _ = taken()
-    with pytest.raises(OutputError, match="The take is damaged"):
-        from_bytes(harm(to_bytes(take)))  # type: ignore[operator]
+    for harmed in (data[:-50], b"", b"no take"):
+        with pytest.raises(OutputError, match="The take is damaged"):
+            from_bytes(harmed)
 
 
 def test_a_finer_step_moves_heights_by_less_than_the_integrations_error() -> None:
@@ -95,47 +91,28 @@ def test_a_finer_step_moves_heights_by_less_than_the_integrations_error() -> Non
     _, take, _ = taken()
     assert 0.0 < difference(take, 4) < 5e-6
     assert difference(take, 1) == 0.0
+    for parts in (0, -1, 65):
+        with pytest.raises(ParameterError, match="must be from 1 to 64"):
+            refine(scene(), parts)
 
 
-@pytest.mark.parametrize("parts", [0, -1, 65])
-def test_a_step_cut_into_too_few_or_too_many_parts_is_refused(parts: int) -> None:
-    with pytest.raises(ParameterError, match="must be from 1 to 64"):
-        refine(scene(), parts)
-
-
-def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: object) -> None:
+def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: Path) -> None:
     system, take, last = taken()
-    file = tmp_path / "my take.toml"  # type: ignore[operator]
-    file.write_text(format_scene(to_scene(take, "my take")), encoding="utf-8")
-    read = load(file)
-    done = record(assemble(read), read.section("trajectory").trajectory(), read.periods)
-    assert read.periods == COUNT
-    # The path is the same but for rounding, 1e-17 m, which stiff contact enlarges a thousandfold.
-    assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
-    assert system.grid.count == read.cells
-
-
-def test_a_take_begun_on_a_bed_that_has_waited_at_rest_is_a_scene_too() -> None:
-    # Nobody begins to record in the very period a session starts in.
-    system, take, last = taken()
-    away = np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1, 1))
-    *_, waited = simulate_path(system, begin(system), away)
+    made = to_scene(take, "my take")
+    # The finger was read every 6th period, and goes straight in between: only turning points are waypoints.
+    assert len(made.section("trajectory").waypoints) <= COUNT // 6 + 2
+    (tmp_path / "my take.toml").write_text(format_scene(made), encoding="utf-8")
+    read = load(tmp_path / "my take.toml")
+    assert (read.periods, read.cells) == (COUNT, system.grid.count)
+    # A take begun on a bed that has waited at rest is a scene too.
+    *_, waited = simulate_path(system, begin(system), np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1, 1)))
     late = to_scene(replace(take, start=snapshot.dump(system, waited)), "late")
-    done = record(assemble(late), late.section("trajectory").trajectory(), late.periods)
-    assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
-
-
-def test_only_turning_points_of_the_path_become_waypoints() -> None:
-    _, take, _ = taken()
-    # The finger was read every 6th period, and goes straight in between.
-    assert len(to_scene(take, "take").section("trajectory").waypoints) <= COUNT // 6 + 2
-
-
-def test_a_take_begun_on_a_formed_bed_is_no_scene() -> None:
-    _, _, formed = taken()
-    _, take, _ = taken(formed)
+    for scene in (read, late):
+        done = record(assemble(scene), scene.section("trajectory").trajectory(), scene.periods)
+        # The path is the same but for rounding, 1e-17 m, which stiff contact enlarges a thousandfold.
+        assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
     with pytest.raises(OutputError, match=r"begins on a bed that is formed already.*reset the session"):
-        to_scene(take, "late")
+        to_scene(taken(True)[1], "late")
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,9 @@ def refused(folder: Path, text: str, **settings: str) -> str:
     return str(caught.value).replace(f"{folder}/", "")
 
 
-def test_a_scene_is_called_like_its_file(tmp_path: Path) -> None:
-    assert scene(tmp_path, "").name == "my"
+def test_a_setting_may_leave_a_part_out_and_a_scene_is_called_like_its_file(tmp_path: Path) -> None:
+    made = scene(tmp_path, "[conduit]\nlength = 0.02", conduit="absent")
+    assert (made.name, made.conduit) == ("my", None)
 
 
 @pytest.mark.parametrize(
@@ -58,14 +59,6 @@ def test_a_mistake_is_told_with_the_file_or_the_option(
     assert refused(tmp_path, text, **setting) == said
 
 
-def test_the_option_that_said_it_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "my.toml"
-    path.touch()
-    settings = [Setting("simulation.stepper", "leapfrog", "--stepper"), Setting("layout.rows", "3")]
-    with pytest.raises(SceneError, match=r"^--stepper: simulation.stepper must be one of"):
-        load(path, settings)
-
-
 @pytest.mark.parametrize(
     ("text", "settings", "part", "key", "value"),
     [
@@ -89,10 +82,6 @@ def test_a_setting_is_a_value_of_the_scene(
     assert getattr(scene(tmp_path, text, **settings).section(part), key) == value
 
 
-def test_a_setting_may_leave_a_part_out(tmp_path: Path) -> None:
-    assert scene(tmp_path, "[conduit]\nlength = 0.02", conduit="absent").conduit is None
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -114,23 +103,11 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
         load(path)
 
 
-@pytest.mark.parametrize("name", list_samples())
-def test_every_sample_is_a_scene_called_like_its_file(name: str) -> None:
-    assert load(find(name)).name == name
-
-
-def test_a_sample_is_found_although_a_run_of_it_lies_here(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "tap").mkdir()
-    (tmp_path / "tap" / "scene.toml").touch()
-    monkeypatch.chdir(tmp_path)
+def test_a_sample_is_found_although_a_run_of_it_lies_here_which_stands_for_its_scene(here: Path) -> None:
+    (here / "tap").mkdir()
+    (here / "tap" / "scene.toml").touch()
     assert find("tap") == SAMPLES / "tap.toml"
-
-
-def test_the_folder_of_a_run_stands_for_its_scene(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").touch()
-    assert find(str(tmp_path)) == tmp_path / "scene.toml"
+    assert find(str(here / "tap")) == here / "tap" / "scene.toml"
 
 
 @pytest.mark.parametrize("word", ["nowhere.toml", "a\0b", 300 * "a", "", 300 * "a" + "/b"])
@@ -139,10 +116,10 @@ def test_a_word_no_file_can_be_called_is_told_as_any_other(word: str) -> None:
         find(word)
 
 
-def test_a_misspelt_sample_is_told_with_the_nearest_and_all_names() -> None:
+def test_every_sample_is_a_scene_called_like_its_file_and_a_misspelt_one_is_told_with_all_names() -> None:
+    assert [name for name in list_samples() if load(find(name)).name != name] == []
+    names = ", ".join(list_samples())
     with pytest.raises(SceneError) as caught:
         find("ridge_mund_valley")
-    assert str(caught.value) == (
-        f"ridge_mund_valley is neither a file nor a sample ({', '.join(list_samples())}). "
-        "Did you mean ridge_mound_valley?"
-    )
+    said = f"ridge_mund_valley is neither a file nor a sample ({names}). Did you mean ridge_mound_valley?"
+    assert str(caught.value) == said
