@@ -199,7 +199,7 @@ def pyramid() -> Solid:
 
 def gear() -> Solid:
     """Return a gear wheel of 12 teeth with a bore, 72 mm across and 10 mm thick."""
-    teeth, steps = 12, 24
+    teeth, steps = 12, 12
     part = np.arange(teeth * steps) / steps
     angle = 2.0 * math.pi * part / teeth
     # Flanks a quarter of a tooth wide, tip and root with as much as is left.
@@ -217,7 +217,7 @@ def gear() -> Solid:
 
 def grip() -> Solid:
     """Return a grip of a hand's size, lying: 110 x 34 mm, with dents for four fingers on top."""
-    along, around = np.linspace(-55.0, 55.0, 90), 2.0 * math.pi * np.arange(40) / 40
+    along, around = np.linspace(-55.0, 55.0, 64), 2.0 * math.pi * np.arange(28) / 28
     rings = []
     for x in along:
         end = math.sqrt(max(1.0 - (x / 55.2) ** 8, 0.0))
@@ -227,7 +227,7 @@ def grip() -> Solid:
         top = (15.0 - dents) * end * np.sin(around)
         rings.append(
             np.column_stack(
-                [np.full(40, x), y, np.where(np.sin(around) > 0.0, top, -9.0 * end * np.abs(np.sin(around)))]
+                [np.full(28, x), y, np.where(np.sin(around) > 0.0, top, -9.0 * end * np.abs(np.sin(around)))]
             )
         )
     return woven(np.array(rings), closed=False)
@@ -235,7 +235,7 @@ def grip() -> Solid:
 
 def knot() -> Solid:
     """Return a trefoil knot, lying: where one strand passes over another, a bed can show only the upper."""
-    count, around = 150, 16
+    count, around = 104, 12
     t = 2.0 * math.pi * np.arange(count) / count
     middle = np.stack(
         [np.sin(t) + 2.0 * np.sin(2.0 * t), np.cos(t) - 2.0 * np.cos(2.0 * t), -0.9 * np.sin(3.0 * t)], -1
