@@ -18,14 +18,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
+import zipfile
 from pathlib import Path
 from typing import NoReturn
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "tools")]
-
-from repacking import EARLIEST, LATEST, repack_zip  # noqa: E402
-
 SOURCE = ROOT / "addon" / "digiclay"
 PINS = ROOT / "requirements" / "extension.txt"
 #: Wheels fetched before, for all builds to come.
@@ -33,6 +31,10 @@ FETCHED = ROOT / "build" / "wheels"
 TOOL = "addons_core/bl_pkg/cli/blender_ext.py"
 TAGS = "modules/_bpy_internal/extensions/tags.py"
 LIMIT = 300
+#: The times that a zip can state, from 1980 to 2107, s since 1970.
+EARLIEST, LATEST = 315532800, 4354819200
+#: Kind and mode of Unix of a file and a folder in a zip, and the mark of a folder.
+ZIPPED_FILE, ZIPPED_FOLDER = 0o100644 << 16, 0o040755 << 16 | 0x10
 #: Git, also in a checkout of another user.
 GIT = ("git", "-c", "safe.directory=*")
 
@@ -115,6 +117,21 @@ def read_instant() -> int:
     )
     # Without a commit there is no time of one.
     return int(done.stdout) if done.returncode == 0 and done.stdout.strip() else EARLIEST
+
+
+def repack_zip(archive: Path, instant: int) -> None:
+    """Write a zip or a wheel again in a fixed form: order, modes and one time, s since 1970 UTC."""
+    when = time.gmtime(max(instant, EARLIEST))[:6]
+    made = archive.with_name(f"{archive.name}.new")
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(made, "w") as new:
+        # The metadata of a wheel stand last, as its specification recommends.
+        for one in sorted(old.infolist(), key=lambda one: (".dist-info/" in one.filename, one.filename)):
+            entry = zipfile.ZipInfo(one.filename, when)
+            entry.compress_type = one.compress_type
+            entry.create_system = 3  # Unix, wherever it is built: the modes are Unix's
+            entry.external_attr = ZIPPED_FOLDER if one.is_dir() else ZIPPED_FILE
+            new.writestr(entry, old.read(one), compresslevel=9)
+    made.replace(archive)
 
 
 def build(out: Path) -> Path:

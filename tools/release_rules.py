@@ -114,11 +114,7 @@ def _find_in_reports(root: Path) -> list[str]:
 
 
 def find_obstacles(root: Path, version: str, folder: Path) -> list[str]:
-    """Return all that stands in the way of a release.
-
-    `root`: the checkout; `version`: to be released, such as ``0.1.0``; `folder`: where the files are to be.
-    Returns a line each; empty when nothing does.
-    """
+    """Return all that stands in the way of a release, a line each; `folder`: where the files are to be."""
     if not VERSION.fullmatch(version):
         return [f"the version must be three numbers such as 0.1.0 (got {version!r})."]
     if git(root, "rev-parse", "--verify", "HEAD").returncode:

@@ -7,9 +7,7 @@ Each is made from a formula here; no data of others are in them. Maps are formul
 from __future__ import annotations
 
 import math
-import struct
 import sys
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -34,21 +32,6 @@ def between_0_and_1(values: Floats) -> Floats:
 def bump(x: Floats, y: Floats, at: Point, size: Point) -> Floats:
     """Return a Gaussian of height 1."""
     return np.exp(-(((x - at[0]) / size[0]) ** 2) - ((y - at[1]) / size[1]) ** 2)
-
-
-def saddle(x: Floats, y: Floats) -> Floats:
-    """Return x² - y²."""
-    return x * x - y * y
-
-
-def wave(x: Floats, y: Floats) -> Floats:
-    """Return two waves that run along x, and fade towards the sides."""
-    return np.sin(2.0 * math.pi * x) * np.cos(0.5 * math.pi * y)
-
-
-def ripple(x: Floats, y: Floats) -> Floats:
-    """Return the waves around a drop: sin(k r) / (k r)."""
-    return np.sinc(3.2 * np.hypot(x, y))
 
 
 def crater(x: Floats, y: Floats) -> Floats:
@@ -252,13 +235,17 @@ def knot() -> Solid:
     return vertices, faces[:, ::-1]
 
 
-#: Pictures: formula, bits a pixel, pixels a side.
+#: Pictures: formula, the highest gray level, pixels a side.
 PICTURES = (
-    (braille, 8, 160), (crater, 8, 96), (face, 16, 128), (heart, 8, 96), (letters, 8, 128), (spiral, 8, 128),
-    (terrain, 16, 96),
+    (braille, 255, 160), (crater, 255, 96), (face, 65535, 128), (heart, 255, 96), (letters, 255, 128),
+    (spiral, 255, 128), (terrain, 65535, 96),
 )  # fmt: skip
-#: Arrays of heights: formula, heights a side, height, m.
-ARRAYS = ((ripple, 49, 12e-3), (saddle, 33, 16e-3), (wave, 33, 10e-3))
+#: Arrays of heights: formula, heights a side, height, m. A ripple: waves around a drop, sin(k r) / (k r).
+ARRAYS = {
+    "ripple": (lambda x, y: np.sinc(3.2 * np.hypot(x, y)), 49, 12e-3),
+    "saddle": (lambda x, y: x * x - y * y, 33, 16e-3),
+    "wave": (lambda x, y: np.sin(2.0 * math.pi * x) * np.cos(0.5 * math.pi * y), 33, 10e-3),
+}
 #: Meshes: formula, format.
 MESHES = ((dome, "stl"), (gear, "stl"), (grip, "obj"), (knot, "ply"), (pyramid, "obj"))
 
@@ -270,30 +257,19 @@ def sample(formula: Callable[[Floats, Floats], Floats], side: int) -> Floats:
     return between_0_and_1(formula(x, y))
 
 
-def png(values: Floats, bits: int) -> bytes:
-    """Return a gray picture of values from 0 to 1, the highest row first as in every picture."""
-    levels = np.rint(np.flipud(values) * (2**bits - 1)).astype(">u2" if bits == 16 else "u1")
-    lines = b"".join(b"\0" + line.tobytes() for line in levels)
-
-    def chunk(name: bytes, content: bytes) -> bytes:
-        size, check = (struct.pack(">I", n) for n in (len(content), zlib.crc32(name + content)))
-        return size + name + content + check
-
-    head = struct.pack(">IIBBBBB", levels.shape[1], levels.shape[0], bits, 0, 0, 0, 0)
-    parts = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines, 9)) + chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + parts
-
-
 def write(folder: Path) -> list[Path]:
     """Write every sample shape into a folder; return the files."""
     import trimesh
+    from PIL import Image
 
     written = []
-    for formula, bits, side in PICTURES:
+    for formula, white, side in PICTURES:
+        # The highest row first, as in every picture.
+        levels = np.rint(np.flipud(sample(formula, side)) * white).astype(np.min_scalar_type(white))
         written.append(folder / f"{formula.__name__}.png")
-        written[-1].write_bytes(png(sample(formula, side), bits))
-    for formula, side, height in ARRAYS:
-        written.append(folder / f"{formula.__name__}.npy")
+        Image.fromarray(levels).save(written[-1], optimize=True)
+    for name, (formula, side, height) in ARRAYS.items():
+        written.append(folder / f"{name}.npy")
         np.save(written[-1], (sample(formula, side) * height).astype(np.float32))
     for solid_of, kind in MESHES:
         vertices, faces = solid_of()

@@ -42,7 +42,6 @@ def on_files(files: Any, config: Any) -> None:
     """Add the pages that are made from the code, those from outside docs/, and the measured results."""
     packages = site_pages.list_packages()
     made: dict[str, str | bytes] = {
-        "assets/favicon.png": site_pages.draw_icon(),
         "reference/commands.md": site_pages.make_commands_page(),
         "reference/parameters.md": site_pages.make_parameters_page(),
         PYTHON: site_pages.make_packages_page(packages),

@@ -8,12 +8,11 @@ from __future__ import annotations
 import argparse
 import ast
 import html
+import os
 import posixpath
 import re
 import sys
 from pathlib import Path
-
-import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "tools")]
@@ -22,7 +21,6 @@ from digiclay.commands.describe import describe_meaning, write_range, write_valu
 from digiclay.commands.parser import parser  # noqa: E402
 from digiclay.core.base.quantity import EXTENTS, Parameters, list_quantities  # noqa: E402
 from digiclay.core.control.methods import METHODS  # noqa: E402
-from digiclay.core.files.formats import encode_png  # noqa: E402
 from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
 
 from benchmarks.kinds import parser as benchmarks_parser  # noqa: E402
@@ -43,7 +41,7 @@ CODE = {
 COMMANDS = """\
 # Command line
 
-Made from the parsers of the commands; `--help` prints the same.
+`--help` prints the same.
 """
 PARAMETERS = """\
 # Parameters
@@ -71,8 +69,8 @@ together; [tasks](../tasks.md#python) has a first program.
 BEHIND = "---\nsearch:\n  boost: 0.0005\n---\n"
 #: Head of a page whose results come before those of the others.
 AHEAD = "---\nsearch:\n  boost: 20\n---\n"
-#: Width of the usage lines, characters.
-WIDTH = 76
+#: The help of commands has one width wherever the site is built, characters.
+os.environ["COLUMNS"] = "98"
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 
 
@@ -81,52 +79,17 @@ def write_cell(text: str) -> str:
     return re.sub(r"([*_|\[\]`\\])", r"\\\1", html.escape(" ".join(text.split()), quote=False))
 
 
-def _usage(command: argparse.ArgumentParser) -> str:
-    """Return the usage lines of a command, at one width wherever the site is built."""
-    lines = command._get_formatter()
-    lines._width = WIDTH
-    lines.add_usage(command.usage, command._actions, command._mutually_exclusive_groups, prefix="")
-    return lines.format_help().strip()
-
-
-def _arguments(command: argparse.ArgumentParser) -> list[str]:
-    """Return the table of a command's arguments, without rows nothing."""
-    rows = []
-    for action in command._actions:
-        if isinstance(action, argparse._HelpAction | argparse._SubParsersAction) or not action.help:
-            continue
-        values = action.metavar or ("{" + ",".join(map(str, action.choices)) + "}" if action.choices else "")
-        value = " ".join(values) if isinstance(values, tuple) else values
-        if not value and action.nargs != 0:
-            value = action.dest.upper()
-        names = [" ".join(filter(None, (name, value))) for name in action.option_strings] or [value]
-        said = action.help % {**vars(action), "prog": command.prog}
-        rows.append(f"| {', '.join(f'`{name}`' for name in names)} | {write_cell(said)} |")
-    return ["| argument | meaning |", "|---|---|", *rows, ""] if rows else []
-
-
-def _describe(top: argparse.ArgumentParser) -> list[str]:
-    """Return the sections of all commands of a parser."""
-    (listed,) = [one for one in top._actions if isinstance(one, argparse._SubParsersAction)]
-    summaries = {one.dest: one.help or "" for one in listed._choices_actions}
-    lines: list[str] = []
-    for name, command in listed.choices.items():
-        said = command.description or summaries.get(name, "")
-        paragraphs = [write_cell(one) for one in said.strip().split("\n\n")]
-        lines += [f"### {top.prog} {name}", "", "\n\n".join(paragraphs), ""]
-        if command.add_help:
-            lines += ["```text", _usage(command), "```", "", *_arguments(command)]
-        if command.epilog:
-            lines += ["```text", command.epilog.strip(), "```", ""]
-    return lines
-
-
 def make_commands_page() -> str:
-    """Return the page of the command line, from its parsers."""
-    top, benchmarks = parser(), benchmarks_parser()
+    """Return the page of the command line: the help of every command."""
     lines = [COMMANDS]
-    for one, where in ((top, ""), (benchmarks, " In a checkout alone.")):
-        lines += [f"## {one.prog}", "", write_cell(one.description or "") + where, "", *_describe(one)]
+    for top, where in ((parser(), ""), (benchmarks_parser(), " In a checkout alone.")):
+        lines += [f"## {top.prog}", "", write_cell(top.description or "") + where, ""]
+        (listed,) = [action for action in top._actions if isinstance(action, argparse._SubParsersAction)]
+        summaries = {entry.dest: entry.help or "" for entry in listed._choices_actions}
+        for name, command in listed.choices.items():
+            summary = "" if command.description else write_cell(summaries.get(name, ""))
+            help_text = command.format_help().strip()
+            lines += [f"### {top.prog} {name}", "", summary, "", "```text", help_text, "```", ""]
     return "\n".join(lines) + "\n"
 
 
@@ -216,14 +179,3 @@ def relink(text: str, source: str, page: str) -> str:
         return f"{picture}[{label}]({posixpath.relpath(there, posixpath.dirname(page) or '.')}{mark}{anchor})"
 
     return LINK.sub(place, text)
-
-
-def draw_icon() -> bytes:
-    """Return the icon of the site as a PNG: nine pins from above, one of them under the fingertip."""
-    size, pitch = 48, 16
-    y, x = np.mgrid[:size, :size]
-    away = np.hypot(x % pitch - (pitch - 1) / 2, y % pitch - (pitch - 1) / 2)
-    cover = np.clip(6.5 - away, 0.0, 1.0)[..., None]
-    blue, orange, dark = np.array([[86, 180, 233], [213, 94, 0], [38, 41, 46]], dtype=float)
-    middle = ((x // pitch == 1) & (y // pitch == 1))[..., None]
-    return encode_png(np.rint(dark + cover * (np.where(middle, orange, blue) - dark)).astype(np.uint8))

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import ast
+import functools
 import json
+import os
 import re
+import subprocess
+import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +19,19 @@ from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.mesh_io.mesh_reader import read
 
-from tests.release.bare_python import BarePython, find_core_tests, install_pytest, make_bare
 from tests.timeouts import TIMEOUT
 
+ROOT = Path(__file__).parents[2]
+#: What the tests of the core may import; what has more needs more than the wheel brings along.
+CORE_ONLY = ("numpy", "trimesh", "pytest", "hypothesis")
+#: Tests whose need of more no import shows.
+NEEDING_MORE = {
+    "test_skin_mesh.py": "SciPy, which trimesh imports for it",
+    "test_source_file.py": "Pillow",
+    "test_speed_limits.py": "Pillow",
+}
+#: Folders of tests that are run with other versions of the libraries.
+FOLDERS = ("unit", "regression")
 #: Python and the file of requirements/ that pins its libraries, empty for what pip chooses.
 KINDS = {"3.11": "lowest", "3.12": "", "3.13": "highest"}
 #: Reads the meshes that it is given, and prints what is in them.
@@ -28,6 +44,92 @@ print(json.dumps({name: [mesh.vertices.tolist(), mesh.faces.tolist()] for name, 
 """
 #: Difference of heights between versions of numpy, m: its sums have another order, and valves amplify that.
 ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class BarePython:
+    """Folder of an environment with the wheel; the versions of libraries that it was to have, by name."""
+
+    folder: Path
+    pins: dict[str, str]
+
+    def run(
+        self, *words: str | Path, cwd: Path, path: str = "", limit: float = TIMEOUT
+    ) -> subprocess.CompletedProcess[str]:
+        """Run a program of the environment, which imports nothing from elsewhere but from `path`."""
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+        return subprocess.run(
+            [self.folder / "bin" / words[0], *words[1:]],
+            cwd=cwd, env=environment | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=limit,
+        )  # fmt: skip
+
+
+def read_pins(name: str) -> dict[str, str]:
+    """Return the versions that a file in requirements/ pins."""
+    text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    return dict(re.findall(r"^([\w-]+)==([\w.]+)$", text, re.MULTILINE))
+
+
+def _carry_out(*command: str | Path) -> str:
+    """Run a command, which must succeed; return what it printed."""
+    environment = {**os.environ, "GOAL": "test-release", "PYTHONPATH": ""}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=TIMEOUT)
+    assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
+    return done.stdout
+
+
+def _install(environment: Path, *words: str | Path) -> None:
+    """Install by the pip of an environment."""
+    pip = (environment / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
+    _carry_out(*pip, "--retries", "5", *words)
+
+
+def make_bare(folder: Path, version: str, wheel: Path, pins: str) -> BarePython:
+    """Make an environment of a Python (``3.12``); install the wheel, pinned by a file of requirements/."""
+    variable = f"PYTHON{version.replace('.', '')}"
+    python = _carry_out(ROOT / "tools" / "find-python", version, variable, os.environ.get(variable, ""))
+    _carry_out(python.strip(), "-m", "venv", folder)
+    limits = ("-c", ROOT / "requirements" / f"{pins}.txt") if pins else ()
+    _install(folder, *limits, wheel)
+    return BarePython(folder, read_pins(pins) if pins else {})
+
+
+def install_pytest(bare: BarePython, folder: Path) -> None:
+    """Install what runs tests beside an environment, which stays as it is."""
+    pins = read_pins("test")
+    _install(bare.folder, "--target", folder, *(f"{name}=={pins[name]}" for name in ("pytest", "hypothesis")))
+
+
+@functools.cache
+def _needed(path: Path) -> frozenset[str]:
+    """Return the modules that a test needs, through the helpers of the tests too."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module]
+        for name in names:
+            helper = ROOT / f"{name.replace('.', '/')}.py"
+            if name.startswith("tests.") and helper.is_file():
+                found |= _needed(helper)
+            elif name.split(".")[0] not in sys.stdlib_module_names:
+                found.add(name)
+    return frozenset(found)
+
+
+def find_core_tests() -> list[str]:
+    """Return the files of tests that need the core and nothing that the wheel does not bring along."""
+
+    def fits(path: Path) -> bool:
+        names = _needed(path)
+        others = [name for name in names if name.split(".")[0] not in CORE_ONLY]
+        return any(names) and bool(others) and all(name.startswith("digiclay.core") for name in others)
+
+    files = [path for folder in FOLDERS for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))]
+    kept = [path for path in files if path.name not in NEEDING_MORE and fits(path)]
+    return [path.relative_to(ROOT).as_posix() for path in kept]
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -109,13 +211,12 @@ def test_meshes_are_read_as_with_our_versions(bare: BarePython, tmp_path: Path) 
 def test_the_tests_of_the_core_pass(bare: BarePython, tmp_path: Path) -> None:
     if not bare.pins:
         return  # between the lowest and the highest versions, which are tested
-    root = Path(__file__).parents[2]
     files = find_core_tests()
     assert len(files) > 30
     install_pytest(bare, tmp_path / "pytest")
     # Not with the checkout's addon/ on the path: what is tested is the wheel.
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-o", "pythonpath=.", *files)
-    done = bare.run("python", *words, cwd=root, path=str(tmp_path / "pytest"), limit=5 * TIMEOUT)
+    done = bare.run("python", *words, cwd=ROOT, path=str(tmp_path / "pytest"), limit=5 * TIMEOUT)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
     passed = re.search(r"(\d+) passed", done.stdout)
     assert passed is not None

@@ -11,12 +11,11 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
 from tests.form.test_pages import PAGES
-from tests.site.page_commands import Command, find_commands, find_files
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")
@@ -28,6 +27,55 @@ OWN = {
 SERIES = ("batch", "study", "sweep", "tune")
 #: Beyond this a command hangs, s.
 LONGEST = 1200.0
+#: Programs whose lines are commands; a number behind a name is a version.
+PROGRAM = re.compile(
+    r"(?:\$ )?(python (?:tools|docs/examples)/\w+\.py(?: .*)?"
+    r"|(?:digiclay|python -m (?:benchmarks|digiclay)|make|pip install"
+    r"|blender (?:--command|--background|-b)|dask|\.venv/bin/\w+) (?!\d).*)"
+)
+#: Word in place of which a reader writes something: DIR, RUN, SCENE.
+PLACEHOLDER = re.compile(r"(?<![\w./-])[A-Z]{3,}[0-9]?(?![\w./])(?!=)|\.\.\.|…|/path/to")
+#: Command without arguments: within a sentence it is the name of the command.
+NAME = re.compile(r"(?:blender --command digiclay|digiclay [\w-]+)")
+#: Block that is a file: name and content.
+FILE = re.compile(r'^```\w+ title="([^"]+)"\n(.*?)^```', re.MULTILINE | re.DOTALL)
+
+
+class Command(NamedTuple):
+    """One command of a page, and whether it stands in a block of code; else within a sentence or a table."""
+
+    text: str
+    block: bool
+
+
+def _complete(text: str) -> str:
+    """Return a command without the remark beside it, which begins at two blanks or a #."""
+    return re.split(r"\s{2,}|\s#\s", text.strip())[0].strip()
+
+
+def find_commands(text: str) -> list[Command]:
+    """Return the commands of a page: lines of its blocks, and complete ones in its sentences, in order.
+
+    One of a sentence with a placeholder is a form, and one without arguments a name.
+    """
+    found, fenced = [], False
+    for line in text.splitlines():
+        fence = line.lstrip().startswith("```")
+        fenced ^= fence
+        if fenced or line.startswith("    "):
+            match = PROGRAM.fullmatch(line.strip())
+            found += [Command(_complete(match[1]), True)] if match else []
+            continue
+        for inside in re.findall(r"`([^`]+)`", line):
+            match = PROGRAM.fullmatch(inside)
+            if match and not PLACEHOLDER.search(inside) and not NAME.fullmatch(inside):
+                found.append(Command(_complete(match[1]), False))
+    return found
+
+
+def find_files(text: str) -> dict[str, str]:
+    """Return the files of a page by name: its blocks with a title."""
+    return dict(FILE.findall(text))
 
 
 @functools.cache
@@ -62,8 +110,8 @@ def play(text: str, folder: Path, excused: set[str]) -> list[str]:
     """
     for name, source in _listed()["own"].items():
         shutil.copyfile(ROOT / source, folder / name)
-    for file in find_files(text):
-        (folder / file.name).write_text(file.content, encoding="utf-8")
+    for name, content in find_files(text).items():
+        (folder / name).write_text(content, encoding="utf-8")
     once = dict.fromkeys(command.text for command in find_commands(text) if command.text not in excused)
     return list(filter(None, (execute(one, ROOT if one.startswith("make ") else folder) for one in once)))
 

@@ -15,31 +15,17 @@ ROW = re.compile(r"^\| (`[\w.]+\.(?:jpg|png)`.*?) \| (.*) \|$", re.MULTILINE)
 SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 
 
-def rows(text: str) -> dict[str, str]:
-    """Return the command of each picture of the table."""
-    return {name: made for names, made in ROW.findall(text) for name in re.findall(r"`([^`]+)`", names)}
-
-
 @pytest.fixture(scope="module")
 def made() -> dict[str, str]:
-    """The table of the page."""
-    return rows(TABLE.read_text(encoding="utf-8"))
+    """The command of each picture of the table."""
+    table = ROW.findall(TABLE.read_text(encoding="utf-8"))
+    return {name: made for names, made in table for name in re.findall(r"`([^`]+)`", names)}
 
 
-@pytest.fixture(scope="module")
-def shown() -> set[Path]:
-    """The pictures that the pages show."""
+def test_every_picture_is_shown_and_has_a_row_of_the_table(made: dict[str, str]) -> None:
     targets = [(page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))]
-    return {(page.parent / target).resolve() for page, target in targets}
-
-
-def test_the_table_has_every_picture_that_a_page_shows_and_no_other(
-    made: dict[str, str], shown: set[Path]
-) -> None:
+    shown = {(page.parent / target).resolve() for page, target in targets}
     assert sorted(made) == sorted(path.name for path in shown)
-
-
-def test_no_picture_of_the_docs_is_unused(shown: set[Path]) -> None:
     assert sorted(set((ROOT / "docs" / "pictures").iterdir()) - shown) == []
 
 
@@ -56,10 +42,3 @@ def test_what_makes_a_picture_exists(made: dict[str, str]) -> None:
             assert re.search(r"\]\(docs/\w+\.md#|same section", cell), name
         else:  # tests.form.test_pages.py checks the arguments
             assert command.startswith(("python -m benchmarks ", "digiclay "))
-
-
-def test_the_table_is_read_as_it_stands() -> None:
-    assert rows("| `a.jpg`, `b.jpg` | `make x` (slow) |\n") == {
-        "a.jpg": "`make x` (slow)",
-        "b.jpg": "`make x` (slow)",
-    }

@@ -1,8 +1,11 @@
-"""The extension's zip of a release: small, and nothing in it that is not needed."""
+"""Files of a release: the zip is small and has nothing that is not needed; the wheel has no benchmark."""
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 import tomllib
 import zipfile
 from collections import Counter
@@ -10,6 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.timeouts import TIMEOUT
+
+ROOT = Path(__file__).parents[2]
+BESIDE = ("digiclay_paper", "digiclay_serve", "digiclay_study")
 #: Endings of the files that the extension reads, and of texts for people.
 KINDS = re.compile(
     r"LICENSE|LICENSES/[\w.-]+\.txt|blender_manifest\.toml|[\w/]+\.py|wheels/[\w.-]+-py3-none-any\.whl"
@@ -26,18 +33,15 @@ def contents(extension_zip: Path) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
 
 
-def test_the_zip_is_small(extension_zip: Path) -> None:
+def test_the_zip_is_small_and_every_file_once_and_of_a_kind_that_is_needed(
+    contents: dict[str, bytes], extension_zip: Path
+) -> None:
     assert extension_zip.stat().st_size < 2e6
-
-
-def test_every_file_is_of_a_kind_that_is_needed(contents: dict[str, bytes]) -> None:
     assert len(contents) > 200
     assert [name for name in contents if not KINDS.fullmatch(name)] == []
-
-
-def test_no_file_is_there_twice(contents: dict[str, bytes]) -> None:
     counts = Counter(content for content in contents.values() if content)
     assert [name for name, content in contents.items() if counts[content] > 1] == []
+    assert [name for name in contents if re.search(r"(^|/)\.", name)] == []
 
 
 def test_what_the_manifest_leaves_out_is_not_there(contents: dict[str, bytes]) -> None:
@@ -62,5 +66,21 @@ def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(
     assert "SPDX:MIT" in manifest["license"]
 
 
-def test_no_file_is_byte_code_or_starts_with_a_point(contents: dict[str, bytes]) -> None:
-    assert [name for name in contents if name.endswith(".pyc") or re.search(r"(^|/)\.", name)] == []
+def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"digiclay", *BESIDE}
+    beside = {f"{name}/{path.name}" for name in BESIDE for path in (ROOT / name).glob("*.py")}
+    shipped = {"digiclay/manual/guide.html", "digiclay/sample_shapes/sessions/tap.toml"}
+    assert (beside | shipped) - names == set()
+    assert len(beside) > 20
+
+
+def test_the_paper_is_found_in_the_wheel(wheel: Path, tmp_path: Path) -> None:
+    zipfile.ZipFile(wheel).extractall(tmp_path / "installed")
+    # Without the checkout's path: all there is of digiclay is what the wheel brought.
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "digiclay", "paper", "--help"],
+        env=os.environ | {"PYTHONPATH": str(tmp_path / "installed")},
+        cwd=tmp_path, capture_output=True, text=True, timeout=TIMEOUT,
+    )  # fmt: skip
+    assert (done.returncode, "reproduce the paper" in done.stdout.lower()) == (0, True), done.stderr
