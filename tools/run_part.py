@@ -14,8 +14,8 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
+from types import FrameType
 
 SUMMARY = re.compile(r"^=*\s*((?:no tests ran|\d+ \w+).* in [\d.]+s.*?)\s*=*$")
 
@@ -23,24 +23,23 @@ SUMMARY = re.compile(r"^=*\s*((?:no tests ran|\d+ \w+).* in [\d.]+s.*?)\s*=*$")
 def run(command: list[str], limit: float) -> tuple[int | None, str]:
     """Run `command`, passing its output on; return its status (None: stopped at the limit) and summary."""
     process = subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         start_new_session=True,
-    )
-    late = threading.Event()
+    )  # fmt: skip
+    late, summary = False, ""
 
-    def stop() -> None:
-        late.set()
-        # The whole session goes, here and at the end, so that no Blender started by a test outlives it.
+    def end() -> None:
+        # The whole session goes, so that no Blender started by a test outlives it.
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
 
-    timer = threading.Timer(limit, stop)
-    timer.start()
-    summary = ""
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal late
+        late = True
+        end()
+
+    signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, limit)
     try:
         assert process.stdout is not None
         for line in process.stdout:
@@ -49,10 +48,9 @@ def run(command: list[str], limit: float) -> tuple[int | None, str]:
             summary = found[1] if found else summary
         status = process.wait()
     finally:
-        timer.cancel()
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-    return (None if late.is_set() else status), summary
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        end()
+    return (None if late else status), summary
 
 
 def judge(status: int | None, summary: str, limit: float, whole: bool) -> str:

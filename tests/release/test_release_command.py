@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 from collections.abc import Callable
@@ -20,7 +19,6 @@ from tests.release.copied_checkout import (
     INIT,
     MANIFEST,
     TAG,
-    clone,
     commit,
     edit,
     git,
@@ -221,15 +219,3 @@ def test_a_second_release_is_refused_and_leaves_the_first_as_it_is(released: Pat
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert f"{__version__} is released already, as tag {TAG} of commit" in done.stderr
     assert {path: path.stat().st_mtime_ns for path in (released / FOLDER).iterdir()} == before
-
-
-def test_the_files_are_the_same_in_another_folder_under_other_circumstances(
-    original: Path, released: Path, tmp_path: Path
-) -> None:
-    other = clone(original, tmp_path / "another plåce")
-    assert git(other, "rev-parse", "HEAD") == git(released, "rev-parse", "HEAD")
-    done = run_release(other, umask=0o077, TZ="NPT-5:45", LC_ALL="C", PYTHONHASHSEED="7", PYTHONUTF8="1")
-    assert done.returncode == 0, done.stderr
-    sums = [(folder / FOLDER / "SHA256SUMS").read_text() for folder in (other, released)]
-    assert sums[0] == sums[1]
-    shutil.rmtree(other)

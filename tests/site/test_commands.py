@@ -19,12 +19,6 @@ from tests.form.test_pages import PAGES
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")
-#: Commands that make a folder or file, its name without --out, and those that go on with it.
-OWN = {
-    "run": "{}", "form": "{}", "batch": "{}", "new-method": "{}.py", "compare": "{}_compare",
-    "paper": "paper", "serve": "", "study": "", "sweep": "", "tune": "",
-}  # fmt: skip
-SERIES = ("batch", "study", "sweep", "tune")
 #: Beyond this a command hangs, s.
 LONGEST = 1200.0
 #: Programs whose lines are commands; a number behind a name is a version.
@@ -126,43 +120,16 @@ def test_every_command_of_the_page_is_carried_out(page: Path, tmp_path: Path) ->
 
 
 def test_a_command_that_fails_is_noticed(tmp_path: Path) -> None:
-    text = "    digiclay run absent_scene\n    digiclay --version\n"
+    text = "    digiclay run absent_scene\n    digiclay --version\n`digiclay run`, `digiclay run SCENE`\n"
     (failure,) = play(text, tmp_path, set())
     assert "digiclay run absent_scene: status 2" in failure
     assert play(text, tmp_path, {"digiclay run absent_scene"}) == []
 
 
-def test_a_file_of_a_page_is_there_for_its_commands(tmp_path: Path) -> None:
-    text = '```python title="a.py"\nopen("made", "w").close()\n```\n\n    .venv/bin/python a.py\n'
-    assert play(text, tmp_path, set()) == []
-    assert (tmp_path / "made").exists()
-
-
-def _find_made(command: str) -> tuple[str, str]:
-    """Return what a command makes, "" for nothing, and what it may go on with."""
-    program, *words = shlex.split(command)
-    if program != "digiclay" or words[0] not in OWN or {"--help", "--overwrite"} & set(words):
-        return "", command
-    series = f"batch {words[1]}" if words[0] == "batch" else command
-    named = words[words.index("--out") + 1] if "--out" in words else OWN[words[0]].format(Path(words[1]).stem)
-    return named, series if words[0] in SERIES or "--suite" in words else ""
-
-
-def test_pages_copied_one_after_the_other_into_a_folder_meet_nothing_that_exists_already() -> None:
-    made: dict[str, list[str]] = {}
-    for page in (page for page in PAGES if page.parent.name in (ROOT.name, "docs")):
-        commands = find_commands(page.read_text(encoding="utf-8"))
-        for text in dict.fromkeys(one.text for one in commands if one.block):
-            name, series = _find_made(text)
-            if name and not (series and series in made.get(name, [])):
-                made.setdefault(name, []).append(series or f"{page.name}: {text}")
-    assert len(made) > 30
-    assert {name: found for name, found in made.items() if len(found) > 1} == {}
-
-
 def test_every_listed_command_is_on_a_page_and_has_a_reason_and_something_that_shows_it() -> None:
     groups = _listed()["group"]
     listed = [command for group in groups for command in group["commands"]]
+    assert len({command.text for command in _commands() if command.block} - _excused()) > 40
     assert sorted(set(listed) - {command.text for command in _commands()}) == []
     assert len(listed) == len(set(listed))
     assert [group for group in groups if not group["reason"] or not (ROOT / group["shown"]).is_file()] == []
@@ -172,13 +139,3 @@ def test_a_command_shown_by_the_whole_check_is_one_of_its_parts() -> None:
     parts = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     (shown,) = [group["commands"] for group in _listed()["group"] if group["shown"] == ".ci/run"]
     assert [command for command in shown if not re.search(rf" {command}( [A-Z]+=.*)?\n", parts)] == []
-
-
-def test_most_commands_of_blocks_are_carried_out() -> None:
-    blocks = {command.text for command in _commands() if command.block}
-    assert len(blocks - _excused()) > 40
-
-
-def test_names_and_forms_within_sentences_are_no_commands() -> None:
-    text = "`digiclay run` is `digiclay run SCENE --out DIR`; `digiclay run tap`.\n\n    make demo  # x\n"
-    assert [command.text for command in find_commands(text)] == ["digiclay run tap", "make demo"]
