@@ -1,7 +1,7 @@
 """Process of the doors: ``python -m digiclay_serve.door_process``, started by `doors`.
 
 A process of its own: whatever clients do costs its time and its memory, not those of the session. Its
-standard input has the settings, then a byte a frame; it ends when that input ends.
+standard input has a line of settings, then a byte a frame; it ends when that input ends.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 from digiclay.core.base.errors import DigiclayError, OutputError
 
 from .door_link import Door, DoorLink
-from .doors import LENGTH, open_slot
+from .doors import open_slot
 from .osc_door import open_osc
 from .protocol import Bed
 from .websocket_door import open_websocket
@@ -36,9 +36,11 @@ def main() -> None:
     with suppress(OSError):
         os.nice(NICE)
     _allow_many_files()
-    settings = json.loads(_read_exactly(int.from_bytes(_read_exactly(LENGTH), "little")))
+    line = sys.stdin.buffer.readline()
+    if not line:
+        sys.exit(0)  # the process that started this one has ended
     try:
-        asyncio.run(_serve(settings))
+        asyncio.run(_serve(json.loads(line)))
     except DigiclayError as error:
         _tell({"error": str(error)})
 
@@ -52,22 +54,10 @@ def _allow_many_files() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(max(soft, 4096), hard), hard))
 
 
-def _read_exactly(count: int) -> bytes:
-    """Read bytes of the standard input."""
-    read = b""
-    while len(read) < count:
-        part = os.read(0, count - len(read))
-        if not part:
-            sys.exit(0)  # the process that started this one has ended
-        read += part
-    return read
-
-
 def _tell(value: dict[str, Any]) -> None:
     """Write a line of JSON for the process that started this one."""
     with suppress(BrokenPipeError):
-        sys.stdout.write(json.dumps(value) + "\n")
-        sys.stdout.flush()
+        print(json.dumps(value), flush=True)
 
 
 class _ErrorCount(logging.Handler):
@@ -105,8 +95,8 @@ async def _open(opening: Awaitable[Door], host: str, port: int) -> Door:
     try:
         return await opening
     except (OSError, OverflowError) as error:
-        said = getattr(error, "strerror", None) or error
-        raise OutputError(f"Port {port} of {host} cannot be opened: {said}.") from None
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"Port {port} of {host} cannot be opened: {reason}.") from None
 
 
 def _take_wake(link: DoorLink, ended: asyncio.Event) -> None:

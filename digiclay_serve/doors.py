@@ -12,14 +12,13 @@ import sys
 import tempfile
 import zlib
 from contextlib import AbstractContextManager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import digiclay
 import numpy as np
 from digiclay.core.base.errors import OutputError
-from numpy.typing import NDArray
 
 from .protocol import Bed
 
@@ -35,12 +34,7 @@ class LatestSlot:
     """Slot for values of one size in memory that two processes share; neither ever waits.
 
     A reader that stalls misses values; a writer that stalls leaves the last one. Nothing is queued, so that
-    neither can fill the memory of the other.
-
-    Parameters
-    ----------
-    memory : mmap
-        `HEAD` bytes and those of a value; zero before the first value.
+    neither can fill the memory of the other. `memory`: `HEAD` bytes, 0 at first, and those of a value.
     """
 
     def __init__(self, memory: mmap.mmap) -> None:
@@ -49,15 +43,11 @@ class LatestSlot:
         self._head = np.frombuffer(memory, np.uint64, 2)
         self._seen = 0
 
-    @property
-    def size(self) -> int:
-        """Bytes of a value."""
-        return len(self._memory) - HEAD
-
     def write(self, value: bytes) -> None:
         """Put a value in the place of the last one. Raises ValueError when it has another size."""
-        if len(value) != self.size:
-            raise ValueError(f"a value must have {self.size} bytes (got {len(value)})")
+        size = len(self._memory) - HEAD
+        if len(value) != size:
+            raise ValueError(f"a value must have {size} bytes (got {len(value)})")
         number = int(self._head[0])
         self._head[0] = number + 1
         self._memory[HEAD:] = value
@@ -79,10 +69,7 @@ class LatestSlot:
 
 
 def make_slot(size: int) -> tuple[LatestSlot, Path]:
-    """Return a new slot, and the file by which another process opens it; remove that file then.
-
-    `size`: bytes of a value, a multiple of 8.
-    """
+    """Return a new slot for values of a multiple of 8 bytes, and its file for the other process to open."""
     place = MEMORY if MEMORY.is_dir() else None
     with tempfile.NamedTemporaryFile(prefix="digiclay_", dir=place, delete=False) as file:
         file.write(bytes(HEAD + size))
@@ -98,31 +85,17 @@ def open_slot(path: Path) -> LatestSlot:
 
 #: Pose, its number, whether there is one, resets.
 LAYOUT = struct.Struct("<7dQQQ")
-ORDER_SIZE = LAYOUT.size
 
 
-@dataclass(frozen=True)
-class Order:
-    """Newest requests of the clients.
+class Order(NamedTuple):
+    """Newest requests of the clients."""
 
-    Attributes
-    ----------
-    pose : tuple of 7 floats or None
-        Lowest point, m, and unit quaternion; None: none was asked for since the last reset.
-    number : int
-        Of that pose.
-    resets : int
-        Since the start.
-    """
-
+    #: Lowest point, m, and unit quaternion; None: none was asked for since the last reset.
     pose: tuple[float, ...] | None = None
+    #: Of that pose.
     number: int = 0
+    #: Since the start.
     resets: int = 0
-
-    @property
-    def target(self) -> NDArray[np.float64] | None:
-        """The pose as an array (7,)."""
-        return None if self.pose is None else np.array(self.pose)
 
 
 def pack_order(order: Order) -> bytes:
@@ -137,26 +110,8 @@ def unpack_order(data: bytes) -> Order:
     return Order(tuple(pose) if there else None, number, resets)
 
 
-#: Bytes of the length in front of the settings.
-LENGTH = 8
 #: Time for the process to open the doors; to tell its counts, and then to end; to heed a signal, s.
 OPENING, ENDING, HEEDING = 60.0, 4.0, 1.0
-
-
-@dataclass(frozen=True)
-class DoorSettings:
-    """Addresses of the doors, and the token of their clients.
-
-    Attributes
-    ----------
-    port, osc_port : int
-        0: chosen by the system.
-    """
-
-    host: str
-    port: int
-    osc_port: int
-    token: str
 
 
 class Doors(AbstractContextManager["Doors"]):
@@ -166,6 +121,8 @@ class Doors(AbstractContextManager["Doors"]):
     ----------
     frame_size : int
         Bytes of a packed frame.
+    settings
+        ``host``, ``port`` and ``osc_port``, 0: chosen by the system, and ``token`` of the clients.
 
     Raises
     ------
@@ -173,11 +130,11 @@ class Doors(AbstractContextManager["Doors"]):
         On entry, when an address cannot be used.
     """
 
-    def __init__(self, settings: DoorSettings, bed: Bed, frame_size: int) -> None:
-        self.settings, self._bed = settings, bed
-        self._orders, orders = make_slot(ORDER_SIZE)
+    def __init__(self, bed: Bed, frame_size: int, **settings: str | int) -> None:
+        self._orders, orders = make_slot(LAYOUT.size)
         self._frames, frames = make_slot(-(-frame_size // 8) * 8)
         self._files = [orders, frames]
+        self._settings = {**settings, "slots": [str(path) for path in self._files], "bed": asdict(bed)}
         self._order = Order()
 
     def __enter__(self) -> Doors:
@@ -198,10 +155,8 @@ class Doors(AbstractContextManager["Doors"]):
             start_new_session=True,  # Ctrl-C on a terminal is for the session
         )  # fmt: skip
         assert self._process.stdin is not None
-        settings = {**asdict(self.settings), "slots": [str(path) for path in self._files]}
-        said = json.dumps({**settings, "bed": asdict(self._bed)}).encode()
         with suppress(BrokenPipeError):  # its answer says why
-            self._process.stdin.write(len(said).to_bytes(LENGTH, "little") + said)
+            self._process.stdin.write(json.dumps(self._settings).encode() + b"\n")
             self._process.stdin.flush()
         answer = self._read_line(OPENING)
         if "port" not in answer:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay.core.base.errors import DigiclayError, ParameterError
@@ -13,7 +13,7 @@ from pythonosc import osc_bundle, osc_message
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from .door_link import Door, DoorLink
-from .protocol import Frame, Pose, Reset, check_pose, is_token
+from .protocol import Frame, Pose, Reset, check_number, check_pose, is_token
 
 #: What can be subscribed to: the pose and the total force, or every pin's height and force besides.
 PARTS = ("state", "pins")
@@ -21,28 +21,15 @@ PARTS = ("state", "pins")
 MOST_PINS = 16_000
 
 
-@dataclass(frozen=True)
-class Subscription:
-    """Request: frames to the sender's address.
-
-    Attributes
-    ----------
-    part : {"state", "pins"}
-    rate : float
-        Frames a second at most.
-    """
+class Subscription(NamedTuple):
+    """Request: frames to the sender's address, with a part of `PARTS`, so many a second at most."""
 
     part: str
     rate: float
 
 
-def read_osc(data: bytes) -> tuple[object, Pose | Reset | Subscription | ParameterError]:
-    """Read a datagram; return the token in it, and the request or what is wrong with it.
-
-    The request of a client without the token is never looked at, so it is checked after that.
-
-    Raises ParameterError when it is no OSC message with a token.
-    """
+def read_osc(data: bytes) -> tuple[object, str, list[object]]:
+    """Read a datagram: token, address and arguments. Raises ParameterError without a token."""
     rule = "must be an OSC message with the token as its first argument"
     try:
         if osc_bundle.OscBundle.dgram_is_bundle(data):
@@ -56,18 +43,13 @@ def read_osc(data: bytes) -> tuple[object, Pose | Reset | Subscription | Paramet
     if not parameters:
         raise ParameterError("datagram", "", rule, "no argument")
     token, *rest = parameters
-    try:
-        return token, _read_request(address, rest)
-    except ParameterError as error:
-        return token, error
+    return token, address, rest
 
 
-def _read_request(address: str, rest: list[object]) -> Pose | Reset | Subscription:
-    """Read what follows the token."""
+def read_request(address: str, rest: list[object]) -> Pose | Reset | Subscription:
+    """Read what follows the token. Raises ParameterError when it is no request."""
     if address == "/digiclay/pose":
-        number = rest.pop() if len(rest) in (4, 8) else 0
-        if type(number) is not int or not 0 <= number < 2**31:
-            raise ParameterError("pose", "number", "must be a whole number of 32 bits", repr(number)[:40])
+        number = check_number(rest.pop(), 31) if len(rest) in (4, 8) else 0
         return Pose(check_pose(rest), number)
     if address == "/digiclay/reset" and not rest:
         return Reset()
@@ -83,31 +65,22 @@ def _read_request(address: str, rest: list[object]) -> Pose | Reset | Subscripti
 
 def format_osc_frame(frame: Frame, part: str) -> list[bytes]:
     """Write the datagrams of a frame, of a part of `PARTS`: its flags come first."""
-    flags = OscMessageBuilder("/digiclay/flags")
-    flags.add_arg(frame.period, OscMessageBuilder.ARG_TYPE_INT64)
-    flags.add_arg(frame.flags, OscMessageBuilder.ARG_TYPE_INT)
-    state = OscMessageBuilder("/digiclay/state")
-    state.add_arg(frame.period, OscMessageBuilder.ARG_TYPE_INT64)
-    state.add_arg(frame.number, OscMessageBuilder.ARG_TYPE_INT64)
-    for value in (frame.time, frame.total_force, *frame.pose.tolist()):
-        state.add_arg(value, OscMessageBuilder.ARG_TYPE_DOUBLE)
-    made = [flags.build().dgram, state.build().dgram]
+    state = (frame.period, frame.number, frame.time, frame.total_force, *frame.pose.tolist())
+    datagrams = [_format("flags", "hi", frame.period, frame.flags), _format("state", "hh" + 9 * "d", *state)]
     if part == "pins" and len(frame.heights) <= MOST_PINS:
         for name, values in (("heights", frame.heights), ("forces", frame.forces)):
-            builder = OscMessageBuilder(f"/digiclay/{name}")
-            builder.add_arg(frame.period, OscMessageBuilder.ARG_TYPE_INT64)
             # OSC is big-endian.
-            builder.add_arg(np.asarray(values, ">f4").tobytes(), OscMessageBuilder.ARG_TYPE_BLOB)
-            made.append(builder.build().dgram)
-    return made
+            datagrams.append(_format(name, "hb", frame.period, np.asarray(values, ">f4").tobytes()))
+    return datagrams
 
 
-def format_osc_error(message: str) -> bytes:
-    """Write an error as a datagram."""
-    builder = OscMessageBuilder("/digiclay/error")
-    builder.add_arg(message.encode("ascii", "replace").decode(), OscMessageBuilder.ARG_TYPE_STRING)
-    made: bytes = builder.build().dgram
-    return made
+def _format(name: str, kinds: str, *values: object) -> bytes:
+    """Write a message; `kinds`: a letter a value, as OSC has them."""
+    builder = OscMessageBuilder(f"/digiclay/{name}")
+    for kind, value in zip(kinds, values, strict=True):
+        builder.add_arg(value, kind)
+    datagram: bytes = builder.build().dgram
+    return datagram
 
 
 #: Most subscribers, and how long a subscription lasts unless it is repeated, s.
@@ -116,8 +89,6 @@ MOST_SUBSCRIBERS, LASTS = 16, 5.0
 BETWEEN_ERRORS = 0.1
 #: Bytes that wait for the network at most.
 MOST_UNSENT = 1024 * 1024
-#: A client that has the token, but is one of too many.
-FULL = f"must be one of {MOST_SUBSCRIBERS} at most"
 
 
 @dataclass
@@ -147,9 +118,9 @@ class _OscDoor(asyncio.DatagramProtocol):
         """Pass over what a subscriber that has gone sends back; its subscription will end."""
 
     def datagram_received(self, data: bytes, address: Any) -> None:
-        """Carry out a request; without the right token nothing is answered."""
+        """Carry out a request; without the right token nothing is answered, nor even looked at."""
         try:
-            token, request = read_osc(data)
+            token, name, rest = read_osc(data)
         except DigiclayError:
             self._link.counts["datagrams refused"] += 1
             return
@@ -157,8 +128,7 @@ class _OscDoor(asyncio.DatagramProtocol):
             self._link.counts["wrong tokens"] += 1
             return
         try:
-            if isinstance(request, ParameterError):
-                raise request
+            request = read_request(name, rest)
             if isinstance(request, Subscription):
                 self._subscribe(address, request)
             else:
@@ -168,14 +138,16 @@ class _OscDoor(asyncio.DatagramProtocol):
             now = asyncio.get_running_loop().time()
             if now - self._last_error >= BETWEEN_ERRORS:
                 self._last_error = now
-                self._transport.sendto(format_osc_error(str(error)), address)
+                reason = str(error).encode("ascii", "replace").decode()
+                self._transport.sendto(_format("error", "s", reason), address)
 
     def _subscribe(self, address: Any, request: Subscription) -> None:
         """Begin or renew a subscription."""
         now = asyncio.get_running_loop().time()
-        kept = {where: one for where, one in self._subscribers.items() if now < one.until}
+        kept = {where: each for where, each in self._subscribers.items() if now < each.until}
         if address not in kept and len(kept) >= MOST_SUBSCRIBERS:
-            raise ParameterError("subscriber", "", FULL, f"{len(kept) + 1}")
+            rule = f"must be one of {MOST_SUBSCRIBERS} at most"
+            raise ParameterError("subscriber", "", rule, f"{len(kept) + 1}")
         every = max(1, round(1.0 / (self._link.bed.period * request.rate)))
         kept[address] = _Subscriber(request.part, every, now + LASTS)
         self._subscribers = kept
@@ -184,20 +156,17 @@ class _OscDoor(asyncio.DatagramProtocol):
         """Send frames to the subscribers, each at its rate."""
         clock = asyncio.get_running_loop().time
         while True:
-            await self._link.next_frame()
-            if not self._subscribers:
-                continue
-            frame, now = self._link.read_frame(), clock()
+            frame, now = await self._link.next_frame(), clock()
             if frame is None:
                 continue
-            for address, one in list(self._subscribers.items()):
-                if now >= one.until:
+            for address, subscriber in list(self._subscribers.items()):
+                if now >= subscriber.until:
                     del self._subscribers[address]
                 elif self._transport.get_write_buffer_size() > MOST_UNSENT:
                     self._link.counts["datagrams dropped"] += 1
-                elif not one.due - one.every < frame.period < one.due:
-                    one.due = frame.period + one.every
-                    for datagram in format_osc_frame(frame, one.part):
+                elif not subscriber.due - subscriber.every < frame.period < subscriber.due:
+                    subscriber.due = frame.period + subscriber.every
+                    for datagram in format_osc_frame(frame, subscriber.part):
                         self._transport.sendto(datagram, address)
                     self._link.counts["frames sent"] += 1
 

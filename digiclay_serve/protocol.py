@@ -48,10 +48,7 @@ def choose_token(given: str | None) -> tuple[str, bool]:
 
 
 def is_token(given: object, token: str) -> bool:
-    """Return whether a client's token is the right one, in a time that does not depend on where it differs.
-
-    `given`: from the client; `token`: the server's.
-    """
+    """Return whether a client's token is the server's, in a time that does not depend on where it differs."""
     return isinstance(given, str) and hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())
 
 
@@ -71,17 +68,11 @@ SHORTEST = 1e-6
 
 @dataclass(frozen=True)
 class Pose:
-    """Request: where the fingertip is to be.
+    """Request: where the fingertip is to be."""
 
-    Attributes
-    ----------
-    pose : tuple of 7 floats
-        Lowest point, m, and unit quaternion w, x, y, z.
-    number : int
-        The client's own, which the frames name once the pose has been taken up.
-    """
-
+    #: Lowest point, m, and unit quaternion w, x, y, z.
     pose: tuple[float, ...]
+    #: The client's own, which the frames name once the pose has been taken up.
     number: int = 0
 
 
@@ -108,19 +99,13 @@ class Flag(IntFlag):
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of what a session hands out to clients that may drive a motor; docs/serve.md has the sources.
+    """Limits of what a session hands out to clients that may drive a motor; docs/serve.md has the sources."""
 
-    Attributes
-    ----------
-    force : float
-        Largest total force, N: that up to which fingerpads were measured. The paper's pins, 0.157 N each at
-        the pressure of their reservoir, reach it with 13, more than lie under the contact of a fingertip.
-    speed : float
-        Largest speed of a point of the fingertip, m/s: that of a robot's tool with people beside it, by ISO
-        10218-1, and about three times that of fingers that explore a surface.
-    """
-
+    #: Largest total force, N: that up to which fingerpads were measured. The paper's pins, 0.157 N each at
+    #: the pressure of their reservoir, reach it with 13, more than lie under the contact of a fingertip.
     force: float = MOST_FORCE
+    #: Largest speed of a point of the fingertip, m/s: that of a robot's tool with people beside it, by ISO
+    #: 10218-1, and about three times that of fingers that explore a surface.
     speed: float = 0.25
 
 
@@ -133,72 +118,52 @@ MOST_POSITIONS = 10_000
 
 @dataclass(frozen=True)
 class Bed:
-    """Bed of the session, sent to a client once.
+    """Bed of the session, sent to a client once."""
 
-    Attributes
-    ----------
-    name : str
-        Of the scene.
-    pitch, stroke : float
-        m.
-    period : float
-        Control period, s.
-    positions : tuple of (float, float)
-        Of the pins, m; none of a bed of more than 10,000.
-    most_force, most_speed : float
-        Largest total force handed out, N, and largest speed of the fingertip, m/s.
-    """
-
+    #: Of the scene.
     name: str
     rows: int
     columns: int
+    #: m.
     pitch: float
     stroke: float
+    #: Control period, s.
     period: float
+    #: Of the pins, m; none of a bed of more than 10,000.
     positions: tuple[tuple[float, float], ...]
+    #: Largest total force handed out, N, and largest speed of the fingertip, m/s.
     most_force: float = LIMITS.force
     most_speed: float = LIMITS.speed
 
 
 def describe_bed(scene: Scene, system: System, limits: Limits) -> Bed:
-    """Return what clients are told of the bed of a scene."""
+    """Return the description of the bed of a scene for clients."""
     layout, grid = scene.layout, system.grid
-    told = grid.positions if grid.count <= MOST_POSITIONS else grid.positions[:0]
+    listed = grid.positions if grid.count <= MOST_POSITIONS else grid.positions[:0]
     return Bed(
         scene.name, layout.rows, layout.columns, layout.pitch, system.cell.actuator.stroke, system.period,
-        tuple((float(x), float(y)) for x, y in told), limits.force, limits.speed,
+        tuple((float(x), float(y)) for x, y in listed), limits.force, limits.speed,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """State after a control period.
+    """State after a control period."""
 
-    Attributes
-    ----------
-    period : int
-        Control periods since the start of the server or the last reset.
-    number : int
-        Of the last pose taken up; 0 before the first.
-    time : float
-        Simulated, s.
-    total_force : float
-        N.
-    pose : ndarray (7,)
-        The fingertip's.
-    heights, forces : ndarray (n,), float32
-        Of the pins, m and N.
-    flags : int
-        Of `Flag`.
-    """
-
+    #: Control periods since the start of the server or the last reset.
     period: int
+    #: Of the last pose taken up; 0 before the first.
     number: int
+    #: Simulated, s.
     time: float
+    #: N.
     total_force: float
+    #: (7,), the fingertip's.
     pose: Floats
+    #: (n,), of the pins, m and N.
     heights: NDArray[np.float32]
     forces: NDArray[np.float32]
+    #: Of `Flag`.
     flags: int = 0
 
 
@@ -227,29 +192,28 @@ def check_pose(values: Sequence[object]) -> tuple[float, ...]:
 def read_json(text: str) -> Pose | Reset | Status:
     """Read a request in JSON. Raises ParameterError when it is none."""
     try:
-        found: Any = json.loads(text)
+        message: Any = json.loads(text)
     except (ValueError, RecursionError):
         raise ParameterError("message", "", "must be JSON", repr(text[:40])) from None
-    if not isinstance(found, dict):
+    if not isinstance(message, dict):
         raise ParameterError("message", "", 'must be an object, such as {"type": "reset"}', repr(text[:40]))
-    _check_version(found.get("version", VERSION))
-    kind, allowed = found.get("type"), {"type", "version"}
-    if kind == "pose":
-        allowed |= {"position", "orientation", "number"}
-    elif kind not in ("reset", "status"):
+    _check_version(message.get("version", VERSION))
+    kind = message.get("type")
+    if kind not in ("pose", "reset", "status"):
         raise ParameterError("message", "type", "must be pose, reset or status", repr(kind)[:40])
-    unknown = sorted(set(found) - allowed)
-    if unknown:
-        raise ParameterError("message", "", f"must have no other keys than {', '.join(sorted(allowed))}",
-                             repr(unknown[0])[:40])  # fmt: skip
+    allowed = {"type", "version", *(("position", "orientation", "number") if kind == "pose" else ())}
+    if unknown := sorted(set(message) - allowed):
+        rule = f"must have no other keys than {', '.join(sorted(allowed))}"
+        raise ParameterError("message", "", rule, repr(unknown[0])[:40])
     if kind != "pose":
         return Reset() if kind == "reset" else Status()
-    place: Any = found.get("position")
-    turn: Any = found.get("orientation", list(LEVEL))
-    for name, value, count in (("position", place, 3), ("orientation", turn, 4)):
+    values = []
+    for name, usual, count in (("position", None, 3), ("orientation", list(LEVEL), 4)):
+        value = message.get(name, usual)
         if not isinstance(value, list) or len(value) != count:
             raise ParameterError("pose", name, f"must be {count} numbers", repr(value)[:40])
-    return Pose(check_pose([*place, *turn]), _check_number(found.get("number", 0)))
+        values += value
+    return Pose(check_pose(values), check_number(message.get("number", 0)))
 
 
 def read_binary(data: bytes) -> Pose | Reset:
@@ -298,13 +262,13 @@ def name_flags(flags: int) -> list[str]:
 
 def format_frame(frame: Frame) -> str:
     """Write a frame in JSON."""
-    said = {
+    message = {
         "version": VERSION, "type": "state", "period": frame.period, "number": frame.number,
         "time": frame.time, "total_force": frame.total_force, "position": frame.pose[:3].tolist(),
         "orientation": frame.pose[3:].tolist(), "heights": frame.heights.tolist(),
         "forces": frame.forces.tolist(), "flags": name_flags(frame.flags),
     }  # fmt: skip
-    return json.dumps(said, allow_nan=False)
+    return json.dumps(message, allow_nan=False)
 
 
 def format_error(message: str) -> str:
@@ -318,8 +282,8 @@ def _check_version(version: object) -> None:
         raise ParameterError("message", "version", f"must be {VERSION}", repr(version)[:40])
 
 
-def _check_number(number: object) -> int:
-    """Return the number of a request."""
-    if type(number) is not int or not 0 <= number < 2**32:
+def check_number(number: object, bits: int = 32) -> int:
+    """Return the number of a request, below 2**bits; refuse anything else."""
+    if type(number) is not int or not 0 <= number < 2**bits:
         raise ParameterError("pose", "number", "must be a whole number of 32 bits", repr(number)[:40])
     return number

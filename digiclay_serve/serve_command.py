@@ -18,7 +18,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import format_json, write_whole
 from digiclay.core.scene.scene_source import Setting
 
-from .doors import Doors, DoorSettings
+from .doors import Doors
 from .protocol import LIMITS, VARIABLE, Limits, choose_token, describe_bed, pack_frame
 from .real_time_loop import run_session
 from .served_session import PartWriter, begin_session, make_frame
@@ -38,45 +38,28 @@ SCENE = "ridge_mound_valley"
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Run a session in real time for other programs: poses in, forces and heights out."
-    parser = add_command(commands, "serve", "run a session for other programs", EXAMPLES, said)
+    description = "Run a session in real time for other programs: poses in, forces and heights out."
+    parser = add_command(commands, "serve", "run a session for other programs", EXAMPLES, description)
     add_scene(parser, optional=True)
-    parser.add_argument(
-        "--rate",
-        metavar="HZ",
-        type=_within(1.0, 1000.0, "Hz"),
-        help="control periods a second, 1 to 1000; default: the scene's",
-    )
-    parser.add_argument("--host", default=HOST, help=f"address of this machine to serve at; default: {HOST}")
-    parser.add_argument(
-        "--port", metavar="N", type=_port, default=PORT, help=f"of the WebSocket, 0: any; default: {PORT}"
-    )
-    parser.add_argument(
-        "--osc-port", metavar="N", type=_port, default=OSC_PORT, help=f"of OSC, 0: any; default: {OSC_PORT}"
-    )
-    parser.add_argument(
-        "--token", metavar="T", help=f"token of the clients; default: {VARIABLE}, or one at random"
-    )
-    parser.add_argument(
-        "--most-force", metavar="N", type=_within(1e-3, 1e3, "N"), default=LIMITS.force,
-        help=f"largest total force handed out, N; default: {LIMITS.force:g}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--most-speed", metavar="MM/S", type=_within(1.0, 1e4, "mm/s"), default=1e3 * LIMITS.speed,
-        help=f"largest speed of the fingertip, mm/s; default: {1e3 * LIMITS.speed:g}",
-    )  # fmt: skip
-    parser.add_argument("--out", metavar="DIR", type=Path, help="record a take into this folder")
+    rate, force, speed = _within(1.0, 1000.0, "Hz"), _within(1e-3, 1e3, "N"), _within(1.0, 1e4, "mm/s")
+    part, seconds, most_speed = _within(0.1, 600.0, "s"), _within(0.0, 1e9, "s"), 1e3 * LIMITS.speed
+    for name, metavar, kind, default, words in (
+        ("rate", "HZ", rate, None, "control periods a second, 1 to 1000; default: the scene's"),
+        ("host", None, str, HOST, f"address of this machine to serve at; default: {HOST}"),
+        ("port", "N", _port, PORT, f"of the WebSocket, 0: any; default: {PORT}"),
+        ("osc-port", "N", _port, OSC_PORT, f"of OSC, 0: any; default: {OSC_PORT}"),
+        ("token", "T", str, None, f"token of the clients; default: {VARIABLE}, or one at random"),
+        ("most-force", "N", force, LIMITS.force,
+         f"largest total force handed out, N; default: {LIMITS.force:g}"),
+        ("most-speed", "MM/S", speed, most_speed,
+         f"largest speed of the fingertip, mm/s; default: {most_speed:g}"),
+        ("out", "DIR", Path, None, "record a take into this folder"),
+        ("part", "S", part, 10.0, "seconds of a take that a killed process loses at most; default: 10"),
+        ("report", "FILE", Path, None, "write times and counts as JSON in the end"),
+        ("seconds", "S", seconds, None, "stop after this time; default: Ctrl-C"),
+    ):  # fmt: skip
+        parser.add_argument(f"--{name}", metavar=metavar, type=kind, default=default, help=words)
     parser.add_argument("--overwrite", action="store_true", help="replace the takes in that folder")
-    parser.add_argument(
-        "--part", metavar="S", type=_within(0.1, 600.0, "s"), default=10.0,
-        help="seconds of a take that a killed process loses at most; default: 10",
-    )  # fmt: skip
-    parser.add_argument(
-        "--report", metavar="FILE", type=Path, help="write times and counts as JSON in the end"
-    )
-    parser.add_argument(
-        "--seconds", metavar="S", type=_within(0.0, 1e9, "s"), help="stop after this time; default: Ctrl-C"
-    )
     parser.add_argument("--quiet", action="store_true", help="print addresses, errors and a random token")
     parser.set_defaults(carry_out=carry_out)
 
@@ -95,25 +78,26 @@ def carry_out(arguments: argparse.Namespace) -> int:
     arguments.scene = arguments.scene or SCENE
     scene, _ = scene_of(arguments)
     session = begin_session(scene, Limits(arguments.most_force, 1e-3 * arguments.most_speed))
-    settings = DoorSettings(arguments.host, arguments.port, arguments.osc_port, token)
-    bed = describe_bed(scene, session.system, session.limits)
+    bed, host = describe_bed(scene, session.system, session.limits), arguments.host
     size, out = len(pack_frame(make_frame(session))), arguments.out
     with (
         PartWriter(out, overwrite=arguments.overwrite) if out is not None else nullcontext() as writer,
         Stop() as stop,
-        Doors(settings, bed, size) as doors,
+        Doors(bed, size, host=host, port=arguments.port, osc_port=arguments.osc_port, token=token) as doors,
     ):
-        rate = 1.0 / session.system.period
+        rate, shown = 1.0 / session.system.period, f"[{host}]" if ":" in host else host
         _tell(f"{scene.name or scene.method}: {scene.cells} pins, {rate:g} control periods a second")
-        _tell(f"WebSocket ws://{_bracket(arguments.host)}:{doors.port}")
-        _tell(f"OSC       {_bracket(arguments.host)}:{doors.osc_port} (UDP)")
+        _tell(f"WebSocket ws://{shown}:{doors.port}")
+        _tell(f"OSC       {shown}:{doors.osc_port} (UDP)")
         if made:
             _tell(f"token     {token}")
-        if exposure := describe_exposure(arguments.host, "the token is"):
+        if exposure := describe_exposure(host, "the token is"):
             _tell(exposure)
-        stopped = _until(stop, arguments.seconds)
+        end = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
         try:
-            session, figures = run_session(session, doors, writer, arguments.part, stopped, _tell)
+            session, figures = run_session(
+                session, doors, writer, arguments.part, lambda: stop() or time.monotonic() >= end, _tell
+            )
         finally:
             written = writer.finish() if writer else []
         figures["counts"] = doors.close()
@@ -151,22 +135,9 @@ def _port(text: str) -> int:
     return int(text)
 
 
-def _bracket(host: str) -> str:
-    """Return a host as it stands in an address."""
-    return f"[{host}]" if ":" in host else host
-
-
 def _tell(line: str) -> None:
     """Print a line at once: other programs wait for the addresses."""
     print(line, flush=True)
-
-
-def _until(stop: Callable[[], bool], seconds: float | None) -> Callable[[], bool]:
-    """Return a function that says whether to stop: on request, or after some time."""
-    if seconds is None:
-        return stop
-    end = time.monotonic() + seconds
-    return lambda: stop() or time.monotonic() >= end
 
 
 def _summary(figures: Mapping[str, Any]) -> Iterator[str]:

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -43,35 +44,23 @@ ARM = 0.02
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Session(LiveSession):
-    """Session of a server at one instant.
+    """Session of a server at one instant."""
 
-    Attributes
-    ----------
-    kept : Moment
-        To which it goes back when it diverges.
-    number : int
-        Of the last pose taken up.
-    diverged : int
-        How often it went back.
-    refused : ndarray (7,) or None
-        Pose on the way to which it diverged: it is not gone to again.
-    behind : bool
-        Whether the pose asked for is farther away than the largest speed allows.
-    """
-
+    #: Moment to which it goes back when it diverges.
     kept: Moment
+    #: Of the last pose taken up.
     number: int = 0
+    #: How often it went back.
     diverged: int = 0
+    #: Pose (7,) on the way to which it diverged: it is not gone to again.
     refused: Floats | None = None
     limits: Limits = LIMITS
+    #: Whether the pose asked for is farther away than the largest speed allows.
     behind: bool = False
 
 
 def begin_session(scene: Scene, limits: Limits = LIMITS) -> Session:
-    """Begin a session at rest, its fingertip where the path of the scene begins.
-
-    Raises DigiclayError when the scene's parts do not go together.
-    """
+    """Begin a session at rest, its fingertip where the path of the scene begins. Raises DigiclayError."""
     return _begin_at_rest(scene, assemble(scene), limits)
 
 
@@ -148,16 +137,9 @@ def make_frame(session: Session) -> Frame:
     if total > most:
         flags |= Flag.FORCE_LIMITED
         forces, total = forces * (most / total), most
-    return Frame(
-        state.period,
-        session.number,
-        state.period * system.period,
-        total,
-        session.pose,
-        state.row(0).astype(np.float32),
-        forces.astype(np.float32),
-        flags,
-    )
+    pins = state.row(0).astype(np.float32), forces.astype(np.float32)
+    time = state.period * system.period
+    return Frame(state.period, session.number, time, total, session.pose, *pins, flags)
 
 
 #: Most parts that wait for the disk.
@@ -169,17 +151,8 @@ TAKE = Content("take", ("take_[0-9][0-9][0-9].npz", f"take_[0-9][0-9][0-9]_part_
 class PartWriter(AbstractContextManager["PartWriter"]):
     """Thread that writes parts into a folder, which no other process writes until the block ends.
 
-    Parameters
-    ----------
-    folder : Path
-        None, or an empty one.
-    overwrite : bool, optional
-        It may hold takes; the first part that is written replaces them.
-
-    Raises
-    ------
-    OutputError
-        On entry, when the folder cannot be used.
+    The folder is new or empty; with `overwrite` it may hold takes, which the first part that is written
+    replaces. Raises OutputError on entry when it cannot be used.
     """
 
     def __init__(self, folder: Path, *, overwrite: bool = False) -> None:
@@ -227,25 +200,25 @@ class PartWriter(AbstractContextManager["PartWriter"]):
 
     def finish(self) -> list[Path]:
         """Wait for the disk, and join the parts of each take; return the takes."""
-        if self._thread.is_alive():
-            self._parts.put(None)
-            self._thread.join()
-        found = sorted(set(self.folder.glob("take_*_part_*.npz")).difference(self._old))
-        sessions = sorted({path.name.partition("_part_")[0] for path in found})
+        self._end()
+        files = sorted(set(self.folder.glob("take_*_part_*.npz")).difference(self._old))
         written = []
-        for name in sessions:
-            parts = [path for path in found if path.name.startswith(f"{name}_part_")]
-            target = self.folder / f"{name}.npz"
+        for name, group in groupby(files, lambda path: path.name.partition("_part_")[0]):
+            parts, target = list(group), self.folder / f"{name}.npz"
             write_whole(target, to_bytes(join_parts([from_bytes(path.read_bytes()) for path in parts])))
             for path in parts:
                 path.unlink()
             written.append(target)
         return written
 
-    def __exit__(self, *raised: object) -> None:
+    def _end(self) -> None:
+        """End the thread when all is written."""
         if self._thread.is_alive():
             self._parts.put(None)
             self._thread.join()
+
+    def __exit__(self, *raised: object) -> None:
+        self._end()
         if self._made:
             with suppress(OSError):  # it holds a take
                 self.folder.rmdir()
@@ -265,16 +238,10 @@ class PartWriter(AbstractContextManager["PartWriter"]):
 
 
 def join_parts(parts: Sequence[Take]) -> Take:
-    """Return one take of parts that follow each other.
-
-    `parts`: oldest first, at least one. Raises OutputError when one does not begin with the state the last
-    one ends with.
-    """
+    """Return one take of parts, oldest first; OutputError when one does not begin where the last one ends."""
     first, *others = parts
-    end, poses = first.end, [first.poses]
-    for part in others:
-        if part.start != end or part.scene != first.scene:
+    for before, part in pairwise(parts):
+        if part.start != before.end or part.scene != first.scene:
             raise OutputError("The parts of a take must follow each other: one of them is missing.")
-        end = part.end
-        poses.append(part.poses[1:])
-    return Take(first.scene, first.start, np.concatenate(poses), end)
+    poses = np.concatenate([first.poses, *(part.poses[1:] for part in others)])
+    return Take(first.scene, first.start, poses, parts[-1].end)

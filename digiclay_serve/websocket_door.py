@@ -7,8 +7,8 @@ import http
 import json
 import math
 from contextlib import suppress
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict
+from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlsplit
 
 from digiclay.core.base.errors import DigiclayError, ParameterError
@@ -25,7 +25,7 @@ from .protocol import (
     is_token,
     read_binary,
     read_json,
-)
+)  # fmt: skip
 
 #: Most clients, and most connections that have not said yet who they are: beyond it the oldest is cut.
 MOST_CLIENTS, MOST_SILENT = 64, 512
@@ -42,22 +42,14 @@ USUAL_RATE = 60.0
 POLICY = 1008
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """Options of a client in its address.
+class Wishes(NamedTuple):
+    """Options of a client in its address."""
 
-    Attributes
-    ----------
-    binary : bool
-        Frames in binary.
-    rate : float
-        Frames a second at most; 0: none.
-    token : str
-        Empty where the header has it.
-    """
-
+    #: Frames in binary.
     binary: bool = False
+    #: Frames a second at most; 0: none.
     rate: float = USUAL_RATE
+    #: Empty where the header has it.
     token: str = ""
 
 
@@ -70,8 +62,8 @@ def read_wishes(path: str) -> Wishes:
         raise ParameterError("address", "", "must be an address", repr(path[:40])) from None
     unknown = sorted(set(given) - {"format", "rate", "token"})
     if unknown or address.path not in ("", "/"):
-        said = repr(unknown[0] if unknown else address.path)[:40]
-        raise ParameterError("address", "", "must be / with format, rate and token alone", said)
+        wrong = repr(unknown[0] if unknown else address.path)[:40]
+        raise ParameterError("address", "", "must be / with format, rate and token alone", wrong)
     if given.get("format", "json") not in ("json", "binary"):
         raise ParameterError("address", "format", "must be json or binary", repr(given["format"])[:40])
     try:
@@ -81,20 +73,6 @@ def read_wishes(path: str) -> Wishes:
     if not 0.0 <= rate <= 1000.0:
         raise ParameterError("address", "rate", "must be from 0 to 1000 Hz", repr(given["rate"])[:40])
     return Wishes(given.get("format") == "binary", rate, given.get("token", ""))
-
-
-@dataclass(frozen=True)
-class Pace:
-    """Messages of a client in a second that began at an instant, s."""
-
-    began: float
-    count: int = 0
-
-
-def count_message(pace: Pace, now: float) -> tuple[bool, Pace]:
-    """Return whether one more message, now, s, is one of too many in a second, and the count with it."""
-    after = Pace(pace.began, pace.count + 1) if now - pace.began < 1.0 else Pace(now, 1)
-    return after.count > FLOOD, after
 
 
 async def open_websocket(link: DoorLink, host: str, port: int) -> Door:
@@ -176,8 +154,8 @@ class _WebSocketDoor:
         self.silent.pop(connection, None)
         if len(self.clients) >= MOST_CLIENTS:
             self.link.counts["clients beyond the limit"] += 1
-            said = f"{MOST_CLIENTS} clients at most: wait until one has left.\n"
-            return connection.respond(http.HTTPStatus.SERVICE_UNAVAILABLE, said)
+            reason = f"{MOST_CLIENTS} clients at most: wait until one has left.\n"
+            return connection.respond(http.HTTPStatus.SERVICE_UNAVAILABLE, reason)
         self.clients.add(connection)
         return None
 
@@ -205,8 +183,7 @@ class _WebSocketDoor:
             return
         every, due = max(1, round(1.0 / (self.link.bed.period * wishes.rate))), 0
         while True:
-            await self.link.next_frame()
-            frame = self.link.read_frame()
+            frame = await self.link.next_frame()
             if frame is None or due - every < frame.period < due:
                 continue
             due = frame.period + every
@@ -216,10 +193,12 @@ class _WebSocketDoor:
     async def _take_requests(self, connection: ServerConnection) -> None:
         """Carry out requests; a client that floods, or sends many wrong ones, is closed."""
         clock = asyncio.get_running_loop().time
-        pace, wrong, told = Pace(clock()), 0, -math.inf
+        second, count, wrong, refused = clock(), 0, 0, -math.inf
         async for message in connection:
-            flood, pace = count_message(pace, clock())
-            if flood:
+            if clock() - second >= 1.0:
+                second, count = clock(), 0
+            count += 1
+            if count > FLOOD:
                 self.link.counts["floods"] += 1
                 self.link.leave(connection)
                 await connection.close(POLICY, f"more than {FLOOD} messages a second")
@@ -228,9 +207,9 @@ class _WebSocketDoor:
                 request = read_json(message) if isinstance(message, str) else read_binary(message)
                 answer = self.link.order(request, connection)
             except HeldError as error:
-                # Said once a second: poses come a thousand times as often.
-                if clock() - told >= 1.0:
-                    told = clock()
+                # Answered once a second: poses come a thousand times as often.
+                if clock() - refused >= 1.0:
+                    refused = clock()
                     await connection.send(format_error(str(error)))
             except DigiclayError as error:
                 wrong += 1
@@ -241,5 +220,5 @@ class _WebSocketDoor:
                     return
             else:
                 if answer is not None:
-                    said = {"version": VERSION, "type": "status", "counts": answer}
-                    await connection.send(json.dumps(said))
+                    status = {"version": VERSION, "type": "status", "counts": answer}
+                    await connection.send(json.dumps(status))

@@ -14,10 +14,9 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, from_bytes, make_take, replay
 
-from digiclay_serve.door_link import LEASE, Lease, claim, release
 from digiclay_serve.doors import Order, make_slot, open_slot, pack_order, unpack_order
 from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token
-from digiclay_serve.real_time_loop import Schedule, TimeCounts, plan_periods
+from digiclay_serve.real_time_loop import Schedule, TimeCounts
 from digiclay_serve.served_session import (
     PartWriter,
     Session,
@@ -43,14 +42,14 @@ DOWN = np.array([0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0])
 def test_a_period_is_due_from_its_beginning_once_and_the_oldest_late_ones_are_left_out() -> None:
     schedule, counts = Schedule(10.0, PERIOD, 5), []
     for now in (9.9995, 10.0, 10.0004, 10.001, 10.0035):
-        due, schedule = plan_periods(schedule, now)
-        counts.append(due.count)
+        counts.append(schedule.take_due(now)[0])
     assert counts == [0, 1, 0, 1, 2]
     assert schedule.begins == pytest.approx(10.004)
-    due, schedule = plan_periods(Schedule(10.0, PERIOD, 5), 10.0085)
-    assert (due.count, schedule.planned, schedule.left_out) == (5, 9, 4)
+    schedule = Schedule(10.0, PERIOD, 5)
+    count, begins = schedule.take_due(10.0085)
+    assert (count, schedule.planned, schedule.left_out) == (5, 9, 4)
     # All that have begun are judged, those left out as well.
-    assert due.begins == pytest.approx(10.0 + PERIOD * np.arange(9))
+    assert begins == pytest.approx(10.0 + PERIOD * np.arange(9))
 
 
 def test_shares_of_times_are_those_of_the_sorted_times() -> None:
@@ -245,13 +244,3 @@ def test_only_the_same_token_is_the_right_one_and_one_that_is_none_is_refused_an
         with pytest.raises(OutputError, match=r"--token must have 8 to 128") as caught:
             choose_token(token)
         assert not token or token not in str(caught.value)
-
-
-def test_the_fingertip_is_anothers_when_its_client_is_silent_or_gone() -> None:
-    granted, lease = claim(Lease(), "one", 10.0)
-    assert granted
-    assert not claim(lease, "two", 10.0 + 0.9 * LEASE)[0]
-    assert claim(lease, "one", 10.0 + 0.9 * LEASE)[0]
-    assert claim(lease, "two", 10.0 + LEASE)[0]
-    assert claim(release(lease, "one"), "two", 10.1)[0]
-    assert not claim(release(lease, "two"), "two", 10.1)[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from contextlib import suppress
 
 import pytest
 
@@ -12,7 +13,7 @@ if sys.platform == "win32":
 
 from digiclay_serve import door_link, websocket_door
 from digiclay_serve.door_link import Bed, DoorLink, HeldError
-from digiclay_serve.doors import Order, make_slot, pack_order
+from digiclay_serve.doors import LAYOUT, make_slot
 from digiclay_serve.protocol import Pose, pack_pose
 from digiclay_serve.websocket_door import open_websocket
 from tests.served import TOKEN, frame_message
@@ -30,7 +31,7 @@ UNANSWERED = (1011).to_bytes(2, "big")
 
 def make_link() -> DoorLink:
     """Return a link without a session."""
-    slot, file = make_slot(len(pack_order(Order())))
+    slot, file = make_slot(LAYOUT.size)
     file.unlink()
     return DoorLink(Bed("bed", 1, 1, 3e-3, 0.1, 5e-3, ()), slot, slot, TOKEN)
 
@@ -81,3 +82,30 @@ def test_a_client_that_is_silent_before_the_token_is_closed(monkeypatch: pytest.
     link = make_link()
     assert asyncio.run(connect(link)) == b""
     assert link.counts["clients"] == 0
+
+
+def test_a_client_that_floods_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(websocket_door, "FLOOD", 2)
+    monkeypatch.setattr(door_link, "LEASE", 1e9)  # the fingertip is another's by the close alone
+    link = make_link()
+    sent = asyncio.run(connect(link, REQUEST.encode() + 3 * frame_message(pack_pose(POSE))))
+    assert b"more than 2 messages a second" in sent
+    assert (link.counts["floods"], link.counts["poses"]) == (1, 3)
+
+
+def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def take_turns() -> list[str]:
+        link, moved = make_link(), []
+        for client in ("one", "two", "one"):
+            with suppress(HeldError):
+                link.order(POSE, client)
+                moved.append(client)
+        link.leave("two")  # it did not move the fingertip
+        with pytest.raises(HeldError):
+            link.order(POSE, "two")
+        await asyncio.sleep(0.2)
+        link.order(POSE, "two")
+        return moved
+
+    monkeypatch.setattr(door_link, "LEASE", 0.1)
+    assert asyncio.run(take_turns()) == ["one", "one"]
