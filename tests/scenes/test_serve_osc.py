@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -164,9 +164,13 @@ def test_the_example_shows_the_heights_on_a_pin_display(server: Server, door: so
             bodies.extend(body for body in found if body)
         return bodies.pop(0)
 
-    with subprocess.Popen(
-        [*command, "--rate", "100"], env=environment, stdout=subprocess.PIPE, text=True
-    ) as example:
+    with (
+        subprocess.Popen(
+            [*command, "--rate", "100"], env=environment, stdout=subprocess.PIPE, text=True
+        ) as example,
+        ExitStack() as stack,
+    ):
+        stack.callback(example.kill)  # a claim that fails does not wait for it
         is_well(door, 5)
         heights = np.ones(81)
         while heights.min() > 0.0399:  # pressed, to within a count of 0.1 m / 65,535
