@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.studies.axes import Record
-from digiclay.core.studies.evaluation import FIGURES
 
 
 def describe_problem(parameters: int) -> dict[str, Any]:
@@ -42,44 +40,25 @@ def sample_shares(samples: int, parameters: int, seed: int, *, second: bool) -> 
 CONFIDENCE, RESAMPLES = 0.95, 1000
 
 
-@dataclass(frozen=True, eq=False)
-class Indices:
-    """Sobol indices of one output over d parameters.
-
-    Attributes
-    ----------
-    first, total : ndarray (d,)
-        Share of the variance by the parameter alone, and with all its interactions.
-    first_interval, total_interval : ndarray (d,)
-        Half widths of their confidence intervals.
-    second, second_interval : ndarray (d, d)
-        Share by the interaction of two parameters, above the diagonal, NaN elsewhere; all NaN if it was not
-        requested.
-    """
-
-    first: Floats
-    first_interval: Floats
-    total: Floats
-    total_interval: Floats
-    second: Floats
-    second_interval: Floats
+#: Sobol indices of one output over d parameters, each with half the width of its confidence interval: shares
+#: of the variance by the parameter alone, with all its interactions, (d,), and by the interaction of two
+#: parameters, (d, d), above the diagonal, if they were requested.
+Indices = dict[str, tuple[Floats, Floats]]
+#: Their names, and those of SALib.
+ORDERS = {"first": "S1", "total": "ST", "second": "S2"}
 
 
 def compute_indices(values: Floats, parameters: int, seed: int, *, second: bool) -> Indices | None:
-    """Return the Sobol indices of an output at the points of `indices.sample_shares`."""
+    """Return the Sobol indices of an output at the points of `sample_shares`; None if it does not vary."""
     from SALib.analyze import sobol
 
     if not np.ptp(values) > 1e-9 * np.max(np.abs(values)):
         return None
-    found = sobol.analyze(
+    result = sobol.analyze(
         describe_problem(parameters), values, calc_second_order=second, num_resamples=RESAMPLES,
         conf_level=CONFIDENCE, seed=seed,
     )  # fmt: skip
-    none = np.full((parameters, parameters), np.nan)
-    return Indices(
-        found["S1"], found["S1_conf"], found["ST"], found["ST_conf"],
-        found["S2"] if second else none, found["S2_conf"] if second else none,
-    )  # fmt: skip
+    return {name: (result[key], result[f"{key}_conf"]) for name, key in ORDERS.items() if key in result}
 
 
 #: The metric by which a run loses the fingertip, and how far it may exceed that of the unchanged scene, which
@@ -89,31 +68,16 @@ LOSS, ALLOWED = "contact_loss_share", 0.05
 CONTACT = (LOSS, "contact_share")
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
-    """An output at the points of a study.
+class Response(NamedTuple):
+    """Output at the points of a study."""
 
-    Attributes
-    ----------
-    name : str
-        A key of `evaluation.FIGURES`.
-    values : ndarray (points,)
-        SI; finite.
-    absent : int
-        How many runs failed, or have no such value.
-    lost : int
-        How many others lost the fingertip.
-    """
-
+    #: Key of `evaluation.FIGURES`.
     name: str
+    #: (points,), SI; finite.
     values: Floats
+    #: How many runs failed, or have no such value, and how many others lost the fingertip.
     absent: int
     lost: int
-
-    @property
-    def unit(self) -> str:
-        """SI unit."""
-        return FIGURES[self.name].unit
 
 
 def find_excess_losses(records: Sequence[Record], reference: Record) -> Floats:
@@ -134,9 +98,8 @@ def make_response(name: str, records: Sequence[Record], excess: Floats) -> Respo
     lost = (excess > 0.0) & ~absent & (name not in CONTACT)
     replaced = absent | lost
     if replaced.all():
-        first = next((record["error"] for record in records if "error" in record), "")
-        why = f"; the first error: {first}" if first else "."
-        raise OutputError(f"No run that keeps the fingertip has the metric {name}{why}")
+        errors = (f"; the first error: {record['error']}" for record in records if "error" in record)
+        raise OutputError(f"No run that keeps the fingertip has the metric {name}{next(errors, '.')}")
     values[replaced] = values[~replaced].max()
     return Response(name, values, int(absent.sum()), int(lost.sum()))
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from statistics import fmean, median, stdev
+from typing import NamedTuple
 
 from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
 
@@ -42,43 +42,26 @@ Cell = tuple[str, str, int]
 Table = Mapping[Cell, Mapping[str, float | None]]
 
 
-@dataclass(frozen=True)
-class Interval:
-    """Mean and its confidence interval.
-
-    Attributes
-    ----------
-    half : float or None
-        Half the width; None of a single value.
-    count : int
-        Values.
-    """
+class Interval(NamedTuple):
+    """Mean of some values, half the width of its confidence interval, and their number."""
 
     mean: float
+    #: None of a single one.
     half: float | None
-    count: int
+    number: int
 
 
-@dataclass(frozen=True)
-class Row:
-    """Row of the league.
-
-    Attributes
-    ----------
-    measures : mapping of str to Interval or None
-        `MEANS`, ``max_total_force``, ``losses``, ``period_cost``, ``cost_ratio`` and a limit a motion.
-    worse : int or None
-        On how many trajectories the mean RFD is above that of the first method; None of that one.
-    trajectories : int
-        With an RFD.
-    searched : frozenset of str
-        Motions whose largest speed was searched.
-    """
+class Row(NamedTuple):
+    """Row of the league."""
 
     method: str
+    #: `MEANS`, ``max_total_force``, ``losses``, ``period_cost``, ``cost_ratio`` and a limit a motion.
     measures: Mapping[str, Interval | None]
+    #: On how many trajectories the mean RFD is above that of the first method; None of that one.
     worse: int | None
+    #: With an RFD.
     trajectories: int
+    #: Motions whose largest speed was searched.
     searched: frozenset[str] = frozenset()
 
 
@@ -101,17 +84,17 @@ def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
     worse = count_worse(table, methods)
     rows = []
     for method in methods:
-        names = (*MEANS, *REDUCED)
         measures = {
-            name: find_interval([_reduce(table, method, name, seed) for seed in seeds]) for name in names
+            name: find_interval([_reduce(table, method, name, seed) for seed in seeds])
+            for name in (*MEANS, *REDUCED)
         }
         costs = [
             [_reduce(table, each, "period_cost", seed) for each in (method, methods[0])] for seed in seeds
         ]
         measures["cost_ratio"] = find_interval([own / first for own, first in costs if own and first])
         for limit in LIMITS:
-            found = [table.get((method, limit, seed), {}).get("speed_limit") for seed in seeds]
-            measures[limit] = find_interval(found)
+            speeds = [table.get((method, limit, seed), {}).get("speed_limit") for seed in seeds]
+            measures[limit] = find_interval(speeds)
         searched = frozenset(name for own, name, _ in table if own == method and name in LIMITS)
         rows.append(Row(method, measures, *worse[method], searched))
     return sorted(rows, key=lambda row: math.inf if row.measures["rfd"] is None else row.measures["rfd"].mean)

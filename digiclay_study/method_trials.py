@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay.core.base.errors import ParameterError
@@ -35,6 +35,8 @@ from digiclay.core.studies.speed_limits import (
 #: Time, s; x, y and height above the bed at rest, mm; turn, pitch and roll of the fingertip, rad.
 Pose = tuple[float, float, float, float, float, float, float]
 
+#: Turn, pitch and roll, rad.
+Turn = tuple[float, float, float]
 #: How far a fingertip is lifted at the end, m, in which time, and how long it then stays away, s.
 AWAY, LIFTED, SETTLED = 40e-3, 0.3, 1.5
 #: Seed of the random drags, and how far their fingertips are pitched and rolled, rad: 30 degrees in all.
@@ -45,11 +47,7 @@ def with_path(scene: Scene, poses: Sequence[Pose], interpolation: str = "smooth"
     """Return a scene with a path of its fingertip, as long as that path."""
     rest = scene.actuator.rest_height
     points = tuple(
-        Waypoint(
-            time=t,
-            position=(1e-3 * x, 1e-3 * y, rest + 1e-3 * z),
-            orientation=_turn(turn, pitch, roll),
-        )
+        Waypoint(t, (1e-3 * x, 1e-3 * y, rest + 1e-3 * z), _turn(turn, pitch, roll))
         for t, x, y, z, turn, pitch, roll in poses
     )
     path, timing = Path(interpolation, points), replace(scene.simulation, duration=poses[-1][0])
@@ -87,20 +85,15 @@ def _turn(turn: float, pitch: float, roll: float) -> tuple[float, float, float, 
     )
 
 
-def _lift(x: float, y: float, height: float, turn: Sequence[float] = (0.0, 0.0, 0.0)) -> list[Pose]:
+def _lift(x: float, y: float, height: float, turn: Turn = (0.0, 0.0, 0.0)) -> list[Pose]:
     """Return a press of 3 mm in 0.8 s, then 5 mm/s to a height, mm, and a rest there."""
     up = 1.1 + max(abs(height + 3.0) / 5.0, 0.3) * 1.2
     ways = ((0.0, 1.5), (0.8, -3.0), (1.1, -3.0), (up, height), (up + 0.4, height))
-    return [(t, x, y, z, *turn) for t, z in ways]  # type: ignore[misc]
+    return [(t, x, y, z, *turn) for t, z in ways]
 
 
 def _drag(
-    x: float,
-    y: float,
-    height: float,
-    speed: float,
-    hold: float = 0.5,
-    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    x: float, y: float, height: float, speed: float, hold: float = 0.5, turn: Turn = (0.0, 0.0, 0.0)
 ) -> list[Pose]:
     """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
     poses = _lift(x, y, height, turn)
@@ -121,12 +114,8 @@ def list_paths() -> dict[str, tuple[str, list[Pose]]]:
         eight.append((time, 20.0 * math.sin(angle), 12.0 * math.sin(2.0 * angle), 8.0, 0.0, 0.0, 0.0))
     twisted = _lift(-20.0, -5.0, 10.0)
     begun = twisted[-1][0]
-    for share, turn, pitch, roll in (
-        (0.25, 0.8, 0.0, 0.2),
-        (0.5, 0.0, 0.25, 0.0),
-        (0.75, -0.8, 0.0, -0.2),
-        (1.0,) + 3 * (0.0,),
-    ):
+    turns = ((0.8, 0.0, 0.2), (0.0, 0.25, 0.0), (-0.8, 0.0, -0.2), (0.0, 0.0, 0.0))
+    for share, (turn, pitch, roll) in zip((0.25, 0.5, 0.75, 1.0), turns, strict=True):
         y = -5.0 + 4.0 * math.sin(2.0 * math.pi * share)
         twisted.append((begun + 4.0 * share, -20.0 + 40.0 * share, y, 10.0, turn, pitch, roll))
     return {
@@ -144,10 +133,8 @@ def draw_drags(count: int) -> list[tuple[str, list[Pose]]]:
     for number in range(count):
         height, speed = random.uniform(-8.0, 15.0), random.uniform(5.0, 16.0)
         angle, length = random.uniform(0.0, 2.0 * math.pi), random.uniform(20.0, 36.0)
-        (x, y), (dx, dy) = (
-            random.uniform(-10.0, 10.0, 2),
-            0.5 * length * np.array((math.cos(angle), math.sin(angle))),
-        )
+        x, y = random.uniform(-10.0, 10.0, 2)
+        dx, dy = 0.5 * length * np.array((math.cos(angle), math.sin(angle)))
         facing, turned = random.uniform((-math.pi, -1.0), (math.pi, 1.0)).tolist()
         first, last = ((turn, *random.uniform(-TILT, TILT, 2).tolist()) for turn in (facing, facing + turned))
         poses = _lift(float(x - dx), float(y - dy), height, first)
@@ -190,22 +177,14 @@ OUTCOMES: dict[str, Metric] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Trial of a method.
+class Trial(NamedTuple):
+    """Trial of a method."""
 
-    Attributes
-    ----------
-    name : str
-        Of its trajectory; a random drag has a number.
-    group : str
-        Name by which it is chosen, in `GROUPS`.
-    number : int
-        Of a random drag; 0 otherwise.
-    """
-
+    #: Of its trajectory; a random drag has a number.
     name: str
+    #: Name by which it is chosen, in `GROUPS`.
     group: str
+    #: Of a random drag; 0 otherwise.
     number: int = 0
 
 

@@ -39,35 +39,21 @@ DIGITS = 12
 
 @dataclass(frozen=True)
 class Range:
-    """Range of one varied parameter.
+    """Range of one varied parameter."""
 
-    Attributes
-    ----------
-    key : str
-        Section and key, ``control.force_gain``.
-    low, high : float
-        Ends, in `unit`.
-    unit : str
-        As written behind the numbers; empty: SI.
-    logarithmic : bool
-        Whether equal shares are equal ratios.
-    words : tuple of str
-        Choices in place of a range.
-    whole : bool
-        Whether values are whole numbers.
-    si : str
-        SI unit of the parameter.
-    factor : float
-        From `unit` to it.
-    """
-
+    #: Section and key, ``control.force_gain``.
     key: str
+    #: Ends, in `unit`, which is as written behind the numbers; empty: SI.
     low: float = 0.0
     high: float = 1.0
     unit: str = ""
+    #: Whether equal shares are equal ratios.
     logarithmic: bool = False
+    #: Choices in place of a range.
     words: tuple[str, ...] = ()
+    #: Whether values are whole numbers.
     whole: bool = False
+    #: SI unit of the parameter, and the factor from `unit` to it.
     si: str = ""
     factor: float = 1.0
 
@@ -144,24 +130,14 @@ def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -
 
 @dataclass(frozen=True)
 class Subject:
-    """Scene, varied parameters and metrics.
+    """Scene, varied parameters and metrics."""
 
-    Attributes
-    ----------
-    path : Path
-        The scene's file.
-    settings : tuple of Setting
-        What the options change of it at every point.
-    scene : Scene
-        With them.
-    names : tuple of str
-        Outputs: keys of `evaluation.FIGURES`.
-    """
-
+    #: The scene's file, what the options change of it at every point, and the scene with that.
     path: Path
     settings: tuple[Setting, ...]
     scene: Scene
     ranges: tuple[Range, ...]
+    #: Outputs: keys of `evaluation.FIGURES`.
     names: tuple[str, ...]
 
     @property

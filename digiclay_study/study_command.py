@@ -7,9 +7,8 @@ import csv
 import io
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay import __version__
@@ -18,6 +17,7 @@ from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.extras import format_command
 from digiclay.commands.progress import Counted
 from digiclay.commands.stop import refuse_without
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.studies.axes import Point, Record
@@ -38,7 +38,6 @@ from .indices import (
 )
 from .point_series import (
     UNCHANGED,
-    Range,
     Subject,
     add_subject,
     evaluate_unchanged,
@@ -67,8 +66,9 @@ MOST_SAMPLES = 4096
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Find which parameters matter: Sobol indices of metrics over ranges of parameters."
-    parser = add_command(commands, "study", "find which parameters matter for which metric", EXAMPLES, said)
+    description = "Find which parameters matter: Sobol indices of metrics over ranges of parameters."
+    purpose = "find which parameters matter for which metric"
+    parser = add_command(commands, "study", purpose, EXAMPLES, description)
     add_subject(parser, METRICS)
     parser.add_argument(
         "--samples", metavar="N", type=_read_samples, default=64, help="a power of two; default: 64"
@@ -98,11 +98,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
         )
     total = count_points(arguments.samples, count, second=second)
     refuse_too_many("--samples", total)
-    plan = {
-        "samples": arguments.samples,
-        "seed": arguments.seed,
-        "orders": "first, second" if second else "first",
-    }
+    orders = "first, second" if second else "first"
+    plan = {"samples": arguments.samples, "seed": arguments.seed, "orders": orders}
     with Counted(sys.stderr, "study", "points read") as bar:
         shares = sample_shares(arguments.samples, count, arguments.seed, second=second)
         points = make_points(subject, shares, 1, None if arguments.quiet else bar)
@@ -131,33 +128,23 @@ def _write(
 
     from .study_plots import draw_indices
 
-    found = [records[point.index] for point in points]
-    excess = find_excess_losses(found, records[UNCHANGED])
+    results = [records[point.index] for point in points]
+    excess = find_excess_losses(results, records[UNCHANGED])
     responses: dict[str, Response] = {}
     notes = []
     for name in subject.names:
         try:
-            responses[name] = make_response(name, found, excess)
+            responses[name] = make_response(name, results, excess)
         except OutputError as error:
             notes.append(str(error))
     if not responses:
         raise OutputError(notes[0])
     indices = {
-        name: compute_indices(one.values, len(subject.ranges), arguments.seed, second=arguments.second)
-        for name, one in responses.items()
+        name: compute_indices(response.values, len(subject.ranges), arguments.seed, second=arguments.second)
+        for name, response in responses.items()
     }
-    findings = Findings(
-        title=f"{subject.scene.name}, digiclay {__version__}",
-        command=_format_call(arguments, subject),
-        ranges=subject.ranges,
-        samples=arguments.samples,
-        points=len(points),
-        seed=arguments.seed,
-        second=arguments.second,
-        unchanged=records[UNCHANGED]["figures"],
-        responses=responses,
-        indices=indices,
-    )
+    unchanged = records[UNCHANGED]["figures"]
+    findings = Findings(arguments, subject, len(points), unchanged, responses, indices)
     out: Path = arguments.out
     every = (Point(UNCHANGED, (), subject.scene), *points)
     write_points(out / "points.csv", subject, every, records, [LOSS])
@@ -169,41 +156,39 @@ def _write(
 
 def _format_call(arguments: argparse.Namespace, subject: Subject) -> str:
     """Return the command that repeats the study."""
-    varied = [word for said in arguments.vary for word in ("--vary", said)]
-    settings = [word for key, value, _ in subject.settings for word in ("--set", f"{key}={value}")]
-    rest = [
-        "--samples",
-        str(arguments.samples),
-        "--seed",
-        str(arguments.seed),
-        "--metric",
-        ",".join(subject.names),
-    ]
-    second = ["--second"] if arguments.second else []
-    return format_command(
-        ["study", arguments.scene, *varied, *settings, *rest, *second, "--out", str(arguments.out)]
-    )
+    words = ["study", arguments.scene]
+    words += [word for varied in arguments.vary for word in ("--vary", varied)]
+    words += [word for key, value, _ in subject.settings for word in ("--set", f"{key}={value}")]
+    words += ["--samples", str(arguments.samples), "--seed", str(arguments.seed)]
+    words += ["--metric", ",".join(subject.names), *(["--second"] if arguments.second else [])]
+    return format_command([*words, "--out", str(arguments.out)])
 
 
-def _summarize(findings: Findings) -> list[str]:
-    """Return a line an output: its parameters by total index."""
-    lines = []
-    for name, found in findings.indices.items():
-        if found is None:
-            lines.append(f"{name} does not vary")
+class Findings(NamedTuple):
+    """Results of a study."""
+
+    arguments: argparse.Namespace
+    subject: Subject
+    #: Number of runs.
+    points: int
+    #: Outputs of the unchanged scene, None where it has none.
+    unchanged: Mapping[str, float | None]
+    responses: Mapping[str, Response]
+    #: None for an output that does not vary.
+    indices: Mapping[str, Indices | None]
+
+
+def _summarize(findings: Findings) -> Iterator[str]:
+    """Give a line an output: its parameters by total index."""
+    keys = findings.subject.keys
+    for name, indices in findings.indices.items():
+        if indices is None:
+            yield f"{name} does not vary"
             continue
-        order = sorted(range(len(findings.ranges)), key=lambda number: -found.total[number])
-        parts = (
-            f"{findings.ranges[i].key} {found.total[i]:.2f} ± {found.total_interval[i]:.2f}" for i in order
-        )
-        one = findings.responses[name]
-        gaps = (
-            f" ({one.absent} runs without a value, {one.lost} that lost the fingertip)"
-            if one.absent + one.lost
-            else ""
-        )
-        lines.append(f"{name}: total indices {', '.join(parts)}{gaps}")
-    return lines
+        parts = (f"{keys[i]} {_format(indices, 'total', i)}" for i in _rank(indices["total"]))
+        _, _, absent, lost = findings.responses[name]
+        gaps = f" ({absent} runs without a value, {lost} that lost the fingertip)" if absent + lost else ""
+        yield f"{name}: total indices {', '.join(parts)}{gaps}"
 
 
 #: Of the table of the outputs.
@@ -213,55 +198,20 @@ HEAD = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Findings:
-    """Results of a study.
-
-    Attributes
-    ----------
-    title : str
-        Scene and version.
-    command : str
-        By which the study is repeated.
-    second : bool
-        Whether there are second-order indices.
-    unchanged : mapping
-        Outputs of the unchanged scene, None where it has none.
-    indices : mapping of str to Indices or None
-        None for an output that does not vary.
-    """
-
-    title: str
-    command: str
-    ranges: tuple[Range, ...]
-    samples: int
-    points: int
-    seed: int
-    second: bool
-    unchanged: Mapping[str, float | None]
-    responses: Mapping[str, Response]
-    indices: Mapping[str, Indices | None]
-
-
 def format_index_table(findings: Findings) -> str:
     """Return all indices as CSV, with half the widths of their intervals; empty where there are none."""
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")
     writer.writerow(["output", "order", "parameter", "with", "index", f"interval ({CONFIDENCE:.0%}, +-)"])
-    keys = [one.key for one in findings.ranges]
-    for name, found in findings.indices.items():
-        for order, kind in (("first", "first"), ("total", "total")):
-            for number, key in enumerate(keys):
-                pair = ("", "")
-                if found is not None:
-                    pair = (
-                        repr(float(getattr(found, kind)[number])),
-                        repr(float(getattr(found, f"{kind}_interval")[number])),
-                    )
+    keys = findings.subject.keys
+    for name, indices in findings.indices.items():
+        for order in ("first", "total"):
+            for i, key in enumerate(keys):
+                pair = ["", ""] if indices is None else [repr(float(part[i])) for part in indices[order]]
                 writer.writerow([name, order, key, "", *pair])
-        if findings.second and found is not None:
+        if indices and "second" in indices:
             for i, j in zip(*np.triu_indices(len(keys), 1), strict=True):
-                pair = (repr(float(found.second[i, j])), repr(float(found.second_interval[i, j])))
+                pair = [repr(float(part[i, j])) for part in indices["second"]]
                 writer.writerow([name, "second", keys[i], keys[j], *pair])
     return lines.getvalue()
 
@@ -272,19 +222,20 @@ def format_page(findings: Findings, pictures: Sequence[str]) -> str:
 
 
 def _write_page(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
-    yield f"# Sensitivity of {findings.title}\n"
-    yield f"    {findings.command}\n"
+    arguments, subject = findings.arguments, findings.subject
+    yield f"# Sensitivity of {subject.scene.name}, digiclay {__version__}\n"
+    yield f"    {_format_call(arguments, subject)}\n"
     yield (
-        f"{findings.points} runs: {findings.samples} samples of Saltelli's design, seed {findings.seed}. "
+        f"{findings.points} runs: {arguments.samples} samples of Saltelli's design, seed {arguments.seed}. "
         "All values of a range are equally likely; on a logarithmic scale, equal ratios are.\n"
     )
     yield "| parameter | range |"
     yield "| --- | --- |"
-    yield from (f"| `{one.key}` | {one} |" for one in findings.ranges)
+    yield from (f"| `{each.key}` | {each} |" for each in subject.ranges)
     yield "\n## Outputs\n"
     yield f"| {' | '.join(HEAD)} |"
     yield f"| --- | --- |{' ---: |' * (len(HEAD) - 2)}"
-    yield from (_describe(findings.unchanged[name], one) for name, one in findings.responses.items())
+    yield from (_describe(findings.unchanged[name], each) for name, each in findings.responses.items())
     yield (
         "\n*Without a value* are runs that failed or to which the output does not apply. *Fingertip lost* "
         f"are other runs whose `{LOSS}` exceeds that of the unchanged scene by more than {ALLOWED:g}. Both "
@@ -298,45 +249,44 @@ def _write_page(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
         f"{CONFIDENCE:.0%} interval, from resampling.\n"
     )
     yield from (f"![Indices]({name})\n" for name in pictures)
-    keys = [one.key for one in findings.ranges]
-    for name, found in findings.indices.items():
+    keys = subject.keys
+    for name, indices in findings.indices.items():
         yield f"### `{name}`\n"
-        if found is None:
+        if indices is None:
             yield "It does not vary.\n"
             continue
         yield "| parameter | first order | total |"
         yield "| --- | ---: | ---: |"
-        for i in np.argsort(-found.total, kind="stable"):
-            first, total = (
-                _pair(found.first[i], found.first_interval[i]),
-                _pair(found.total[i], found.total_interval[i]),
-            )
-            yield f"| `{keys[i]}` | {first} | {total} |"
+        for i in _rank(indices["total"]):
+            yield f"| `{keys[i]}` | {_format(indices, 'first', i)} | {_format(indices, 'total', i)} |"
         yield ""
-        if findings.second:
-            yield from _write_pairs(keys, found)
+        if "second" in indices:
+            yield "| interaction of | second order |"
+            yield "| --- | ---: |"
+            pairs = np.triu_indices(len(keys), 1)
+            for place in _rank(indices["second"], pairs):
+                i, j = (int(part[place]) for part in pairs)
+                yield f"| `{keys[i]}`, `{keys[j]}` | {_format(indices, 'second', (i, j))} |"
+            yield ""
 
 
-def _describe(unchanged: float | None, one: Response) -> str:
+def _describe(unchanged: float | None, response: Response) -> str:
     """Return an output as a row of the table."""
-    factor, unit = read_unit(FIGURES[one.name].unit, one.values)
-    values = one.values * factor
+    factor, unit = read_unit(FIGURES[response.name].unit, response.values)
+    values = response.values * factor
     usual = "–" if unchanged is None else f"{unchanged * factor:.4g}"
     numbers = (values.mean(), values.std(), values.min(), values.max())
     middle = " | ".join(f"{number:.4g}" for number in numbers)
-    return f"| `{one.name}` | {unit or '1'} | {usual} | {middle} | {one.absent} | {one.lost} |"
+    return f"| `{response.name}` | {unit or '1'} | {usual} | {middle} | {response.absent} | {response.lost} |"
 
 
-def _write_pairs(keys: Sequence[str], found: Indices) -> Iterator[str]:
-    """Give the second-order indices, the largest first."""
-    yield "| interaction of | second order |"
-    yield "| --- | ---: |"
-    rows, columns = np.triu_indices(len(keys), 1)
-    for number in np.argsort(-found.second[rows, columns], kind="stable"):
-        i, j = rows[number], columns[number]
-        yield f"| `{keys[i]}`, `{keys[j]}` | {_pair(found.second[i, j], found.second_interval[i, j])} |"
-    yield ""
+def _rank(order: tuple[Floats, Floats], part: Any = slice(None)) -> list[int]:
+    """Return the places of indices, the largest first."""
+    places: list[int] = np.argsort(-order[0][part], kind="stable").tolist()
+    return places
 
 
-def _pair(index: float, interval: float) -> str:
-    return f"{round(index, 2) + 0.0:.2f} ± {interval:.2f}"  # no minus before a zero
+def _format(indices: Indices, order: str, place: Any) -> str:
+    """Return an index and half its interval."""
+    index, interval = (part[place] for part in indices[order])
+    return f"{round(float(index), 2) + 0.0:.2f} ± {interval:.2f}"  # no minus before a zero

@@ -29,13 +29,9 @@ SHOWN = 0.85
 
 
 def draw_front(
-    names: Sequence[str],
-    values: Floats,
-    sound: NDArray[np.bool_],
-    front: NDArray[np.intp],
-    chosen: int,
+    names: Sequence[str], values: Floats, sound: NDArray[np.bool_], front: NDArray[np.intp], chosen: int,
     title: str,
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Draw the trials over two outputs; the first one upwards, the second one to the right."""
     units = [read_unit(FIGURES[name].unit, values[sound, number]) for number, name in enumerate(names)]
     shown = values * [factor for factor, _ in units]
@@ -55,29 +51,20 @@ def draw_front(
         axes.set_xlabel(_label(names[1], units[1][1]))
         outside = _frame(axes, shown, np.concatenate([front, [0]]), trials)
         if outside:
-            axes.text(
-                1.0, -0.155, f"{outside} trials are outside the axes", transform=axes.transAxes, ha="right"
-            )
+            note = f"{outside} trials are outside the axes"
+            axes.text(1.0, -0.155, note, transform=axes.transAxes, ha="right")
         close = {"borderaxespad": 0.2, "handletextpad": 0.3, "columnspacing": 1.2}
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, **close)
     return figure
 
 
 def _mark(axes: Any, points: Floats, marker: str, color: str, size: float, label: str) -> None:
-    """Draw markers."""
-    edge: dict[str, Any] = (
-        {} if marker == "x" else {"edgecolors": INK if size > 30 else "none", "linewidths": 0.8}
-    )
-    axes.scatter(
-        points[:, 1],
-        points[:, 0],
-        size,
-        color,
-        marker=marker,
-        label=label,
-        zorder=4 if size > 30 else 2,
-        **edge,
-    )
+    """Draw markers, large ones over small ones."""
+    large = size > 30
+    look: dict[str, Any] = {"marker": marker, "label": label, "zorder": 4 if large else 2}
+    if marker != "x":
+        look |= {"edgecolors": INK if large else "none", "linewidths": 0.8}
+    axes.scatter(points[:, 1], points[:, 0], size, color, **look)
 
 
 def _label(name: str, unit: str) -> str:
@@ -114,15 +101,16 @@ FARTHEST = (-0.4, 1.4)
 
 def draw_indices(keys: Sequence[str], found: Mapping[str, Indices | None], title: str) -> Figure:
     """Draw first-order and total indices of each output, those with the largest totals at the top."""
-    totals = [one.total for one in found.values() if one is not None]
-    low, high = _find_ends([one for one in found.values() if one is not None])
+    varying = [indices for indices in found.values() if indices is not None]
+    low, high = _find_ends(varying)
+    totals = [indices["total"][0] for indices in varying]
     order = np.argsort(np.max(totals, axis=0)) if totals else np.arange(len(keys))
     beside = BESIDE + LETTER * max(len(key) for key in keys)
     width = beside + len(found) * (ACROSS + GAP)
     up = A_PARAMETER * len(keys) + 0.2
     height = ABOVE + up + BELOW
     with canvas(width, height, title) as (figure, place):
-        for number, (name, one) in enumerate(found.items()):
+        for number, (name, indices) in enumerate(found.items()):
             axes = place(name, beside + number * (ACROSS + GAP), BELOW, ACROSS, up)
             axes.set(xlim=(low, high), ylim=(-0.6, len(keys) - 0.4), title=name)
             axes.set_xlabel("share of the variance")
@@ -130,10 +118,10 @@ def draw_indices(keys: Sequence[str], found: Mapping[str, Indices | None], title
             axes.tick_params(axis="y", length=0)
             axes.grid(visible=False, axis="y")
             axes.axvline(0.0, color=INK, linewidth=0.8)
-            if one is None:
+            if indices is None:
                 axes.text(0.5, 0.5, "does not vary", transform=axes.transAxes, ha="center", va="center")
             else:
-                _draw_bars(axes, one, order)
+                _draw_bars(axes, indices, order)
         handles, labels = figure.axes[0].get_legend_handles_labels()
         if handles:
             figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.0))
@@ -142,33 +130,22 @@ def draw_indices(keys: Sequence[str], found: Mapping[str, Indices | None], title
 
 def _find_ends(found: Sequence[Indices]) -> tuple[float, float]:
     """Return the ends of the axes that show the bars with their intervals."""
-    low, high = [0.0], [1.0]
-    for one in found:
-        for values, interval in ((one.first, one.first_interval), (one.total, one.total_interval)):
-            low.append(float(np.min(values - interval)))
-            high.append(float(np.max(values + interval)))
-    return max(min(low) - 0.05, FARTHEST[0]), min(max(high) + 0.05, FARTHEST[1])
+    bars = [indices[order] for indices in found for order in ("first", "total")]
+    low = min([0.0, *(float(np.min(values - interval)) for values, interval in bars)])
+    high = max([1.0, *(float(np.max(values + interval)) for values, interval in bars)])
+    return max(low - 0.05, FARTHEST[0]), min(high + 0.05, FARTHEST[1])
 
 
-def _draw_bars(axes: Any, one: Indices, order: Any) -> None:
+def _draw_bars(axes: Any, indices: Indices, order: Any) -> None:
     """Draw the bars of an output."""
-    level = f"{CONFIDENCE:.0%}"
-    rows = np.arange(len(order))
-    pairs = (
-        ("alone (first order)", one.first, one.first_interval, 0.5, LINES[0], ""),
-        (
-            f"with interactions (total), {level} intervals",
-            one.total,
-            one.total_interval,
-            -0.5,
-            LINES[1],
-            "////",
-        ),
-    )
-    for label, values, interval, side, color, hatch in pairs:
+    rows, whisker = np.arange(len(order)), {"ecolor": INK, "elinewidth": 1.1, "capsize": 2.5}
+    total = f"with interactions (total), {CONFIDENCE:.0%} intervals"
+    for name, label, side, color, hatch in (
+        ("first", "alone (first order)", 0.5, LINES[0], ""), ("total", total, -0.5, LINES[1], "////"),
+    ):  # fmt: skip
+        values, interval = (part[order] for part in indices[name])
         look = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.0, "label": label}
-        whisker = {"ecolor": INK, "elinewidth": 1.1, "capsize": 2.5}
-        axes.barh(rows + side * BAR, values[order], BAR, xerr=interval[order], error_kw=whisker, **look)
+        axes.barh(rows + side * BAR, values, BAR, xerr=interval, error_kw=whisker, **look)
 
 
 #: Marks of the methods, which differ without their colors.
@@ -189,9 +166,9 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
         for number, method in enumerate(methods):
             _mark_method(axes, table, method, number, names)
         points = [found.get("set_point") for (own, _, _), found in table.items() if own == methods[0]]
-        known = [value for value in points if value is not None]
-        if known:
-            edges = [share * known[0] / 1e-3 for share in find_weber_fractions(known[0])]
+        set_point = next((value for value in points if value is not None), None)
+        if set_point is not None:
+            edges = [share * set_point / 1e-3 for share in find_weber_fractions(set_point)]
             axes.axvspan(*edges, color=SHADE, zorder=0, label="one JND of the set point")
         axes.set_yticks(-np.arange(len(names)), names)
         axes.set(ylim=(-len(names) + 0.4, 0.6), xlabel="RFD (mN)", xscale="log")
@@ -211,21 +188,11 @@ def _mark_method(axes: Any, table: Table, method: str, number: int, names: Seque
             for (own, trajectory, _), found in table.items()
             if (own, trajectory) == (method, name) and found.get("rfd")
         ]
-        if values:
-            rows = np.full(len(values), -line - shift)
-            axes.plot(values, rows, linestyle="", markersize=3, alpha=0.6, **style)
-            found = find_interval(values)
-            assert found is not None
-            axes.errorbar(
-                found.mean,
-                rows[0],
-                xerr=found.half,
-                linestyle="",
-                markersize=7,
-                capsize=3,
-                label=label,
-                **style,
-            )
+        if mean := find_interval(values):
+            row = -line - shift
+            axes.plot(np.array(values), np.full(len(values), row), ls="", markersize=3, alpha=0.6, **style)
+            whole = {"linestyle": "", "markersize": 7, "capsize": 3, "label": label}
+            axes.errorbar(mean.mean, row, xerr=mean.half, **whole, **style)
             label = None
 
 
@@ -256,11 +223,7 @@ def _mark_interval(axes: Any, row: Row, measure: str, line: int, number: int, fa
         axes.text(0.0, line, " –", va="center", fontsize=11, color=INK)
         return
     mean, half = found.mean * factor, (found.half or 0.0) * factor
-    axes.errorbar(
-        mean, line, xerr=half, color=LINES[number % len(LINES)], marker=MARKS[number % len(MARKS)],
-        markersize=8, capsize=4,
-    )  # fmt: skip
-    axes.annotate(
-        f"{mean:.3g}", (mean + half, line), xytext=(8, 0), textcoords="offset points", va="center",
-        fontsize=11,
-    )  # fmt: skip
+    style = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
+    axes.errorbar(mean, line, xerr=half, markersize=8, capsize=4, **style)
+    beside = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 11}
+    axes.annotate(f"{mean:.3g}", (mean + half, line), **beside)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from digiclay import __version__
 from digiclay.commands.arguments import METHOD, settings_of, whole_number
@@ -47,30 +46,20 @@ MOST_REPEATS, MOST_DRAGS = 100, 200
 RFD_PICTURE, MEASURES_PICTURE = "rfd.svg", "measures.svg"
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Plan of a suite.
-
-    Attributes
-    ----------
-    seeds : tuple of int
-        Of the noise.
-    points : tuple of Point
-        A trial each; words are method, trajectory and seed.
-    noise : float
-        Standard deviation of the force sensors, N.
-    title : str
-        Name of the scene.
-    identity : str
-        Hash of all scenes with all parameters, and of the code of methods of one's own.
-    """
+class Plan(NamedTuple):
+    """Plan of a suite."""
 
     methods: tuple[str, ...]
     groups: tuple[str, ...]
+    #: Of the noise.
     seeds: tuple[int, ...]
+    #: A trial each; words are method, trajectory and seed.
     points: tuple[Point, ...]
+    #: Standard deviation of the force sensors, N.
     noise: float
+    #: Name of the scene.
     title: str
+    #: Hash of all scenes with all parameters, and of the code of methods of one's own.
     identity: str
 
 
@@ -110,13 +99,9 @@ def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequ
     plan = make_plan(arguments, methods)
     out: Path = arguments.out or Path(f"{plan.title}_suite")
     description = {
-        "digiclay": __version__,
-        "methods": list(plan.methods),
-        "trajectories": list(plan.groups),
-        "seeds": list(plan.seeds),
-        "points": len(plan.points),
-        "scenes": plan.identity,
-    }
+        "digiclay": __version__, "methods": list(plan.methods), "trajectories": list(plan.groups),
+        "seeds": list(plan.seeds), "points": len(plan.points), "scenes": plan.identity,
+    }  # fmt: skip
 
     def describe(there: Mapping[str, Any]) -> str:
         return f"{there.get('points', '?')} trials, digiclay {there.get('digiclay', '?')}"

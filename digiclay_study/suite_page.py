@@ -52,15 +52,7 @@ SHOWN = ("rfd", "lag_mean", "ridge_unevenness", "relief_rms", "max_total_force",
 
 @dataclass(frozen=True)
 class Provenance:
-    """Origin of the results of a suite.
-
-    Attributes
-    ----------
-    identity : str
-        Hash of all scenes, with all parameters.
-    noise : float
-        N.
-    """
+    """Origin of the results of a suite: `identity` is the hash of all scenes, `noise` in N."""
 
     scene: str
     version: str
@@ -74,7 +66,7 @@ class Provenance:
 
     def cite(self) -> str:
         """Return the line by which a paper cites the results."""
-        ends = f"{self.seeds[0]} to {self.seeds[-1]}" if len(self.seeds) > 1 else f"{self.seeds[0]}"
+        ends = " to ".join(dict.fromkeys((str(self.seeds[0]), str(self.seeds[-1]))))
         return (
             f"digiclay {self.version}, benchmark of control methods {', '.join(self.methods)} "
             f"({self.scene}, scenes {self.identity[:16]}, noise {self.noise * 1e3:g} mN, seeds {ends}), "
@@ -115,7 +107,7 @@ def format_trajectories(source: Provenance, table: Table, methods: Sequence[str]
             for measure, metric in OUTCOMES.items():
                 found = _find_interval(table, method, name, measure)
                 if found is not None:
-                    rows.append([name, method, measure, metric.unit, found.mean, found.half, found.count])
+                    rows.append([name, method, measure, metric.unit, found.mean, found.half, found.number])
     return _format_csv(source, head, rows)
 
 

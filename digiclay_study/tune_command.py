@@ -6,9 +6,9 @@ import argparse
 import warnings
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay.commands.arguments import add_command, whole_number
@@ -52,19 +52,15 @@ KNEE = "knee"
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Find the best trade-off of two metrics: their Pareto front over ranges of parameters."
-    parser = add_command(commands, "tune", "find the best trade-off of two metrics", EXAMPLES, said)
+    description = "Find the best trade-off of two metrics: their Pareto front over ranges of parameters."
+    parser = add_command(commands, "tune", "find the best trade-off of two metrics", EXAMPLES, description)
     add_subject(parser, METRICS)
-    parser.add_argument(
-        "--population",
-        metavar="N",
-        type=whole_number(4, 4096),
-        default=64,
-        help="runs a generation; default: 64",
-    )
-    parser.add_argument(
-        "--generations", metavar="N", type=whole_number(1, 4096), default=10, help="default: 10"
-    )
+    options = (("population", 4, 64, "runs a generation; "), ("generations", 1, 10, ""))
+    for name, least, usual, words in options:
+        kind = whole_number(least, 4096)
+        parser.add_argument(
+            f"--{name}", metavar="N", type=kind, default=usual, help=f"{words}default: {usual}"
+        )
     parser.add_argument(
         "--choose", metavar="M", default=KNEE,
         help="what is chosen on the front: knee, or the metric that is to be least; default: knee",
@@ -125,8 +121,8 @@ def _evolve(
         done += points
         if len(done) + 1 == evaluation.total:
             return
-        found = [records[point.index] for point in points]
-        shares = generations.send(judge_trials(subject.names, found, unchanged).outcomes)
+        results = [records[point.index] for point in points]
+        shares = generations.send(judge_trials(subject.names, results, unchanged))
 
 
 def _refuse_others(
@@ -161,8 +157,8 @@ def _write(
     out: Path = arguments.out
     write_points(out / "points.csv", subject, every, records)
     write_points(out / "front.csv", subject, [every[index] for index in front], records)
-    said = _describe(subject.names, trials.values[chosen])
-    text = f"Chosen by digiclay tune from {len(points)} runs, {choice} of the front: {said}"
+    outputs = _describe(subject.names, trials.values[chosen])
+    text = f"Chosen by digiclay tune from {len(points)} runs, {choice} of the front: {outputs}"
     scene = every[chosen].scene
     assert scene is not None  # a point on the front has been run
     scene = replace(scene, name=f"{subject.scene.name}_tuned", description=text)
@@ -181,7 +177,7 @@ def _write(
     return [
         f"{len(points)} runs, {lost} of them failed or lost the fingertip; on the front: {len(front)}",
         f"unchanged scene: {own}; better in both: {np.count_nonzero(worse)} of the front",
-        f"chosen ({choice}): {said}; {values or 'the unchanged scene'}",
+        f"chosen ({choice}): {outputs}; {values or 'the unchanged scene'}",
     ]
 
 
@@ -200,8 +196,8 @@ def find_front(values: Floats) -> NDArray[np.intp]:
     A point dominates another if it is at most as large in both outputs, and less in one. Of equal points the
     first one is returned.
     """
-    known = np.flatnonzero(~np.isnan(values).any(axis=1))
-    order = known[np.lexsort((values[known, 1], values[known, 0]))]
+    valid = np.flatnonzero(~np.isnan(values).any(axis=1))
+    order = valid[np.lexsort((values[valid, 1], values[valid, 0]))]
     front, least = [], np.inf
     for point in order:
         if values[point, 1] < least:
@@ -221,71 +217,17 @@ def find_knee(front: Floats) -> int:
     return int(np.argmin(scaled.sum(axis=1)))
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Outcome of a point, which a search takes.
-
-    Attributes
-    ----------
-    values : tuple of float
-        The outputs to be minimized; infinite where there are none.
-    violation : float
-        Above 0 for a point that is no solution: of two such points the lesser violation is preferred, and any
-        solution to both.
-    """
-
-    values: tuple[float, float]
-    violation: float
-
-
-def propose_generations(
-    parameters: int, population: int, seed: int
-) -> Generator[Floats, Sequence[Outcome], None]:
-    """Yield generations without end; each is asked for with the outcomes of the one before.
-
-    The same outcomes lead to the same generations: a search that is told kept outcomes from its beginning
-    goes on as if it had never stopped.
-    """
-    import optuna
-    from optuna.samplers.nsgaii import PolynomialMutation, SBXCrossover
-
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    space: dict[str, optuna.distributions.BaseDistribution] = {
-        f"x{number}": optuna.distributions.FloatDistribution(0.0, 1.0) for number in range(parameters)
-    }
-    with warnings.catch_warnings():
-        # Crossover and mutation of the original NSGA-II; optuna's own are coarser, and no experiment.
-        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-        sampler = optuna.samplers.NSGAIISampler(
-            population_size=population, crossover=SBXCrossover(), mutation=PolynomialMutation(), seed=seed
-        )
-    study = optuna.create_study(directions=["minimize", "minimize"], sampler=sampler)
-    while True:
-        trials = [study.ask(space) for _ in range(population)]
-        outcomes = yield np.array([[trial.params[name] for name in space] for trial in trials])
-        for trial, outcome in zip(trials, outcomes, strict=True):
-            trial.set_constraint("loss", outcome.violation)
-            study.tell(trial, outcome.values)
-
-
 #: Violation of a run without outputs: more than any loss of contact, which is a share.
 WITHOUT = 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Trials:
-    """Outputs of runs.
+class Trials(NamedTuple):
+    """Outputs of runs."""
 
-    Attributes
-    ----------
-    values : ndarray (points, 2)
-        SI; infinite in both where a run has no such outputs.
-    violation : ndarray (points,)
-        By how much the loss of contact exceeds what is allowed, 0 for a run that keeps the fingertip, and
-        `WITHOUT` for one without outputs.
-    """
-
+    #: (points, 2), SI, to be minimized; infinite in both where a run has no such outputs.
     values: Floats
+    #: (points,), by how much the loss of contact exceeds what is allowed, 0 for a run that keeps the
+    #: fingertip, and `WITHOUT` for one without outputs.
     violation: Floats
 
     @property
@@ -293,14 +235,6 @@ class Trials:
         """Which runs keep the fingertip, shape (points,)."""
         kept: NDArray[np.bool_] = self.violation <= 0.0
         return kept
-
-    @property
-    def outcomes(self) -> list[Outcome]:
-        """What a search is told of them."""
-        return [
-            Outcome((float(one), float(other)), float(violation))
-            for (one, other), violation in zip(self.values, self.violation, strict=True)
-        ]
 
     def find_front(self) -> NDArray[np.intp]:
         """Return the runs on the front, ordered by the first output."""
@@ -317,3 +251,31 @@ def judge_trials(names: Sequence[str], records: Sequence[Record], reference: Rec
     without = np.isnan(values).any(axis=1) | np.isnan(excess)
     values[without] = np.inf
     return Trials(values, np.where(without, WITHOUT, np.maximum(excess, 0.0)))
+
+
+def propose_generations(parameters: int, population: int, seed: int) -> Generator[Floats, Trials, None]:
+    """Yield generations without end; each is asked for with the trials of the one before.
+
+    The same trials lead to the same generations: a search that is given kept trials from its beginning goes
+    on as if it had never stopped. Of two runs that are no solution the lesser violation is preferred.
+    """
+    import optuna
+    from optuna.samplers.nsgaii import PolynomialMutation, SBXCrossover
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    space: dict[str, optuna.distributions.BaseDistribution] = {
+        f"x{number}": optuna.distributions.FloatDistribution(0.0, 1.0) for number in range(parameters)
+    }
+    with warnings.catch_warnings():
+        # Crossover and mutation of the original NSGA-II; optuna's own are coarser, and no experiment.
+        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+        sampler = optuna.samplers.NSGAIISampler(
+            population_size=population, crossover=SBXCrossover(), mutation=PolynomialMutation(), seed=seed
+        )
+    study = optuna.create_study(directions=["minimize", "minimize"], sampler=sampler)
+    while True:
+        asked = [study.ask(space) for _ in range(population)]
+        trials = yield np.array([[trial.params[name] for name in space] for trial in asked])
+        for trial, values, violation in zip(asked, trials.values, trials.violation, strict=True):
+            trial.set_constraint("loss", float(violation))
+            study.tell(trial, values.tolist())

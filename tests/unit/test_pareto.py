@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
-from digiclay_study.tune_command import Outcome, find_front, find_knee, propose_generations
+from digiclay_study.tune_command import Trials, find_front, find_knee, propose_generations
 
 POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]])
 
@@ -47,12 +47,10 @@ def evolve(count: int, seed: int = 1) -> NDArray[np.float64]:
     shares, found = next(generations), []
     for _ in range(count):
         values = measure(shares)
-        outcomes = [
-            Outcome((np.inf, np.inf), 2.0) if number == 3 else Outcome((one, other), max(share - 0.67, 0.0))
-            for number, ((one, other), share) in enumerate(zip(values, shares[:, 0], strict=True))
-        ]
-        found.append(np.where((shares[:, :1] > 0.67), np.nan, values))
-        shares = generations.send(outcomes)
+        violation = np.maximum(shares[:, 0] - 0.67, 0.0)
+        found.append(np.where(shares[:, :1] > 0.67, np.nan, values))
+        values[3], violation[3] = np.inf, 2.0
+        shares = generations.send(Trials(values, violation))
     return np.concatenate(found)
 
 
