@@ -155,7 +155,7 @@ def test_a_method_of_one_s_own_enters_by_one_option(here: Path) -> None:
 
 def test_an_interval_is_student_s_and_one_value_has_none() -> None:
     found, single = find_interval([1.0, 2.0, None, 3.0, math.nan]), find_interval([1.0])
-    assert (found.mean, found.count, single.half) == (2.0, 3, None)
+    assert (found.mean, found.number, single.half) == (2.0, 3, None)
     assert found.half == pytest.approx(4.302652729911275 / math.sqrt(3.0))  # t(0.975, 2), table
     assert find_interval([None, math.inf]) is None
 
