@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pythonosc.osc_message import OscMessage
 
-from digiclay_serve.osc_door import format_osc_frame, read_osc, read_request, read_request
+from digiclay_serve.osc_door import format_osc_frame, read_osc, read_request
 from digiclay_serve.protocol import (
     Flag,
     Frame,
