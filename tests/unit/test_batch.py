@@ -6,8 +6,6 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -15,14 +13,10 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands.batch import JobProcess
-from digiclay.commands.batch_folder import Folder, open_batch
-from digiclay.core.base.errors import OutputError
-from digiclay.core.studies.job_table import read_jobs
+from digiclay.commands.batch_folder import Folder
 
-from tests.other_process import dead
+from tests.other_process import PROGRAM, dead, finish, start
 from tests.timeouts import TIMEOUT, wait_until
-
-ADDON = Path(__file__).parents[2] / "addon"
 
 TWO = """
 scenes = ["tap"]
@@ -55,18 +49,17 @@ def jobs(said: str) -> None:
     Path("two.toml").write_text(said, encoding="utf-8")
 
 
+def started() -> Any:
+    """Start a batch of sessions of hours in a process of its own; return it when both have begun."""
+    jobs(HOURS)
+    process = start(PROGRAM, "batch", "two.toml", "--jobs", "2", start_new_session=True)
+    wait_until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
+    return process
+
+
 def runs(out: str = "two") -> list[str]:
     """Return what lies in the folder of runs, hidden things too."""
     return sorted(path.name for path in Path(out, "runs").iterdir())
-
-
-def started(*arguments: str) -> subprocess.Popen[str]:
-    """Start the program in a process of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "digiclay", "batch", *arguments], text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ADDON)},
-        start_new_session=True,
-    )  # fmt: skip
 
 
 def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(
@@ -104,18 +97,21 @@ def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(
     assert page.count("start of its process") == page.count("data:image/png;base64,") == 2
 
 
-def test_finished_jobs_are_kept_and_only_changed_ones_are_done_again() -> None:
+def test_finished_jobs_are_kept_and_changed_or_half_written_ones_are_done_again() -> None:
     jobs(TWO)
     main(["batch", "two.toml", "--quiet"])
     before = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
     jobs(TWO.replace("0.2", "0.3") + "other.simulation.duration = 0.1\n")
+    shutil.copytree("two/runs/tap-quick", f"two/runs/.tap-quick.{dead()}.part")
     assert main(["batch", "two.toml", "--quiet"]) == 0
     after = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
-    assert after["tap-quick"] == before["tap-quick"]
-    assert after["tap-slow"] > before["tap-slow"]
+    assert (after["tap-quick"] == before["tap-quick"], after["tap-slow"] > before["tap-slow"]) == (True, True)
     assert list(after) == ["tap-other", "tap-quick", "tap-slow"]
     metrics = json.loads(Path("two/runs/tap-slow/metrics.json").read_text(encoding="utf-8"))
     assert metrics["simulated"] == pytest.approx(0.3, abs=1e-9)
+    Path("two/runs/tap-slow/job.toml").unlink()  # as if it had not come so far
+    assert main(["batch", "two.toml", "--quiet"]) == 0
+    assert Path("two/runs/tap-slow/job.toml").is_file()
 
 
 def test_a_failing_job_is_told_of_and_the_rest_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
@@ -133,45 +129,22 @@ def test_a_failing_job_is_told_of_and_the_rest_goes_on(capsys: pytest.CaptureFix
     assert "recorder.every must be at least" in page
 
 
-def test_a_folder_that_was_half_written_does_not_count() -> None:
-    jobs(TWO)
-    main(["batch", "two.toml", "--quiet"])
-    Path("two/runs/tap-slow/job.toml").unlink()  # as if it had not come so far
-    leftover = Path(f"two/runs/.tap-quick.{dead()}.part")
-    shutil.move("two/runs/tap-quick", leftover)
-    assert main(["batch", "two.toml", "--quiet"]) == 0
-    assert runs() == ["tap-quick", "tap-slow"]
-    assert Path("two/runs/tap-slow/job.toml").is_file()
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_ctrl_c_ends_all_processes_and_leaves_nothing_half_done() -> None:
-    jobs(HOURS)
-    process = started("two.toml", "--jobs", "2")
-    wait_until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
+    process = started()
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    out, err = process.communicate(timeout=TIMEOUT)
-    assert (process.returncode, err) == (130, "")
+    code, out, err = finish(process)
+    assert (code, err, runs()) == (130, "", [])
     assert "Stopped: what is done is kept, and the same command goes on from there." in out
-    assert runs() == []
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_when_a_batch_is_killed_its_processes_end_and_the_next_one_goes_on() -> None:
-    jobs(HOURS)
-    process = started("two.toml", "--jobs", "2")
-    wait_until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
+def test_when_a_batch_is_killed_its_processes_end_and_a_process_that_dies_is_told_by_its_signal() -> None:
+    process = started()
     process.kill()
     process.communicate(timeout=TIMEOUT)
     # The processes notice that nobody is there, and take back what they have begun.
     wait_until(lambda: runs() == [])
-    jobs(TWO)
-    assert main(["batch", "two.toml", "--quiet"]) == 0
-
-
-def test_a_process_that_dies_is_told_by_its_signal() -> None:
-    jobs(HOURS)
-    main(["batch", "two.toml", "--prepare", "--quiet"])
     worker = JobProcess(["job", "two/jobs/tap-a", "--follow"], Path("log.txt"))
     wait_until(lambda: list(Path("two/runs").glob(".*.part")))
     worker.kill()
@@ -192,13 +165,6 @@ def test_a_job_can_be_done_elsewhere_from_its_files_alone(here: Path) -> None:
     assert json.loads(Path("two/runs/tap-slow/timing.json").read_text(encoding="utf-8"))["start_up"] is None
 
 
-def test_two_batches_cannot_work_in_one_folder() -> None:
-    jobs(TWO)
-    made, busy = read_jobs(Path("two.toml")), "being worked in by another digiclay"
-    with open_batch(Path("two"), made), pytest.raises(OutputError, match=busy), open_batch(Path("two"), made):
-        pass
-
-
 @pytest.mark.parametrize(
     ("arguments", "said", "told"),
     [
@@ -211,11 +177,8 @@ def test_two_batches_cannot_work_in_one_folder() -> None:
     ],
 )
 def test_a_mistake_is_refused_in_one_line_before_any_work(
-    arguments: list[str], said: str, told: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], said: str, told: str, refused: Any
 ) -> None:
     jobs(said)
-    assert main(["batch", "two.toml", *arguments]) == 2
-    _, err = capsys.readouterr()
-    assert told in err
-    assert err.count("\n") == 1
+    refused(["batch", "two.toml", *arguments], told)
     assert [path.name for path in Path().iterdir()] == ["two.toml"]

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,8 +18,9 @@ from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from distributed import Client, LocalCluster
 
-from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
-from tests.timeouts import TIMEOUT, wait_until
+from tests.other_process import finish as run_process
+from tests.other_process import start
+from tests.timeouts import wait_until
 
 ROOT = Path(__file__).parents[2]
 #: Two batches, and no pictures of three axes.
@@ -31,10 +29,7 @@ SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis
 Found = dict[int, Any]
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder with one scene, my.toml."""
-    return folder_with(scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER), tmp_path, monkeypatch)
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def cluster_here(workers: int) -> LocalCluster:
@@ -70,20 +65,18 @@ def test_a_sweep_on_a_cluster_comes_to_the_table_of_this_machine(here: Path, add
 
 
 @pytest.mark.parametrize(
-    ("command", "size"),
-    [("study", ("--samples", "4")), ("tune", ("--population", "4", "--generations", "2"))],
+    ("command", "size"), [("study", "--samples 4"), ("tune", "--population 4 --generations 2")]
 )
 def test_a_study_and_a_tuning_on_a_cluster_come_to_the_tables_of_this_machine(
-    command: str, size: tuple[str, ...], here: Path, address: str
+    command: str, size: str, here: Path, address: str
 ) -> None:
     varied = ["--vary", "control.force_gain=1:2", "--vary", "control.position_gain=100:900"]
-    words = [command, "my.toml", *varied, *size, "--metric", "rfd,highest", "--quiet"]
+    words = [command, "my.toml", *varied, *size.split(), "--metric", "rfd,highest", "--quiet"]
     assert main([*words, "--workers", "1", "--out", "own"]) == 0
     assert main([*words, "--scheduler", address, "--out", "far"]) == 0
-    tables = [sorted(path.name for path in (here / where).glob("*.csv")) for where in ("own", "far")]
-    assert len(tables[0]) == 2
-    assert tables[0] == tables[1]
-    assert all((here / "own" / name).read_bytes() == (here / "far" / name).read_bytes() for name in tables[0])
+    own, far = ({path.name: path.read_bytes() for path in (here / at).glob("*.csv")} for at in ("own", "far"))
+    assert len(own) == 2
+    assert own == far
 
 
 def test_after_a_stop_no_task_is_left_in_the_cluster(address: str) -> None:
@@ -125,11 +118,17 @@ def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(
     )
 
 
-def test_errors_of_tasks_are_told_of_each_piece_and_the_others_go_on(address: str) -> None:
+def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     done: Found = {}
     with open_cluster(address, lambda: False, silent) as cluster:
         finish(cluster, invert, [0, 1, 2], done.__setitem__, done.__setitem__, stopped=lambda: False)
-    assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}
+        assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}
+        monkeypatch.setattr(cluster_module, "FETCH", 0.3)
+        finish(cluster, give_slowly, [0], done.__setitem__, done.__setitem__, stopped=lambda: False)
+    assert isinstance(done[0], SlowToSend)
+    assert SlowToSend.sent > 1
 
 
 def invert(number: int) -> float:
@@ -145,24 +144,13 @@ class SlowToSend:
     def __reduce__(self) -> tuple[type[SlowToSend], tuple[()]]:
         SlowToSend.sent += 1
         if SlowToSend.sent == 1:
-            time.sleep(3.0)
+            time.sleep(1.5)
         return SlowToSend, ()
 
 
 def give_slowly(number: int) -> SlowToSend:
     """Return a result that arrives late."""
     return SlowToSend()
-
-
-def test_a_result_that_does_not_arrive_is_computed_again(
-    address: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cluster_module, "FETCH", 0.5)
-    done: Found = {}
-    with open_cluster(address, lambda: False, silent) as cluster:
-        finish(cluster, give_slowly, [0], done.__setitem__, done.__setitem__, stopped=lambda: False)
-    assert isinstance(done[0], SlowToSend)
-    assert SlowToSend.sent > 1
 
 
 def test_a_scheduler_that_is_gone_ends_a_series_in_one_line() -> None:
@@ -187,62 +175,39 @@ def test_versions_that_differ_are_named_with_who_has_them() -> None:
 @pytest.mark.parametrize(
     ("address", "why"),
     [
-        ("foo", "missing port number"),
-        ("", "missing port number"),
+        ("foo", "missing port number"), ("", "missing port number"),
         ("http://127.0.0.1:8786", "unknown address scheme 'http'"),
         ("tls://127.0.0.1:8786", "TLS expects a `ssl_context`"),
     ],
-)
-def test_a_bad_address_is_refused_in_one_line(
-    address: str, why: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([*SWEEP, "--scheduler", address, "--out", "out"]) == 2
-    said = capsys.readouterr().err
+)  # fmt: skip
+def test_a_bad_address_is_refused_in_one_line(address: str, why: str, refused: Any) -> None:
     rule = "--scheduler must be an address such as tcp://127.0.0.1:8786"
-    assert said.startswith(f"{rule} (got {address!r}: {why}")
-    assert said.count("\n") == 1
+    refused([*SWEEP, "--scheduler", address, "--out", "out"], f"{rule} (got {address!r}: {why}")
 
 
 @pytest.mark.parametrize(
     ("address", "host"),
     [
-        ("tcp://127.0.0.1:8786", ""),
-        ("tcp://localhost:8786", ""),
-        ("tcp://[::1]:8786", ""),
-        ("tls://10.0.0.1:8786", ""),
-        ("10.0.0.1:8786", "10.0.0.1"),
-        ("tcp://[fe80::1]:8786", "fe80::1"),
+        ("tcp://127.0.0.1:8786", ""), ("tcp://localhost:8786", ""), ("tcp://[::1]:8786", ""),
+        ("tls://10.0.0.1:8786", ""), ("10.0.0.1:8786", "10.0.0.1"), ("tcp://[fe80::1]:8786", "fe80::1"),
         ("tcp://login.example:8786", "login.example"),
     ],
-)
+)  # fmt: skip
 def test_an_address_without_encryption_beyond_this_machine_is_warned_of(address: str, host: str) -> None:
     said = cluster_module._describe_exposure(address)
     assert said.partition(",")[0] == (f"Other machines can reach {host}" if host else "")
 
 
-def test_the_example_for_slurm_makes_the_script_of_a_job() -> None:
+def test_the_example_for_slurm_makes_the_script_of_a_job_and_nothing_else_imports_dask() -> None:
     said = (ROOT / "docs" / "cluster.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"    (from dask_jobqueue(?:.*\n)+?)(?=\n\S)", said)
     lines = [line.removeprefix("    ") for line in example.splitlines()]
     made = lines.index(next(line for line in lines if line.startswith("cluster.scale")))
-    script = "\n".join([*lines[:made], "print(cluster.job_script())", "cluster.close()"])
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=TIMEOUT,
-        env={**os.environ, "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("#!/")
-    assert re.search(r"^#SBATCH --cpus-per-task=\d+$", done.stdout, re.MULTILINE)
-    assert "distributed.cli.dask_worker tcp://" in done.stdout or "dask worker tcp://" in done.stdout
-
-
-def test_nothing_imports_dask_unless_a_scheduler_is_named() -> None:
-    script = (
-        "import sys; from digiclay.commands.parser import parser; parser();"
-        "print({name.split('.')[0] for name in sys.modules} & {'dask', 'distributed', 'tornado'})"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=TIMEOUT,
-        env={**os.environ, "PYTHONPATH": str(ROOT / "addon")},
-    )  # fmt: skip
-    assert (done.stdout, done.stderr) == ("set()\n", "")
+    script = "import sys\nfrom digiclay.commands.parser import parser\nparser()\n"
+    script += "assert not {name.split('.')[0] for name in sys.modules} & {'dask', 'distributed', 'tornado'}\n"
+    script += "\n".join([*lines[:made], "print(cluster.job_script())", "cluster.close()"])
+    code, out, err = run_process(start(script, env={"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"}))
+    assert code == 0, err
+    assert out.startswith("#!/")
+    assert re.search(r"^#SBATCH --cpus-per-task=\d+$", out, re.MULTILINE)
+    assert "distributed.cli.dask_worker tcp://" in out or "dask worker tcp://" in out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,40 +13,27 @@ from digiclay.commands.compare import table
 from digiclay.core.session.run_scene import RUN_METRICS
 from digiclay.plots.comparison import PANELS, comparison
 
-from tests.scene_files import folder_with, scene_text
+from tests.scene_files import scene_text
 
 SCENE = scene_text(11, 11, (0.0, 0.041), (0.3, 0.035), (0.5, 0.035))
 BOTH = ["virtual_master", "cell_states"]
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder with one scene, my.toml."""
-    return folder_with(SCENE, tmp_path, monkeypatch)
+pytestmark = pytest.mark.usefixtures("here")
 
 
-def test_both_methods_are_printed_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "my.toml"]) == 0
+def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", "my.toml", "--methods", "cell_states,virtual_master"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split() == ["metric", "unit", *BOTH]
+    assert lines[0].split() == ["metric", "unit", *BOTH[::-1]]
     printed = {line.split()[0]: line.split()[-2:] for line in lines[2 : 2 + len(RUN_METRICS)]}
     assert list(printed) == list(RUN_METRICS)
     assert [name for name, values in printed.items() if len(values) != 2] == []
     # The finger comes down 5 mm deep: Method I alone presses harder than fingers were measured.
     said = [line for line in lines if "the contact law does not hold" in line]
     assert [line.split(":")[0] for line in said] == ["virtual_master"]
-
-
-def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_not_found() -> None:
-    found = {name: dict.fromkeys(RUN_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
-    assert len({len(line) for line in table(found)}) == 1
-    rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
-    assert ["lag_max", "mm", "2.5"] in rows
-    assert ["rfd", "N", "–"] in rows
-
-
-def test_the_folder_holds_the_picture_and_every_number_of_all_methods_on_the_same_input(here: Path) -> None:
-    main(["compare", "my.toml", "--quiet", "--methods", "cell_states,virtual_master"])
     folder = here / "my_compare"
     assert sorted(path.name for path in folder.iterdir()) == ["compare.png", "metrics.json"]
     known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["methods"]
@@ -54,6 +42,14 @@ def test_the_folder_holds_the_picture_and_every_number_of_all_methods_on_the_sam
     assert known["cell_states"]["duration"] == known["virtual_master"]["duration"] == 0.5
     # Other controllers, other forces: neither was run twice.
     assert known["cell_states"]["max_total_force"] != known["virtual_master"]["max_total_force"]
+
+
+def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_not_found() -> None:
+    found = {name: dict.fromkeys(RUN_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
+    assert len({len(line) for line in table(found)}) == 1
+    rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
+    assert ["lag_max", "mm", "2.5"] in rows
+    assert ["rfd", "N", "–"] in rows
 
 
 def test_a_setting_reaches_every_method(here: Path) -> None:
@@ -65,21 +61,17 @@ def test_a_setting_reaches_every_method(here: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("words", "said"),
     [
-        (["--methods", "cell_stats"], "did you mean cell_states"),
-        (["--methods", ","], "must name at least one method"),
-        (["--method", "cell_stats"], "Did you mean cell_states"),
-        (["--out", "my.toml"], "my.toml is a file"),
-        (["--set", "control.spring_trigger=1"], "control.spring_trigger must be a known key"),
+        ("--methods cell_stats", "did you mean cell_states"),
+        ("--methods ,", "must name at least one method"),
+        ("--method cell_stats", "Did you mean cell_states"),
+        ("--out my.toml", "my.toml is a file"),
+        ("--set control.spring_trigger=1", "control.spring_trigger must be a known key"),
     ],
 )
-def test_a_mistake_is_one_line_and_leaves_nothing(
-    arguments: list[str], said: str, here: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    code = main(["compare", "my.toml", *arguments])
-    err = capfd.readouterr().err
-    assert (code, err.count("\n"), said in err) == (2, 1, True), err
+def test_a_mistake_is_one_line_and_leaves_nothing(words: str, said: str, here: Path, refused: Any) -> None:
+    refused(["compare", "my.toml", *words.split()], said)
     assert [path.name for path in here.iterdir()] == ["my.toml"]
 
 

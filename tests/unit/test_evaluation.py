@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.batch.packing import begin, classify, extend_path, make_batch, merge_parts
+from digiclay.core.batch.packing import begin, extend_path, make_batch
 from digiclay.core.engine.simulation import simulate_period
-from digiclay.core.model.actuator import Supply
-from digiclay.core.model.contact import Contact
 from digiclay.core.model.fingertip import Fingertip, compute_reach
 from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import (
     RUNS,
@@ -32,11 +29,7 @@ from digiclay.core.studies.evaluation import (
 SHORT = [Setting("simulation.duration", "0.1")]
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def some(*varied: str, settings: list[Setting] | None = None) -> list[Point]:
@@ -47,25 +40,6 @@ def some(*varied: str, settings: list[Setting] | None = None) -> list[Point]:
 def indices(parts: tuple[tuple[Point, ...], ...]) -> list[list[int]]:
     """Return which points are in which bundle."""
     return [[point.index for point in part] for part in parts]
-
-
-def test_numbers_that_differ_become_an_array_and_the_others_stay() -> None:
-    part = merge_parts([Contact(stiffness=100.0), Contact(stiffness=200.0)])
-    np.testing.assert_array_equal(part.stiffness, [100.0, 200.0])
-    assert part.exponent == Contact().exponent
-
-
-def test_the_formulas_of_a_part_hold_for_many_runs() -> None:
-    supplies = [Supply(high=4e4), Supply(low=-3e4)]
-    openings = np.linspace(-1.0, 1.0, 12).reshape(6, 2)
-    alone = np.column_stack([one.pressure(openings[:, run]) for run, one in enumerate(supplies)])
-    np.testing.assert_array_equal(merge_parts(supplies).pressure(openings), alone)
-
-
-def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
-    assert classify(Contact(stiffness=100.0)) == classify(Contact())
-    layout = load(find("tap")).layout
-    assert classify(layout) != classify(replace(layout, rows=15))
 
 
 def test_the_reach_of_many_fingers_is_that_of_each() -> None:
@@ -108,12 +82,6 @@ def test_a_control_period_of_a_larger_stack_takes_no_more_calls() -> None:
     assert np.median(calls(16)) == np.median(calls(4))
 
 
-def test_points_of_one_structure_run_together() -> None:
-    parts = make_bundles(some("control.force_gain=1,2,3,4", "layout.rows=11,13"))
-    assert indices(parts.batches) == [[0, 2, 4, 6], [1, 3, 5, 7]]
-    assert parts.describe() == ["8 points run in 2 stacks"]
-
-
 @pytest.mark.parametrize(
     ("count", "duration", "sizes"),
     [
@@ -133,39 +101,50 @@ def test_a_stack_has_no_more_runs_than_pay_or_fit_into_memory(
     assert (parts.describe() == [reason]) == (not sizes)
 
 
-def test_points_whose_half_steps_are_cut_elsewhere_are_judged_in_stacks_of_their_own() -> None:
-    # A dead time of half a control period falls on the end of a half step.
-    varied = ("delay.dead_time=1 ms,2.5 ms", "control.force_gain=1:4:4")
-    assert indices(make_bundles(some(*varied)).batches) == [[0, 1, 2, 3, 4, 5, 6, 7]]
-    assert indices(make_bundles(some(*varied), errors=True).batches) == [[0, 1, 2, 3], [4, 5, 6, 7]]
+HALVED = ("delay.dead_time=1 ms,2.5 ms", "control.force_gain=1:4:4")
+METHODS = "control.method=viscous,push_pull,cell_states,virtual_master"
+NOISE = ("sensors.force_noise=1e-3,2e-3,3e-3", "sensors.seed=1,2")
+TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.06,0.08")
 
 
-def test_points_whose_steps_cannot_be_halved_are_told_when_they_run() -> None:
-    finest = [*SHORT, Setting("simulation.physics_step", "5e-6")]
-    parts = make_bundles(some("control.force_gain=1:4:4", settings=finest), errors=True)
-    assert (parts.batches, indices(parts.alone)) == ((), [[0], [1], [2], [3]])
-
-
-def test_points_without_their_like_run_alone_and_it_is_said() -> None:
-    parts = make_bundles(some("layout.rows=11,13,15"))
-    assert (parts.batches, indices(parts.alone)) == ((), [[0], [1], [2]])
-    assert parts.describe() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
-
-
-def test_every_method_stands_in_stacks_with_noise_and_without() -> None:
-    noise = ("sensors.force_noise=1e-3,2e-3,3e-3", "sensors.seed=1,2")
-    parts = make_bundles(some("control.method=viscous,push_pull,cell_states,virtual_master", *noise))
-    assert indices(parts.batches) == [list(range(first, first + 6)) for first in (0, 6, 12, 18)]
-    assert parts.describe() == ["24 points run in 4 stacks"]
-    quiet = make_bundles(some("control.method=virtual_master", "sensors.force_noise=0,1e-3", noise[1]))
-    assert quiet.batches == ()  # with noise and without it are two structures, of two runs each
-
-
-def test_values_that_do_not_go_together_are_in_no_stack() -> None:
-    triggers = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.06,0.08")
-    method = [*SHORT, Setting("control.method", "cell_states")]
-    parts = make_bundles(some(*triggers, settings=method))
-    assert (indices(parts.batches), indices(parts.alone)) == ([[0, 1, 2, 4, 5]], [[3]])
+@pytest.mark.parametrize(
+    ("varied", "setting", "errors", "batches", "alone", "said"),
+    [
+        pytest.param(
+            ("control.force_gain=1,2,3,4", "layout.rows=11,13"), "", False, [[0, 2, 4, 6], [1, 3, 5, 7]], [],
+            "8 points run in 2 stacks", id="points of one structure run together",
+        ),
+        pytest.param(
+            ("layout.rows=11,13,15",), "", False, [], [[0], [1], [2]],
+            "3 points one at a time: fewer than 4 have the same bed, parts and steps", id="too few of a kind",
+        ),
+        pytest.param(HALVED, "", False, [[*range(8)]], [], "8 points run in 1 stack", id="not judged"),
+        # A dead time of half a control period falls on the end of a half step.
+        pytest.param(HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 stacks", id="ha"),
+        pytest.param(
+            HALVED[1:], "simulation.physics_step=5e-6", True, [], [[0], [1], [2], [3]], None, id="too fine"
+        ),
+        pytest.param(
+            (METHODS, *NOISE), "", False, [[*range(first, first + 6)] for first in (0, 6, 12, 18)], [],
+            "24 points run in 4 stacks", id="every method with noise",
+        ),
+        pytest.param(
+            ("sensors.force_noise=0,1e-3", NOISE[1]), "", False, [], [[0], [1], [2], [3]], None,
+            id="with noise and without it are two structures",
+        ),
+        pytest.param(
+            TRIGGERS, "control.method=cell_states", False, [[0, 1, 2, 4, 5]], [[3]], None,
+            id="values that do not go together",
+        ),
+    ],
+)  # fmt: skip
+def test_points_of_one_structure_run_together_and_others_alone(
+    varied: tuple[str, ...], setting: str, errors: bool, batches: Any, alone: Any, said: str | None
+) -> None:
+    settings = [*SHORT, *([Setting(*setting.split("="))] if setting else [])]
+    parts = make_bundles(some(*varied, settings=settings), errors=errors)
+    assert (indices(parts.batches), indices(parts.alone)) == (batches, alone)
+    assert said is None or parts.describe() == [said]
 
 
 @pytest.mark.parametrize("errors", [False, True])
@@ -193,17 +172,14 @@ def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     monkeypatch.setattr("digiclay.core.studies.evaluation.measure_together", faulty)
 
 
-def test_a_fault_in_a_stack_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_in_a_stack_is_not_passed_over(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     # Warnings are errors in tests: a stack that fails by our own fault fails the test it runs in.
     break_stacks(monkeypatch, ZeroDivisionError("by\nzero"))
     with pytest.warns(BatchWarning, match="A batch of 2 runs failed: ZeroDivisionError: by zero"):
         records = evaluate_bundle(some("control.force_gain=1,5"))
     assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
-
-
-def test_a_sweep_says_which_points_ran_alone_because_their_stack_failed(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
     break_stacks(monkeypatch, MemoryError())
     varied = ["--vary", "control.force_gain=1:5:4", "--set", "simulation.duration=0.1", "--workers", "1"]
     assert main(["sweep", "tap", *varied, "--out", "out"]) == 0

@@ -18,17 +18,13 @@ from digiclay.commands.extras import format_command, plan_meshes
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session.finished_run import find_row
 
-from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
+from tests.scene_files import left
 
-SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
 #: A folder whose name a shell would take for several words.
 OUT = "first run"
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder with one scene, my.toml."""
-    return folder_with(SCENE, tmp_path, monkeypatch)
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> None:
@@ -42,10 +38,19 @@ def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> None
     monkeypatch.setattr(module, name, interrupted)
 
 
-def told(said: str) -> dict[str, list[str]]:
-    """Return the commands that stderr names, by the files they make."""
-    pairs = (line.removeprefix("Stopped before ").split("; to have it: ") for line in said.splitlines())
-    return {what: shlex.split(command)[1:] for what, command in pairs}
+@pytest.fixture
+def stopped(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
+    """Give a way to stop a command before a step; it returns the commands on stderr by their files."""
+
+    def run(module: Any, name: str, *arguments: str) -> dict[str, list[str]]:
+        with monkeypatch.context() as patched:
+            stop_before(patched, module, name)
+            assert main([*arguments, "--out", OUT]) == 130
+        said = capsys.readouterr().err.splitlines()
+        pairs = (line.removeprefix("Stopped before ").split("; to have it: ") for line in said)
+        return {what: shlex.split(command)[1:] for what, command in pairs}
+
+    return run
 
 
 def files(folder: Path) -> set[str]:
@@ -53,34 +58,37 @@ def files(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_run_stopped_before_its_extras_names_them_and_how_to_make_them(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+SMALL = ["--set", "layout.rows=13", "--set", "layout.columns=13", "--quiet"]
+
+
+@pytest.mark.parametrize(
+    ("command", "module", "made"),
+    [
+        (
+            ["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots", "--no-errors"], run_command,
+            ["surface.stl, surface.obj", "session.png, surface.png"],
+        ),
+        (["form", "dome", *SMALL], form_command, ["surface.stl", "displayed/surface.stl"]),
+    ],
+    ids=["run", "form"],
+)  # fmt: skip
+def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(
+    command: list[str], module: Any, made: list[str], here: Path, stopped: Any
 ) -> None:
-    wanted = ["--export", "stl,obj", "--plots", "--no-errors"]
-    assert main(["run", "my.toml", "--out", "whole", "--quiet", *wanted]) == 0
-    with monkeypatch.context() as patched:
-        stop_before(patched, run_command, "save")
-        assert main(["run", "my.toml", "--out", OUT, "--quiet", *wanted]) == 130
-    commands = told(capsys.readouterr().err)
-    assert list(commands) == ["surface.stl, surface.obj", "session.png, surface.png"]
+    assert main([*command, "--out", "whole"]) == 0
+    commands = stopped(module, "save", *command)
+    assert list(commands) == made
     assert files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
     assert not json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
     for command in commands.values():
         assert main(command) == 0
     assert files(here / OUT) == files(here / "whole")
-    for name in ("surface.stl", "surface.obj", "session.png"):
+    for name in {*", ".join(made).split(", ")}:
         assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
 
 
-def test_a_run_stopped_before_its_errors_are_estimated_says_so(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with monkeypatch.context() as patched:
-        stop_before(patched, run_command, "estimate_errors")
-        assert main(["run", "my.toml", "--out", OUT]) == 130
-    out, err = capsys.readouterr()
-    assert f"written to {OUT}" in out
-    commands = told(err)
+def test_a_run_stopped_before_its_errors_are_estimated_says_so(here: Path, stopped: Any) -> None:
+    commands = stopped(run_command, "estimate_errors", "run", "my.toml")
     assert list(commands) == ["its errors were estimated"]
     assert "height_error" not in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
     assert main(commands["its errors were estimated"]) == 0
@@ -88,34 +96,11 @@ def test_a_run_stopped_before_its_errors_are_estimated_says_so(
     assert left(here) == [OUT]
 
 
-def test_a_run_stopped_within_its_session_can_be_exported_as_it_says(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with monkeypatch.context() as patched:
-        stop_before(patched, run_command, "run")
-        assert main(["run", "my.toml", "--out", OUT, "--quiet", "--export", "ply"]) == 130
-    commands = told(capsys.readouterr().err)
+def test_a_run_stopped_within_its_session_can_be_exported_as_it_says(here: Path, stopped: Any) -> None:
+    commands = stopped(run_command, "run", "run", "my.toml", "--quiet", "--export", "ply")
     assert list(commands) == ["surface.ply"]
     assert main(commands["surface.ply"]) == 0
     assert (here / OUT / "surface.ply").is_file()
-
-
-def test_form_ends_at_the_first_signal_and_names_what_is_missing(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    small = ["--set", "layout.rows=13", "--set", "layout.columns=13", "--quiet"]
-    assert main(["form", "dome", "--out", "whole", *small]) == 0
-    with monkeypatch.context() as patched:
-        stop_before(patched, form_command, "save")
-        assert main(["form", "dome", "--out", OUT, *small]) == 130
-    commands = told(capsys.readouterr().err)
-    assert list(commands) == ["surface.stl", "displayed/surface.stl"]
-    assert files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
-    for command in commands.values():
-        assert main(command) == 0
-    assert files(here / OUT) == files(here / "whole")
-    for name in ("surface.stl", "displayed/surface.stl"):
-        assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
 
 
 @pytest.mark.parametrize("step", ["scene_of", "fit_shape", "make_forming_scene"])
@@ -147,13 +132,10 @@ def test_plot_draws_what_a_run_with_plots_draws(here: Path, capsys: pytest.Captu
     ],
 )
 def test_what_cannot_be_plotted_is_told_in_a_line(
-    settings: list[str], arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    settings: list[str], arguments: list[str], said: str, refused: Any
 ) -> None:
     assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors", *settings]) == 0
-    assert main(arguments) == 2
-    err = capsys.readouterr().err
-    assert said in err
-    assert err.count("\n") == 1
+    refused(arguments, said)
 
 
 def test_a_command_is_written_as_a_shell_takes_it() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,23 +35,14 @@ def test_every_scene_meets_every_method_and_every_setting(tmp_path: Path) -> Non
     soft = { control.force_setpoint = "300 mN" }
     firm.control.force_setpoint = 0.6
     """
-    made = read_jobs(jobs_file(tmp_path, said))
-    assert [job.name for job in made.jobs] == [
-        f"{scene}-{method}-{label}"
-        for scene in ("tap", "slow_press")
-        for method in ("virtual_master", "cell_states")
-        for label in ("soft", "firm")
-    ]
-    assert [job.error for job in made.jobs] == [""] * 8
-    assert [(job.scene.method, job.scene.control.force_setpoint) for job in made.jobs[:4] if job.scene] == [
+    made = read_jobs(jobs_file(tmp_path, said)).jobs
+    axes = (("tap", "slow_press"), ("virtual_master", "cell_states"), ("soft", "firm"))
+    assert [job.name for job in made] == ["-".join(words) for words in itertools.product(*axes)]
+    for jobs in (made, read_jobs(SAMPLES.parent / "batches" / "first.toml").jobs):
+        assert [job.error for job in jobs] == [""] * 8
+    assert [(job.scene.method, job.scene.control.force_setpoint) for job in made[:4] if job.scene] == [
         ("virtual_master", 0.3), ("virtual_master", 0.6), ("cell_states", 0.3), ("cell_states", 0.6),
     ]  # fmt: skip
-
-
-def test_a_picture_of_an_older_file_has_its_color_under_the_former_key() -> None:
-    assert make_outputs({"still": {"colour": "force"}}).still == Still(color="force")
-    with pytest.raises(ParameterError, match="colour"):
-        make_outputs({"still": {"colour": "force", "color": "mode"}})
 
 
 def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(
@@ -107,43 +100,33 @@ def test_a_mistake_is_told_in_one_line(said: str, told: str, tmp_path: Path) -> 
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "made",
-    [
-        Outputs(),
-        make_outputs({"export": ["stl"], "mesh": {"kind": "features", "skin": "smooth"}}),
-        Outputs(
-            export=("stl", "glb"), errors=False, still=Still(engine="cycles"), turntable=Turntable(frames=4),
-            film=Film(speed=0.5, start=0.1, arrows=False),
-        ),
-    ],
-)  # fmt: skip
-def test_a_jobs_own_files_say_all_there_is_to_do(made: Outputs, tmp_path: Path) -> None:
-    path = tmp_path / "job.toml"
-    path.write_text(made.format(), encoding="utf-8")
-    assert read_outputs(path) == made
+def test_a_jobs_own_files_say_all_there_is_to_do(tmp_path: Path) -> None:
+    path, film = tmp_path / "job.toml", Film(speed=0.5, start=0.1, arrows=False)
+    full = Outputs(
+        ("stl", "glb"), errors=False, still=Still(engine="cycles"), turntable=Turntable(frames=4), film=film
+    )
+    mesh = {"kind": "features", "skin": "smooth"}
+    for made in (Outputs(), make_outputs({"export": ["stl"], "mesh": mesh}), full):
+        path.write_text(made.format(), encoding="utf-8")
+        assert read_outputs(path) == made
+    # An older file has the color under the former key.
+    assert make_outputs({"still": {"colour": "force"}}).still == Still(color="force")
+    with pytest.raises(ParameterError, match="colour"):
+        make_outputs({"still": {"colour": "force", "color": "mode"}})
 
 
 def test_a_job_needs_no_other_file_for_its_shape(tmp_path: Path) -> None:
     np.save(tmp_path / "own.npy", np.arange(25.0).reshape(5, 5))
     said = 'control = "absent"\nlayout = { rows = 5, columns = 5 }\nshape.file = "own.npy"\n'
     (tmp_path / "shaped.toml").write_text(said, encoding="utf-8")
-    path = jobs_file(tmp_path, 'scenes = ["shaped.toml"]')
-    (job,) = read_jobs(path).jobs
-    assert job.scene is not None
-    assert job.scene.shape is not None
+    (job,) = read_jobs(jobs_file(tmp_path, 'scenes = ["shaped.toml"]')).jobs
+
+    def fit(scene: Any) -> Any:
+        return fit_shape(scene.shape, make_grid(scene.layout), scene.actuator).heights
+
     (tmp_path / "far").mkdir()
     (tmp_path / "far" / "scene.toml").write_text(format_scene(job.scene), encoding="utf-8")
-    wanted = fit_shape(job.scene.shape, make_grid(job.scene.layout), job.scene.actuator).heights
+    wanted = fit(job.scene)
     (tmp_path / "own.npy").unlink()
-    alone = load(tmp_path / "far" / "scene.toml")
-    assert alone.shape is not None
-    np.testing.assert_array_equal(
-        fit_shape(alone.shape, make_grid(alone.layout), alone.actuator).heights, wanted
-    )
+    np.testing.assert_array_equal(fit(load(tmp_path / "far" / "scene.toml")), wanted)
     assert np.ptp(wanted) > 1e-3
-
-
-def test_the_sample_batch_makes_eight_sound_jobs() -> None:
-    made = read_jobs(SAMPLES.parent / "batches" / "first.toml")
-    assert [job.error for job in made.jobs] == [""] * 8

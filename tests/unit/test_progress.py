@@ -60,9 +60,15 @@ def test_a_terminal_gets_the_share_done_and_the_time_left_in_a_line_that_goes_an
         assert stream.getvalue().endswith("\r\033[K")
 
 
-def test_a_line_is_cut_to_the_width_of_the_terminal(
+def test_a_line_is_cut_to_the_terminal_and_things_done_beforehand_do_not_count_for_the_time_left(
     clock: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    stream = Terminal()
+    with Counted(stream, "first", "jobs", before=8) as bar:
+        clock[0] += 10.0
+        bar(9, 10)
+    # One job took ten seconds, so the last one will.
+    assert "9 of 10 jobs, 10 s left" in stream.getvalue()
     monkeypatch.setenv("COLUMNS", "40")
     stream = Terminal()
     with Counted(stream, "a name that is rather long", "frames") as bar:
@@ -71,15 +77,6 @@ def test_a_line_is_cut_to_the_width_of_the_terminal(
         line = stream.getvalue().removeprefix("\r").removesuffix("\033[K")
     # A character in the last column would already begin the next line on some terminals.
     assert len(line) == 39
-
-
-def test_things_done_beforehand_do_not_count_for_the_time_left(clock: list[float]) -> None:
-    stream = Terminal()
-    with Counted(stream, "first", "jobs", before=8) as bar:
-        clock[0] += 10.0
-        bar(9, 10)
-    # One job took ten seconds, so the last one will.
-    assert "9 of 10 jobs, 10 s left" in stream.getvalue()
 
 
 @pytest.mark.parametrize(

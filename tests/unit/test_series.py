@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -15,11 +16,10 @@ from digiclay.core.files.run_folder import read_json
 from digiclay.core.studies.series import Kind, open_series
 
 from tests.other_process import dead
-from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
+from tests.scene_files import SCENE, folder_with, left
 
 resource = pytest.importorskip("resource", reason="Windows cannot limit how much is written")
 
-SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
 SWEEP = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
 BATCH = ["batch", "jobs.toml", "--prepare", "--out", "o", "--quiet"]
 COMMANDS = {"sweep": SWEEP, "batch": BATCH}
@@ -47,25 +47,22 @@ def room_for(size: int) -> Iterator[None]:
 @pytest.mark.parametrize("name", COMMANDS)
 @pytest.mark.parametrize("size", [0, 40])
 def test_a_series_that_found_the_disk_full_goes_on_when_there_is_room(
-    name: str, size: int, here: Path, capsys: pytest.CaptureFixture[str]
+    name: str, size: int, here: Path, refused: Any
 ) -> None:
     with room_for(size):
-        assert main(COMMANDS[name]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"Cannot write {Path('o', f'{name}.json')}: ")
-    assert said.count("\n") == 1
+        refused(COMMANDS[name], f"Cannot write {Path('o', f'{name}.json')}: ")
     assert left(here) == ["jobs.toml"]
     assert main(COMMANDS[name]) == 0
     assert read_json(here / "o" / f"{name}.json")
-    for path in (here / "o").glob("points/*"):
+    points = here / "o" / "points"
+    for path in points.glob("*"):
         path.unlink()
     if name == "sweep":  # a point's file is larger
         with room_for(200):
-            assert main(SWEEP) == 2
-        assert "Cannot write" in capsys.readouterr().err
-        assert list((here / "o" / "points").iterdir()) == []
+            refused(SWEEP, "Cannot write")
+        assert list(points.iterdir()) == []
         assert main(SWEEP) == 0
-        assert len(list((here / "o" / "points").iterdir())) == 2
+        assert len(list(points.iterdir())) == 2
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -85,29 +82,22 @@ def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(
     assert [path.name for path in (here / "o").iterdir() if path.name.startswith(".")] == []
 
 
-def test_a_sweep_of_which_points_are_done_is_not_begun_anew(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_of_which_points_are_done_is_not_begun_anew(here: Path, refused: Any) -> None:
     assert main(SWEEP) == 0
     (here / "o" / "sweep.json").write_text("", encoding="utf-8")
-    assert main(SWEEP) == 2
-    assert "its sweep.json cannot be read" in capsys.readouterr().err
+    refused(SWEEP, "its sweep.json cannot be read")
     (here / "o" / "sweep.json").unlink()
-    assert main(SWEEP) == 2
-    assert "o holds other things than a sweep" in capsys.readouterr().err
+    refused(SWEEP, "o holds other things than a sweep")
 
 
 @pytest.mark.parametrize("stranger", ["letter.txt", "points/letter.txt", "sub/", ".git/"])
-def test_a_folder_with_other_things_is_left_alone(
-    stranger: str, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_with_other_things_is_left_alone(stranger: str, here: Path, refused: Any) -> None:
     path = here / "o" / stranger
     (path if stranger.endswith("/") else path.parent).mkdir(parents=True)
     if not stranger.endswith("/"):
         path.touch()
     before = sorted((here / "o").rglob("*"))
-    assert main(SWEEP) == 2
-    assert "o holds other things than a sweep" in capsys.readouterr().err
+    refused(SWEEP, "o holds other things than a sweep")
     assert sorted((here / "o").rglob("*")) == before
 
 

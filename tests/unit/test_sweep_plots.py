@@ -10,12 +10,7 @@ from digiclay.cli import main
 from digiclay.core.studies.axes import Column
 from digiclay.plots.sweep import sweep_figure
 
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("here")
 
 
 ONE = Column("control.force_gain", "1/N", (1.0, 2.0, 4.0), True)
@@ -33,11 +28,13 @@ def test_one_axis_is_a_line_with_markers_labeled_with_units() -> None:
 
 
 def test_numbers_in_any_order_make_a_line_from_left_to_right_and_words_make_none() -> None:
-    picture = sweep_figure([Column("a.b", "", (3, 1, 2), False)], "rfd", np.array([0.3, 0.1, 0.2]))
-    assert picture.axes[0].get_lines()[0].get_xydata().tolist() == [[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]]
-    picture = sweep_figure([WORDS], "rfd", np.array([0.3, 0.1, 0.2]))
-    assert [text.get_text() for text in picture.axes[0].get_xticklabels()] == list(WORDS.values)
-    assert picture.axes[0].get_lines()[0].get_linestyle() == "None"
+    lines = []
+    for column in (Column("a.b", "", (3, 1, 2), False), WORDS):
+        (axes,) = sweep_figure([column], "rfd", np.array([0.3, 0.1, 0.2])).axes
+        lines.append(axes.get_lines()[0])
+    assert lines[0].get_xydata().tolist() == [[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]]
+    assert [text.get_text() for text in axes.get_xticklabels()] == list(WORDS.values)
+    assert lines[1].get_linestyle() == "None"
 
 
 def test_two_axes_are_a_heat_map_labeled_with_units() -> None:
