@@ -11,11 +11,12 @@ from functools import partial
 from typing import Any
 
 from digiclay.commands.cluster import Cluster, evaluate_on_worker, open_cluster
-from digiclay.commands.evaluator import finish
+from digiclay.commands.evaluator import submit
 from digiclay.commands.progress import table
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import evaluate_bundle, make_bundles
+from digiclay.core.studies.series import finish
 from digiclay.core.studies.sweep_plan import hash_points
 
 from .report import Report, Steps, cells, list_records
@@ -128,7 +129,7 @@ def _measure(
     with Client(address, set_as_default=False) as client:
         before = sum(client.run(time.process_time).values())
         wall, spent = _time(
-            lambda: finish(cluster, task, pieces, lambda *_: None, fail, stopped=lambda: False)
+            lambda: finish(submit(cluster, task, pieces, stopped=lambda: False), lambda *_: None, fail)
         )
         after = sum(client.run(time.process_time).values())
     return Cost(work, workers, count, wall / count, spent / count, (after - before) / count)

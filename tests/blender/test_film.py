@@ -16,10 +16,9 @@ from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.files.formats import is_whole_picture
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.session.render_settings import Film, Turntable
+from digiclay.core.session.render_settings import Film, Still, Turntable
 from digiclay.device.instant import Instant
 from digiclay.pictures import film, still
-from digiclay.pictures import film as films
 
 from tests.blender.at_hand import inventory
 
@@ -63,6 +62,13 @@ def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:
     return rate, pictures
 
 
+def render(shown: Any, out: Path, looks: Any, set_point: float | None = None, **known: Any) -> Path | None:
+    """Draw a film of a history, or a turntable of an instant."""
+    sizes = {"set_point": set_point} if isinstance(looks, Film) else {}
+    stage = film.stage_film if isinstance(looks, Film) else film.stage_turntable
+    return film.render_film(stage(shown, looks, **sizes), out, looks, **known)
+
+
 def looks_like(pixels: np.ndarray, mode: Mode) -> int:
     """Count pixels of the bed, right of the legend and above the strip, in the direction of a color."""
     bed = pixels[HEIGHT // 3 :, WIDTH // 4 :].reshape(-1, 3)
@@ -76,7 +82,7 @@ def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path: Path, histo
     before, told = inventory(), list[tuple[int, int]]()
     history["total_force"][:] = 0.3
     looks = Film(**SMALL, arrows=False)
-    path = films.render_film(
+    path = render(
         history, tmp_path / "a film.mp4", looks, set_point=0.3, progress=lambda *at: told.append(at)
     )
     assert inventory() == before
@@ -101,7 +107,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
     counts = []
     for arrows in (False, True):
         looks = Film(**SMALL, start=0.4, stop=0.45, arrows=arrows, strip=False)
-        path = films.render_film(history, tmp_path / f"{arrows}.mp4", looks)
+        path = render(history, tmp_path / f"{arrows}.mp4", looks)
         assert path is not None
         _, pictures = frames_of(path, tmp_path / f"{arrows}")
         red, green, blue = np.moveaxis(pictures[-1], -1, 0)
@@ -112,7 +118,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
 
 def test_a_bed_colored_by_force_changes_its_colors_with_the_force(tmp_path: Path, history: Any) -> None:
     history["force"] = history["force"] * 10.0
-    path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, color="force", arrows=False))
+    path = render(history, tmp_path / "film.mp4", Film(**SMALL, color="force", arrows=False))
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
     middle = [picture[HEIGHT // 2 :, WIDTH // 3 :].reshape(-1, 3) for picture in pictures]
@@ -124,7 +130,7 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: 
     # One half of the bed is blue: its middle goes round.
     history["mode"][-1] = np.where(history["position"][:, 0] > 0.0, Mode.HOLD, Mode.REST)
     instant = Instant.of(history, -1)
-    path = films.render_turntable(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
+    path = render(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
     assert len(pictures) == 4
@@ -141,30 +147,32 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: 
 def test_a_film_that_is_stopped_leaves_nothing(tmp_path: Path, history: Any) -> None:
     asked = iter([False, True])
     path = tmp_path / "film.mp4"
-    assert films.render_film(history, path, Film(**SMALL), stopped=lambda: next(asked)) is None
+    assert render(history, path, Film(**SMALL), stopped=lambda: next(asked)) is None
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_part_that_is_not_in_the_session_is_refused_before_any_work(tmp_path: Path, history: Any) -> None:
     with pytest.raises(ParameterError, match="start must be between 0 s and 1 s"):
-        films.render_film(history, tmp_path / "film.mp4", Film(start=3.0))
+        render(history, tmp_path / "film.mp4", Film(start=3.0))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, history: Any) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match=r"film\.mp4 cannot be written") as caught:
-        films.render_film(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
+        render(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
     assert "\n" not in str(caught.value)
 
 
 def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any) -> None:
-    path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.3))
+    path = render(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.3))
     assert path is not None
     data = path.read_bytes()
     assert film.is_whole_film(data)
     assert not any(film.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1))
-    path = still.render_still(Instant.of(history), tmp_path / "still.png", width=32, height=20, samples=1)
+    path = still.render_still(
+        Instant.of(history), tmp_path / "still.png", Still(width=32, height=20, samples=1)
+    )
     picture = path.read_bytes()
     assert is_whole_picture(picture)
     assert not any(is_whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1))
@@ -179,7 +187,7 @@ def test_on_a_full_disk_nothing_half_written_stays(tmp_path: Path, history: Any)
         pytest.skip("this machine does not let root mount a disk")
     try:
         with pytest.raises(OutputError, match=r"film\.mp4 cannot be written: [Nn]o space") as caught:
-            films.render_film(history, disk / "film.mp4", Film(**SMALL, stop=0.3))
+            render(history, disk / "film.mp4", Film(**SMALL, stop=0.3))
         assert "\n" not in str(caught.value)
         assert list(disk.iterdir()) == []
     finally:

@@ -14,6 +14,7 @@ import pytest
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.model.layout import Layout
+from digiclay.core.session.render_settings import Still
 from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
 from digiclay.pictures import stage, still
@@ -51,7 +52,9 @@ def bed_in(mode: Mode) -> Instant:
 def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(
     mode: Mode, tmp_path: Path
 ) -> None:
-    out = still.render_still(bed_in(mode), tmp_path / "pins.png", width=WIDTH, height=HEIGHT, samples=2)
+    out = still.render_still(
+        bed_in(mode), tmp_path / "pins.png", Still(width=WIDTH, height=HEIGHT, samples=2)
+    )
     assert out.read_bytes().startswith(b"\x89PNG")
     pixels = picture(out)
     assert pixels.shape == (HEIGHT, WIDTH, 3)
@@ -66,7 +69,7 @@ def test_the_legend_names_the_modes_present_in_the_palette_that_the_open_file_we
     other = palettes.PALETTES["tol_muted"][Mode.HOLD]
     for seen, unseen in ((COLORS[Mode.HOLD], other), (other, COLORS[Mode.HOLD])):
         size = {"width": 2 * WIDTH, "height": 2 * HEIGHT}
-        out = still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", **size, samples=2)
+        out = still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", Still(**size, samples=2))
         legend = picture(out)[:, : 2 * WIDTH // 5]
         assert of_the_hue(legend, seen) > 20
         assert of_the_hue(legend, unseen) < 20
@@ -77,7 +80,7 @@ def test_the_legend_names_the_modes_present_in_the_palette_that_the_open_file_we
 def test_a_still_leaves_the_users_file_as_it_was(tmp_path: Path, formed: Instant) -> None:
     scene, before = bpy.context.scene, inventory()
     active = bpy.context.view_layer.objects.active
-    still.render_still(formed, tmp_path / "pins.png", width=40, height=25, samples=1)
+    still.render_still(formed, tmp_path / "pins.png", Still(width=40, height=25, samples=1))
     assert inventory() == before
     assert bpy.context.scene == scene
     assert bpy.context.view_layer.objects.active == active
@@ -89,14 +92,14 @@ def test_a_failed_render_leaves_neither_data_nor_files(tmp_path: Path, formed: I
     (folder / "pins.png").mkdir()
     before = inventory()
     with pytest.raises(OutputError, match=r"pins\.png cannot be written"):
-        still.render_still(formed, folder / "pins.png", width=40, height=25, samples=1)
+        still.render_still(formed, folder / "pins.png", Still(width=40, height=25, samples=1))
     assert inventory() == before
     assert [path.name for path in folder.iterdir()] == ["pins.png"]
 
 
-def test_an_unknown_engine_is_refused_with_the_known_ones(tmp_path: Path, formed: Instant) -> None:
+def test_an_unknown_engine_is_refused_with_the_known_ones() -> None:
     with pytest.raises(DigiclayError, match="cycles, workbench"):
-        still.render_still(formed, tmp_path / "pins.png", engine="eevee")
+        Still(engine="eevee")
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])

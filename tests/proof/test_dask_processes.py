@@ -13,8 +13,9 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands.cluster import open_cluster
-from digiclay.commands.evaluator import finish
+from digiclay.commands.evaluator import submit
 from digiclay.core.files.run_folder import read_json
+from digiclay.core.studies.series import finish
 from distributed import Client
 
 from tests.own_methods import forgotten, write_method
@@ -136,7 +137,7 @@ def test_a_piece_that_no_worker_survives_fails_alone(here: Path, start: Start) -
     done: dict[str, Any] = {}
     with open_cluster(address, lambda: False, lambda note: None) as cluster:
         pieces = ["1 + 1", "__import__('os')._exit(1)", "2 + 2"]
-        finish(cluster, eval, pieces, done.__setitem__, done.__setitem__, stopped=lambda: False)
+        finish(submit(cluster, eval, pieces, stopped=lambda: False), done.__setitem__, done.__setitem__)
     assert [done[piece] for piece in pieces[::2]] == [2, 4]
     assert done[pieces[1]].startswith("2 workers died of this, the last one tcp://127.0.0.1:")
 

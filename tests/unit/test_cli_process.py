@@ -52,6 +52,7 @@ def test_a_missing_library_is_told_before_any_work(
 ) -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == missing]:
         monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(sys.modules, "digiclay.compat", raising=False)
     monkeypatch.setitem(sys.modules, missing, None)  # as Python marks what cannot be imported
     refused(line.split(), install)
     assert left(here) == []

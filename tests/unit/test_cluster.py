@@ -12,10 +12,11 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands import cluster as cluster_module
 from digiclay.commands.cluster import Versions, describe_versions, evaluate_on_worker, open_cluster
-from digiclay.commands.evaluator import finish
+from digiclay.commands.evaluator import submit
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
+from digiclay.core.studies.series import finish
 from distributed import Client, LocalCluster
 
 from tests.other_process import finish as run_process
@@ -57,6 +58,11 @@ def silent(note: str) -> None:
     """Draw nothing."""
 
 
+def never() -> bool:
+    """Ask for no stop."""
+    return False
+
+
 def test_a_sweep_on_a_cluster_comes_to_the_table_of_this_machine(here: Path, address: str) -> None:
     assert main([*SWEEP, "--workers", "1", "--out", "own"]) == 0
     assert main([*SWEEP, "--scheduler", address, "--out", "far"]) == 0
@@ -93,7 +99,7 @@ def test_after_a_stop_no_task_is_left_in_the_cluster(address: str) -> None:
             return bool(running)
 
         with open_cluster(address, lambda: False, silent) as cluster:
-            finish(cluster, evaluate_hours, hours(4), lambda *_: None, lambda *_: None, stopped=stop)
+            finish(submit(cluster, evaluate_hours, hours(4), stopped=stop), lambda *_: None, lambda *_: None)
         wait_until(lambda: list(client.run(look).values()) == [(0, 0)])
 
 
@@ -123,10 +129,10 @@ def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_
 ) -> None:
     done: Found = {}
     with open_cluster(address, lambda: False, silent) as cluster:
-        finish(cluster, invert, [0, 1, 2], done.__setitem__, done.__setitem__, stopped=lambda: False)
+        finish(submit(cluster, invert, [0, 1, 2], stopped=never), done.__setitem__, done.__setitem__)
         assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}
         monkeypatch.setattr(cluster_module, "FETCH", 0.3)
-        finish(cluster, give_slowly, [0], done.__setitem__, done.__setitem__, stopped=lambda: False)
+        finish(submit(cluster, give_slowly, [0], stopped=never), done.__setitem__, done.__setitem__)
     assert isinstance(done[0], SlowToSend)
     assert SlowToSend.sent > 1
 
@@ -160,7 +166,7 @@ def test_a_scheduler_that_is_gone_ends_a_series_in_one_line() -> None:
             other.close()
             gone = f"^The scheduler {address} is gone. What is done is kept, and the same command goes on"
             with pytest.raises(OutputError, match=gone):
-                finish(cluster, invert, [1], print, print, stopped=lambda: False)
+                finish(submit(cluster, invert, [1], stopped=never), print, print)
 
 
 def test_versions_that_differ_are_named_with_who_has_them() -> None:

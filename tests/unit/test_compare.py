@@ -11,7 +11,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.compare import table
 from digiclay.core.session.run_scene import RUN_METRICS
-from digiclay.plots.comparison import PANELS, comparison
+from digiclay.plots.sweep import PANELS, comparison
 
 from tests.scene_files import scene_text
 

@@ -13,6 +13,7 @@ from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.plots import run as plots
 from digiclay.plots.bed import hidden
+from digiclay.plots.figure import save
 
 from tests.other_process import finish, start
 
@@ -163,24 +164,24 @@ def test_no_text_on_the_relief_hides_another(rows, columns, share):
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
 def test_both_pictures_are_written_at_their_size(tmp_path, arrangement):
     case = drag(arrangement=arrangement)
-    assert png_size(plots.session(case, tmp_path / "session.png", SetPoint(0.4))) == (2000, 1008)
-    assert png_size(plots.surface(case, tmp_path / "surface.png")) == (2000, 880)
+    assert png_size(save(plots.session_figure(case, SetPoint(0.4)), tmp_path / "session.png")) == (2000, 1008)
+    assert png_size(save(plots.surface_figure(case), tmp_path / "surface.png")) == (2000, 880)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["session.png", "surface.png"]
     # A picture with something on it: a white one of this size has 10 kB.
     assert min(path.stat().st_size for path in tmp_path.iterdir()) > 40_000
     with pytest.raises(OutputError, match=r"^Cannot write \S+session\.png: No such file or directory\.$"):
-        plots.session(case, tmp_path / "missing" / "session.png", SetPoint(0.4))
+        save(plots.session_figure(case, SetPoint(0.4)), tmp_path / "missing" / "session.png")
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1)])
 def test_a_single_row_or_column_has_a_session_and_no_surface(tmp_path, shape):
     case = drag(*shape)
     with pytest.raises(ParameterError, match="2 x 2 pins at least"):
-        plots.surface(case, tmp_path / "surface.png")
+        save(plots.surface_figure(case), tmp_path / "surface.png")
     assert not list(tmp_path.iterdir())
     if shape == (1, 1):  # a session of one row as well
         case = {name: value if name == "position" else value[:1] for name, value in case.items()}
-    assert plots.session(case, tmp_path / "session.png", SetPoint(0.4)).stat().st_size > 40_000
+    assert save(plots.session_figure(case, SetPoint(0.4)), tmp_path / "session.png").stat().st_size > 40_000
 
 
 def test_matplotlib_is_not_imported_before_it_is_needed_and_it_is_said_what_to_install():
@@ -189,7 +190,7 @@ def test_matplotlib_is_not_imported_before_it_is_needed_and_it_is_said_what_to_i
         "sys.modules['matplotlib'] = None\n"
         "from digiclay.plots import run\n"
         "case = {'position': [[0, 0]], 'time': [0], 'total_force': [0], 'height': [[0]]}\n"
-        "run.session(case, 'session.png', None)\n"
+        "run.session_figure(case, None)\n"
     )
     code, _, err = finish(start(script))
     said = "OutputError: Plots need matplotlib: run 'pip install digiclay[plots]'.\n"

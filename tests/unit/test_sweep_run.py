@@ -14,12 +14,13 @@ from typing import Any
 
 import pytest
 from digiclay.cli import main
-from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere, finish
+from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere, submit
 from digiclay.commands.worker import Processes
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, Record, make_points, read_axis
 from digiclay.core.studies.evaluation import evaluate
+from digiclay.core.studies.series import finish
 
 from tests.other_process import PROGRAM, start
 from tests.other_process import finish as finish_process
@@ -46,10 +47,9 @@ def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> 
     """Run points, each in a bundle of its own; return what was kept."""
     done: dict[int, Record] = {}
     finish(
-        executor, task, [(point,) for point in todo],
+        submit(executor, task, [(point,) for point in todo], **{"stopped": lambda: False, **known}),
         lambda bundle, records: done.update({bundle[0].index: records[0]}),
         lambda bundle, why: done.update({bundle[0].index: {"error": why}}),
-        **{"stopped": lambda: False, **known},
     )  # fmt: skip
     return done
 

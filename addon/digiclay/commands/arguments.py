@@ -114,6 +114,12 @@ def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.Argume
     return parser
 
 
+def say(arguments: argparse.Namespace, *lines: object) -> None:
+    """Print lines, unless only errors are asked for."""
+    if not arguments.quiet:
+        print(*lines, sep="\n", flush=True)
+
+
 @contextmanager
 def told_as_options(*owners: str, **names: str) -> Iterator[None]:
     """Rename parameters of some owners to their options in an error, by equal name or `names`."""

@@ -13,7 +13,7 @@ from typing import Any
 from ..core.base.errors import one_line
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
 from ..plugins.method_loader import find_word
-from .arguments import add_command, load_by_option
+from .arguments import add_command, load_by_option, say
 from .batch_folder import Folder, open_batch
 from .evaluation_pool import read_count
 from .job_steps import PROGRESS, check_outputs, find_error, read_fraction, read_tail
@@ -102,17 +102,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
         for job in made.jobs:
             folder.describe(job)
         if arguments.prepare:
-            if not arguments.quiet:
-                print(f"{len(made.jobs)} jobs written to {out / 'jobs'}")
+            say(arguments, f"{len(made.jobs)} jobs written to {out / 'jobs'}")
             return 0
         return _submit(arguments, folder) if arguments.submit else _finish(arguments, folder)
 
 
 def _submit(arguments: argparse.Namespace, folder: Folder) -> int:
     """Write the files of a farm, print how they are submitted, and return the exit code."""
-    said = write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk)
-    if not arguments.quiet:
-        print("\n".join(said))
+    say(arguments, *write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk))
     return _tell_failed(
         {job.name: job.error for job in folder.batch.jobs if job.error}, len(folder.batch.jobs)
     )
@@ -125,12 +122,8 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
     todo = [job for job in made.jobs if not job.error and not folder.is_done(job)]
     before = len(made.jobs) - len(todo)
 
-    def tell(line: str) -> None:
-        if not arguments.quiet:
-            print(line, flush=True)
-
     for name, error in failed.items():
-        tell(f"failed: {name}: {error}")
+        say(arguments, f"failed: {name}: {error}")
     count = max(1, min(arguments.jobs or count_cores(), len(todo)))
     with Stop() as stop, Counted(sys.stderr, made.name, "jobs", before) as bar:
         running: dict[str, JobProcess] = {}
@@ -161,7 +154,7 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
             ended.append(job)
             if not stop():
                 failed[job.name] = error
-                tell(f"failed: {job.name}: {error}")
+                say(arguments, f"failed: {job.name}: {error}")
                 refresh()
 
         def draw() -> None:
@@ -183,9 +176,9 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
     if ready is not None:
         said += f"; a job's process takes {ready:.1f} s to start"
     index = folder.write_index(failed, f"{said}.")
-    tell(f"{said}.\nwritten to {index}")
+    say(arguments, f"{said}.", f"written to {index}")
     if stopped and done + len(failed) < len(made.jobs):
-        tell("Stopped: what is done is kept, and the same command goes on from there.")
+        say(arguments, "Stopped: what is done is kept, and the same command goes on from there.")
         return STOPPED
     return _tell_failed(failed, len(made.jobs))
 

@@ -23,7 +23,7 @@ from ..core.scene.schema import Scene
 from ..core.session.run_scene import RUN_METRICS, Result, run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
 from ..plugins.method_loader import find_installed, is_file_word
-from .arguments import METHOD, add_command, add_scene, load_by_option, settings_of
+from .arguments import METHOD, add_command, add_scene, load_by_option, say, settings_of
 from .outside import SUITE, find_beside, refuse_absent
 from .progress import Bar
 from .progress import table as aligned
@@ -108,10 +108,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out or Path(f"{find_name(path)}_compare")
     check_folder(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
-    from ..plots.comparison import comparison
     from ..plots.figure import save
+    from ..plots.sweep import comparison
 
-    scenes = {method: _scene(arguments, path, method) for method in methods}
+    settings = settings_of(arguments)
+    scenes = {name: load(path, [*settings, Setting(METHOD, name, "--methods")]) for name in methods}
     found: dict[str, Metrics] = {}
     forces: dict[str, tuple[Any, Any, Any]] = {}
     beyond: dict[str, str] = {}
@@ -127,12 +128,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
         said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(said + "\n", encoding="utf-8")
         save(comparison(found, forces, scene.name), folder / "compare.png")
-    if not arguments.quiet:
-        print("\n".join(table(found)))
-        print("".join(f"{method}: {words}\n" for method, words in beyond.items() if words), end="")
-        if arguments.speed:
-            print(f"Followed: {Criterion()}.")
-        print(f"written to {out}")
+    notes = [f"{method}: {words}" for method, words in beyond.items() if words]
+    notes += [f"Followed: {Criterion()}."] if arguments.speed else []
+    say(arguments, *table(found), *notes, f"written to {out}")
     return 0
 
 
@@ -154,11 +152,6 @@ def _refuse_options_of_suite(arguments: argparse.Namespace) -> None:
             raise OutputError(f"--{name.replace('_', '-')} is for --suite.")
     if arguments.scene is None:
         raise OutputError("The following arguments are required: SCENE, or --suite.")
-
-
-def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:
-    """Return the scene with one method, and the settings of the command line."""
-    return load(path, [*settings_of(arguments), Setting(METHOD, method, "--methods")])
 
 
 def _run(scene: Scene, method: str, *, quiet: bool) -> Result:

@@ -7,15 +7,15 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
-from typing import Any
 
 from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point, Record
 from ..core.studies.evaluation import Pool, evaluate_bundle
-from ..core.studies.series import finish_here
-from ..core.studies.sweep_plan import Folder, find_unfinished, select_done
-from .arguments import add_scene, whole_number
+from ..core.studies.series import finish
+from ..core.studies.sweep_plan import Folder
+from .arguments import add_scene, say, whole_number
 from .progress import Counted
 from .stop import STOPPED, Stop, refuse_without
 from .worker import count_cores, in_blender
@@ -78,11 +78,11 @@ def open_pool(
     # Modules with threads are not part of the extension's zip, where there is one process.
     if arguments.scheduler is not None:
         from .cluster import evaluate_on_worker, open_cluster
-        from .evaluator import finish
+        from .evaluator import submit
 
         with open_cluster(arguments.scheduler, stop, draw) as cluster:
             yield partial(
-                finish, cluster, partial(evaluate_on_worker, errors=errors),
+                submit, cluster, partial(evaluate_on_worker, errors=errors),
                 stopped=lambda: draw_and_ask(cluster.describe()),
             )  # fmt: skip
         return
@@ -94,10 +94,12 @@ def open_pool(
             yield pool
         return
     task = partial(evaluate_bundle, stopped=draw_and_ask, errors=errors)
-    yield partial(finish_here, task, stopped=draw_and_ask)
+    yield lambda bundles: (
+        (bundle, partial(task, bundle)) for bundle in takewhile(lambda _: not draw_and_ask(), bundles)
+    )
 
 
-class Evaluation:
+class Evaluation(ExitStack):
     """Points of a series under evaluation, with a progress line; each is kept as soon as it is done.
 
     Parameters
@@ -128,20 +130,14 @@ class Evaluation:
         errors: bool = False,
         pieces: int = 0,
     ) -> None:
+        super().__init__()
         self.folder, self.total, self.stop, self._quiet = folder, total, stop, arguments.quiet
-        self.records = select_done(folder.read_records(), errors=errors)
+        self.records = folder.read_records(errors=errors)
         self.failed: dict[int, Record] = {}
-        self._bar = Counted(sys.stderr, label, "points", len(self.records))
+        self._bar = self.enter_context(Counted(sys.stderr, label, "points", len(self.records)))
         self._open = partial(open_pool, arguments, stop=stop, draw=self._draw, errors=errors)
-        self._pieces, self._opened = pieces, ExitStack()
+        self._pieces = pieces
         self._pool: Pool | None = None
-
-    def __enter__(self) -> Evaluation:
-        self._opened.enter_context(self._bar)
-        return self
-
-    def __exit__(self, *raised: Any) -> None:
-        self._opened.__exit__(*raised)
 
     def _draw(self, note: str) -> None:
         if not self._quiet:
@@ -156,7 +152,10 @@ class Evaluation:
         """Evaluate the bundles of which a point is missing. `keys`: the varied parameters."""
 
         def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
-            self.folder.keep_bundle(bundle, found, keys, self.records)
+            for point, record in zip(bundle, found, strict=True):
+                if record is not None and point.index not in self.records:
+                    self.folder.keep(point, keys, record)
+                    self.records[point.index] = record
 
         def fail(bundle: Sequence[Point], why: str) -> None:
             self.failed.update((point.index, {"error": why}) for point in bundle)
@@ -164,11 +163,12 @@ class Evaluation:
             which = f"point {first}" if len(bundle) == 1 else f"{len(bundle)} points from {first}"
             self._bar.tell(f"failed: {which}: {why}")
 
-        todo = find_unfinished(bundles, self.records)
+        # Of a bundle all points are run again: alone the last bit of a point would be another one.
+        todo = [bundle for bundle in bundles if any(point.index not in self.records for point in bundle)]
         if todo:
             if self._pool is None:
-                self._pool = self._opened.enter_context(self._open(max(len(todo), self._pieces)))
-            self._pool(todo, keep, fail)
+                self._pool = self.enter_context(self._open(max(len(todo), self._pieces)))
+            finish(self._pool(todo), keep, fail)
 
 
 def run_series(
@@ -191,11 +191,8 @@ def run_series(
             evaluate(evaluation)
             records = evaluation.collect()
         if stop() and len(records) < total:
-            if not arguments.quiet:
-                kept = f"{len(records)} of {total} {noun} are done and kept in {folder.path}"
-                print(f"Stopped: {kept}. The same command goes on from there.")
+            kept = f"{len(records)} of {total} {noun} are done and kept in {folder.path}"
+            say(arguments, f"Stopped: {kept}. The same command goes on from there.")
             return STOPPED
-        lines = write(records)
-        if not arguments.quiet:
-            print(*lines, sep="\n")
+        say(arguments, *write(records))
     return 0

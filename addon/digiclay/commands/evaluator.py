@@ -15,31 +15,26 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecu
 from contextlib import contextmanager
 from functools import partial
 from queue import Empty, SimpleQueue
-from typing import Any, TypeVar
+from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError, one_line
 from ..core.studies.axes import Point, Record
 from ..core.studies.evaluation import Pool, evaluate_bundle
-from ..core.studies.series import describe_error
+from ..core.studies.series import Outcome, Piece, Results
 from .worker import Process, Processes
 
 #: Seconds between two looks at whether somebody asked to stop.
 PAUSE = 0.1
 
-Piece = TypeVar("Piece")
-Outcome = TypeVar("Outcome")
 
-
-def finish(
+def submit(
     executor: Executor,
     task: Callable[[Piece], Outcome],
     pieces: Iterable[Piece],
-    keep: Callable[[Piece, Outcome], None],
-    fail: Callable[[Piece, str], None],
     *,
     stopped: Callable[[], bool],
-) -> None:
-    """Have an executor do what is left of a series, by value; OutputError when it breaks down itself."""
+) -> Results[Piece, Outcome]:
+    """Have an executor do pieces of a series, by value; OutputError when it breaks down itself."""
     arrived: SimpleQueue[Future[Outcome]] = SimpleQueue()
     waiting: dict[Future[Outcome], Piece] = {}
     looked = -PAUSE
@@ -63,14 +58,9 @@ def finish(
             piece = waiting.pop(future)
             if future.cancelled():
                 continue
-            try:
-                outcome = future.result()
-            except BrokenExecutor:
-                raise
-            except Exception as error:  # the other pieces are worth having
-                fail(piece, describe_error(error))
-            else:
-                keep(piece, outcome)
+            if isinstance(broken := future.exception(), BrokenExecutor):
+                raise broken
+            yield piece, future.result
     except BrokenExecutor as error:
         rule = "What is done is kept, and the same command goes on from there."
         raise OutputError(f"{one_line(error)} {rule}") from None
@@ -107,7 +97,7 @@ def open_evaluators(
     """Yield an evaluation of bundles in processes, each waited for by a thread."""
     with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
         task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
-        yield partial(finish, threads, task, stopped=processes.stopped)
+        yield partial(submit, threads, task, stopped=processes.stopped)
 
 
 def evaluate_elsewhere(

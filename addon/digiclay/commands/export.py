@@ -20,7 +20,7 @@ from ..core.session.finished_run import Run, find_row, read_run
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, make_formed
 from ..core.surface.skins import SKINS
-from .arguments import add_run, millimeters, seconds, told_as_options
+from .arguments import add_run, millimeters, say, seconds, told_as_options, whole_number
 from .progress import table as aligned
 from .stop import require_surface
 
@@ -32,7 +32,7 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resolution",
         metavar="N",
-        type=_points,
+        type=whole_number(1, 64),  # 0 stands for the default in files alone
         default=0,
         help="points a pitch; default: 1, or 4 for curved skins",
     )
@@ -50,13 +50,6 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
         "--former", metavar="T", default="0",
         help="instant of the former surface, s, or 'rest'; default: the start",
     )  # fmt: skip
-
-
-def _points(text: str) -> int:
-    """Read points a pitch: a whole number from 1 on; 0 stands for the default in files alone."""
-    if not text.isdecimal() or int(text[:9]) < 1:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to 64 (got {text!r})")
-    return int(text[:9])
 
 
 def finding_of(arguments: argparse.Namespace) -> Finding:
@@ -185,8 +178,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     with claim_files([path for _, _, path in targets]):
         for some, kind, path in targets:
             write(some, path, arguments.unit, kind, arguments.up, arguments.forward)
-            if not arguments.quiet:
-                print(f"{path} ({arguments.up} up)" if kind == "obj" else path)
+            say(arguments, f"{path} ({arguments.up} up)" if kind == "obj" else path)
     return 0
 
 
@@ -216,13 +208,9 @@ def list_features(arguments: argparse.Namespace) -> int:
     require_surface(run.scene, "features")
     formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
     features = find_features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
-    if arguments.quiet:
-        return 0
     if arguments.json:
-        print(json.dumps([feature.figures() for feature in features], indent=1))
-        return 0
-    print(summarize(features))
-    if features:
+        say(arguments, json.dumps([feature.figures() for feature in features], indent=1))
+    else:
         head, *rows = make_table(features)
-        print("\n".join(aligned(head, rows)))
+        say(arguments, summarize(features), *(aligned(head, rows) if rows else ()))
     return 0

@@ -23,7 +23,7 @@ from ..core.scene.schema import Scene
 from ..core.session.run_scene import Result, run, save
 from ..core.shapes.fitting import Fitted, pack
 from ..core.shapes.source_file import find_shape, fit_shape, import_reader, list_shapes
-from .arguments import add_command, add_scene, scene_of
+from .arguments import add_command, add_scene, say, scene_of
 from .export import formats
 from .extras import Extra, make_extras, plan_meshes, print_skipped
 from .progress import Bar
@@ -80,8 +80,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         import_reader(file)
     with allow_interrupt():  # a mesh of millions of triangles takes a while
         scene, laid = _laid(scene_of(arguments)[0])
-        if not arguments.quiet:
-            print(laid.describe())
+        say(arguments, laid.describe())
         if arguments.finger != "scene":
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
@@ -93,8 +92,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         with claim.write() as folder:
             save(result, folder)
             left_out, wrong = make_extras(_exports(result, arguments.export), folder, stop)
-    if not arguments.quiet:
-        print("\n".join([*lines, result.summary(), f"written to {out}"]))
+    say(arguments, *lines, result.summary(), f"written to {out}")
     print_skipped(left_out, out)
     if wrong:
         raise wrong[0]

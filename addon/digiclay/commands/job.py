@@ -19,8 +19,9 @@ from ..core.base.errors import BusyError, DigiclayError, OutputError, one_line
 from ..core.files.run_folder import claim_folder, format_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
+from ..core.studies.series import describe_error
 from ..plugins.method_loader import CODE, resolve_word
-from .arguments import add_command, load_by_option
+from .arguments import add_command, load_by_option, say
 from .batch_folder import note_failure, read_batch, refresh_page
 from .job_steps import (
     ERROR,
@@ -39,7 +40,7 @@ from .job_steps import (
     make_outputs,
 )
 from .progress import Counted
-from .stop import STOPPED, WRONG, Stop
+from .stop import FAILED, STOPPED, WRONG, Stop
 
 EXAMPLES = """\
 examples:
@@ -96,8 +97,7 @@ def _do_alone(arguments: argparse.Namespace) -> int:
         refresh_page(arguments.job)
         raise
     refresh_page(arguments.job)
-    if not arguments.quiet:
-        print(outcome)
+    say(arguments, outcome)
     return 0
 
 
@@ -112,15 +112,12 @@ def _follow(arguments: argparse.Namespace) -> int:
         return 0
     except KeyboardInterrupt:
         return STOPPED
-    except DigiclayError as error:
-        code, why = WRONG, one_line(error)
-    except MemoryError:
-        code, why = WRONG, "There is not enough memory: use fewer cells, or a higher recorder.every."
     except Exception as error:  # the batch continues, and has to report this
-        traceback.print_exc()
-        code, why = 1, f"{type(error).__name__}: {one_line(error)}"
-    print(f"{ERROR}{why}", flush=True)
-    return code
+        mendable = isinstance(error, (DigiclayError, MemoryError))
+        if not mendable:
+            traceback.print_exc()
+        print(f"{ERROR}{describe_error(error)}", flush=True)
+        return WRONG if mendable else FAILED
 
 
 def has_input_ended() -> bool:
@@ -186,8 +183,8 @@ def _write_run(arguments: argparse.Namespace, work: Work, outputs: Outputs) -> b
         state = judge_run(folder, out)
         if state is RunState.WHOLE and not arguments.overwrite:
             return False
-        if state in (RunState.CHANGED, RunState.INCOMPLETE) and not arguments.quiet:
-            print(f"The run in {out} is {state.value}: it is done again.", flush=True)
+        if state in (RunState.CHANGED, RunState.INCOMPLETE):
+            say(arguments, f"The run in {out} is {state.value}: it is done again.")
         with claim.write() as staged:
             make_outputs(work, scene, outputs, staged, timing)
             # As they were given: by them a batch recognizes what this is the run of.
@@ -219,7 +216,5 @@ def add_page(commands: Any) -> None:
 def write_page(arguments: argparse.Namespace) -> int:
     """Write the page."""
     series = read_batch(arguments.series)
-    said = series.write_page()
-    if not arguments.quiet:
-        print(f"{said}; written to {arguments.series / 'index.html'}")
+    say(arguments, f"{series.write_page()}; written to {arguments.series / 'index.html'}")
     return 0

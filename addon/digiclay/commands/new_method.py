@@ -13,7 +13,7 @@ from ..core.base.errors import OutputError
 from ..core.control.methods import METHODS
 from ..core.files.run_folder import write_whole
 from ..plugins.method_loader import name_method
-from .arguments import add_command
+from .arguments import add_command, say
 from .stop import refuse_unwritable
 
 EXAMPLES = """\
@@ -68,6 +68,5 @@ def carry_out(arguments: argparse.Namespace) -> int:
     except OSError as error:
         raise OutputError(f"{path.parent} cannot be made: {error.strerror or error}.") from None
     write_whole(path, text.encode())
-    if not arguments.quiet:
-        print(f"written to {path}", f"try: digiclay run slow_press --method {path}:{name}", sep="\n")
+    say(arguments, f"written to {path}", f"try: digiclay run slow_press --method {path}:{name}")
     return 0

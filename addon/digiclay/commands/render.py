@@ -18,7 +18,7 @@ from ..core.metrics.summary import compute_metrics
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
-from .arguments import add_run, seconds, size, told_as_options
+from .arguments import add_run, say, seconds, size, told_as_options
 from .progress import Counted
 from .stop import (
     STOPPED,
@@ -114,8 +114,7 @@ def _draw(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int
     if path is None:
         print("Stopped; nothing was written.", file=sys.stderr)
         return STOPPED
-    if not arguments.quiet:
-        print(path)
+    say(arguments, path)
     return STOPPED if stop() else 0
 
 
@@ -153,9 +152,7 @@ def draw_still(
     """Draw the instant of `looks`, or one row of a history; Blender is imported only now."""
     from ..pictures.still import render_still
 
-    names = ("width", "height", "engine", "samples", "color", "arrows")
-    instant = _find_instant(scene, history, looks, row)
-    return render_still(instant, out, **{name: getattr(looks, name) for name in names})
+    return render_still(_find_instant(scene, history, looks, row), out, looks)
 
 
 def draw_moving(
@@ -168,29 +165,21 @@ def draw_moving(
     row: int | None = None,
 ) -> Path | None:
     """Draw a session, or one rotation at the instant of `looks` or at a row; None when it was stopped."""
-    from ..pictures.film import render_film, render_turntable
+    from ..pictures.film import render_film
 
-    if isinstance(looks, Film):
-        session = _describe_session(scene, history)
-        return render_film(history, out, looks, progress=progress, stopped=stopped, **session)
-    instant = _find_instant(scene, history, looks, row)
-    return render_turntable(instant, out, looks, progress=progress, stopped=stopped)
+    return render_film(stage_moving(scene, history, looks, row), out, looks, progress, stopped)
 
 
 def stage_moving(
-    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Film | Turntable
+    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Film | Turntable, row: int | None = None
 ) -> AbstractContextManager[Shots]:
-    """Set the stage for single frames of the film that `draw_moving` would draw."""
+    """Set the stage for the frames of the film that `draw_moving` draws."""
     from ..pictures.film import stage_film, stage_turntable
 
     if isinstance(looks, Film):
-        return stage_film(history, looks, **_describe_session(scene, history))
-    return stage_turntable(_find_instant(scene, history, looks, None), looks)
-
-
-def _describe_session(scene: Scene, history: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    """Return what a film shows besides the rows of the history."""
-    return {"set_point": compute_metrics(history, scene.set_point)["set_point"], **sizes(scene)}
+        set_point = compute_metrics(history, scene.set_point)["set_point"]
+        return stage_film(history, looks, set_point=set_point, **sizes(scene))
+    return stage_turntable(_find_instant(scene, history, looks, row), looks)
 
 
 def _find_instant(
@@ -223,10 +212,11 @@ def add_plot(commands: Any) -> None:
 
 def plotted(scene: Scene, history: Mapping[str, NDArray[Any]], folder: Path) -> list[Path]:
     """Draw a history into a folder; return the files."""
-    from ..plots.run import session, surface
+    from ..plots.figure import save
+    from ..plots.run import session_figure, surface_figure
 
-    paths = [folder / name for name in PLOTS]
-    return [session(history, paths[0], scene.set_point), surface(history, paths[1])]
+    figures = session_figure(history, scene.set_point), surface_figure(history)
+    return [save(figure, folder / name) for figure, name in zip(figures, PLOTS, strict=True)]
 
 
 def plot(arguments: argparse.Namespace) -> int:
@@ -237,7 +227,5 @@ def plot(arguments: argparse.Namespace) -> int:
     require_surface(run.scene, "plot")
     refuse_unwritable(folder)
     with claim_files([folder / name for name in PLOTS]):
-        for path in plotted(run.scene, run.history, folder):
-            if not arguments.quiet:
-                print(path)
+        say(arguments, *plotted(run.scene, run.history, folder))
     return 0

@@ -18,7 +18,7 @@ from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import Result, run, save
 from ..core.studies.omissions import Fitted, find_omissions
 from ..plugins.method_loader import describe_origin, write_code
-from .arguments import add_command, add_scene, length, scene_of, told_as_options
+from .arguments import add_command, add_scene, length, say, scene_of, told_as_options
 from .export import formats
 from .extras import (
     Extra,
@@ -141,9 +141,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
                 save(result, folder)
                 write_code(scene, folder)
                 left_out, wrong = make_extras(_extras(arguments, result), folder, stop)
-    if not arguments.quiet:
-        print(result.summary())
-        print(f"written to {out}")
+    say(arguments, result.summary(), f"written to {out}")
     if unjudged:
         tell_stopped_before("its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"])
     print_skipped(left_out, out)

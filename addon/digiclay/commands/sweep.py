@@ -85,11 +85,12 @@ def _draw_pictures(
     """Draw the figures over one or two axes; return the messages."""
     if len(axes) > 2:
         return [f"{len(axes)} axes: a table only, no pictures"]
-    from ..plots.sweep import picture
+    from ..plots.figure import save
+    from ..plots.sweep import sweep_figure
 
     try:
         for name in names:
-            picture(columns, name, make_grid(records, axes, name), out / f"{name}.png")
+            save(sweep_figure(columns, name, make_grid(records, axes, name)), out / f"{name}.png")
     except OutputError as error:  # the table is written, and pictures can be drawn later
         return [str(error)]
     return []

@@ -74,14 +74,6 @@ def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
     return _show(bed, scene, shape, fit_shape(shape, make_grid(scene.layout), scene.actuator))
 
 
-def embed_heights(scene: Scene) -> Scene:
-    """Return a scene that has the heights of its shape in it, so that a .blend needs no other file."""
-    if scene.shape is None or scene.shape.heights:
-        return scene
-    laid = fit_shape(scene.shape, make_grid(scene.layout), scene.actuator)
-    return replace(scene, shape=replace(scene.shape, heights=pack(laid.heights)))
-
-
 def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, float]:
     """Drive the pins of a bed to a shape, and keep shape and state in the bed."""
     scene = replace(scene, shape=replace(shape, heights=pack(laid.heights)))

@@ -12,6 +12,7 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
 from ..core.shapes.request import Shape
 from ..core.shapes.source_file import list_shapes
+from ..core.studies.job_table import embed_heights
 from ..device.instant import find_ellipsoid, pick_pose, read
 from ..exchange import shape_show
 from ..recorded import takes
@@ -57,7 +58,7 @@ class AddSceneAction(Placed, Action):
 
     def add_scene(self, context: Any, scene: Scene) -> None:
         """Add the bed of a scene, its fingertip where its path begins."""
-        scene = shape_show.embed_heights(scene)
+        scene = embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
         bed.name = scene.name

@@ -102,22 +102,6 @@ class Shots:
     show: Callable[[int], None]
 
 
-def render_film(
-    history: Mapping[str, NDArray[Any]],
-    out: Path,
-    looks: Film,
-    *,
-    set_point: float | None = None,
-    progress: Progress | None = None,
-    stopped: Callable[[], bool] | None = None,
-    **sizes: Any,
-) -> Path | None:
-    """Draw rows of a history into an MP4 file, which appears whole or not at all; None: it was stopped."""
-    return _render_whole(
-        stage_film(history, looks, set_point=set_point, **sizes), out, looks, progress, stopped
-    )
-
-
 @contextmanager
 def stage_film(
     history: Mapping[str, NDArray[Any]], looks: Film, *, set_point: float | None = None, **sizes: Any
@@ -151,21 +135,9 @@ def stage_film(
         yield Shots(scene, len(rows), show)
 
 
-def render_turntable(
-    instant: Instant,
-    out: Path,
-    looks: Turntable,
-    *,
-    progress: Progress | None = None,
-    stopped: Callable[[], bool] | None = None,
-) -> Path | None:
-    """Draw a bed that turns once about itself into an MP4 file; None when it was stopped."""
-    return _render_whole(stage_turntable(instant, looks), out, looks, progress, stopped)
-
-
 @contextmanager
 def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
-    """Set the stage for the frames of a turntable. `instant`, `looks`: as for `render_turntable`."""
+    """Set the stage for the frames of a bed that turns once about itself."""
     with scratch():
         scene = add_picture_scene("Digital Clay Turntable", looks)
         use_fast_settings(scene)
@@ -212,14 +184,14 @@ def _turn(points: Floats, angle: float) -> Floats:
     return np.asarray(points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
 
-def _render_whole(
+def render_film(
     staged: AbstractContextManager[Shots],
     out: Path,
     looks: Moving,
-    progress: Progress | None,
-    stopped: Callable[[], bool] | None,
+    progress: Progress | None = None,
+    stopped: Callable[[], bool] | None = None,
 ) -> Path | None:
-    """Draw all frames into a folder that is taken away again, and make the film of them."""
+    """Draw all frames into an MP4 file, which appears whole or not at all; None when it was stopped."""
     with frame_folder(out) as folder, staged as shots:
         frames = range(shots.count)
         if not draw_frames(shots, frames, folder, out, progress, stopped):

@@ -21,25 +21,13 @@ ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
 SPACE = 2**20
 
 
-def render_still(
-    instant: Instant,
-    out: Path,
-    *,
-    width: int = 1600,
-    height: int = 1000,
-    engine: str = "cycles",
-    samples: int = 6,
-    denoise: bool = True,
-    color: str = "mode",
-    arrows: bool = False,
-) -> Path:
+def render_still(instant: Instant, out: Path, looks: Still) -> Path:
     """Draw an instant into a PNG file, which appears whole or not at all."""
-    looks = Still(width=width, height=height, engine=engine, samples=samples, color=color, arrows=arrows)
     partial = out.with_name(f".{out.name}.{os.getpid()}.partial.png")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         with scratch():
-            scene = add_picture_scene("Digital Clay Still", looks, denoise=denoise)
+            scene = add_picture_scene("Digital Clay Still", looks)
             bed = view.build(instant, scene.collection)
             apply_style(bed, looks)
             stage.set_up(scene, bed, instant)
@@ -79,8 +67,8 @@ def failure_reason(path: Path) -> str:
     return "no space is left on the disk" if full else "Blender wrote no whole file"
 
 
-def add_picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
-    """Add a scene with all that decides a picture besides the scene's contents. `denoise`: of Cycles."""
+def add_picture_scene(name: str, looks: Picture) -> Any:
+    """Add a scene with all that decides a picture besides the scene's contents."""
     scene = bpy.data.scenes.new(name)
     render, engine = scene.render, looks.engine
     render.engine = ENGINES[engine]
@@ -90,7 +78,7 @@ def add_picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any
     render.image_settings.file_format = "PNG"
     render.image_settings.color_mode = "RGB"
     if engine == "cycles":
-        _cycles(scene.cycles, looks.samples, denoise)
+        _cycles(scene.cycles, looks.samples)
     else:
         _workbench(scene.display)
     return scene
@@ -102,14 +90,14 @@ def use_fast_settings(scene: Any) -> None:
     scene.display.render_aa = "8"
 
 
-def _cycles(cycles: Any, samples: int, denoise: bool) -> None:
+def _cycles(cycles: Any, samples: int) -> None:
     """Few samples, no surprises: the same picture each time, on any machine."""
     cycles.device = "CPU"
     cycles.samples = samples
     cycles.seed = 0
     cycles.use_adaptive_sampling = False
     cycles.max_bounces = 2
-    cycles.use_denoising = denoise and has_denoiser()
+    cycles.use_denoising = has_denoiser()
     if cycles.use_denoising:
         cycles.denoiser = "OPENIMAGEDENOISE"
         if hasattr(cycles, "denoising_quality"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,7 @@ from ..core.metrics.metric_table import METRICS
 from ..core.metrics.summary import compute_metrics
 from ..core.model.control_interface import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
-from .figure import INK, LINES, MM, SHADE, canvas, legend_above, save
+from .figure import INK, LINES, MM, SHADE, canvas, legend_above
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
@@ -22,16 +21,6 @@ if TYPE_CHECKING:  # only named in annotations
 LETTERS = "ABCDEF"
 #: Metrics in the picture of a session.
 FIGURES = ("rfd", "rfd_shaping", "max_total_force", "contact_loss_share", "lag_mean", "height_range")
-
-
-def session(history: History, out: str | Path, set_point: SetPoint | None) -> Path:
-    """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written."""
-    return save(session_figure(history, set_point), out)
-
-
-def surface(history: History, out: str | Path) -> Path:
-    """Write `surface_figure` as a PNG and return its path; OutputError when it cannot be written."""
-    return save(surface_figure(history), out)
 
 
 def session_cells(history: History) -> list[int]:

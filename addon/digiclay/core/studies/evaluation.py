@@ -17,19 +17,11 @@ from ..scene.schema import Scene
 from ..session.accuracy import estimate_errors, has_every_command, make_reference
 from ..session.run_scene import Result, run
 from .axes import Measure, Point, Record
-from .series import describe_error
+from .series import Results, describe_error
 
-#: Evaluation of bundles in any order, until all are done or a stop is requested. Its callbacks get each
-#: bundle that is done with its records, None for a point that was stopped, and each that no worker survives
-#: with the reason in one line. OutputError when no worker is left.
-Pool = Callable[
-    [
-        Sequence[Sequence[Point]],
-        Callable[[Sequence[Point], Sequence[Record | None]], None],
-        Callable[[Sequence[Point], str], None],
-    ],
-    None,
-]
+#: Evaluation of bundles in any order, until all are done or a stop is requested. A record is None for a point
+#: that was stopped; a bundle that no worker survives raises. OutputError when no worker is left.
+Pool = Callable[[Sequence[Sequence[Point]]], Results[Sequence[Point], Sequence[Record | None]]]
 
 #: Metrics by which a session can be judged.
 FIGURES = {

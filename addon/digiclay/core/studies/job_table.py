@@ -248,12 +248,12 @@ def _make_job(name: str, file: Path, method: str, setting: tuple[str, list[Setti
     """Make one job."""
     chosen = [Setting("control.method", format_value(method), "methods")] if method else []
     try:
-        return Job(name, _embed_heights(load(file, [*chosen, *setting[1]])))
+        return Job(name, embed_heights(load(file, [*chosen, *setting[1]])))
     except (SceneError, ParameterError) as error:
         return Job(name, None, one_line(error))
 
 
-def _embed_heights(scene: Scene) -> Scene:
+def embed_heights(scene: Scene) -> Scene:
     """Return a scene with the heights of its shape in it, so that it needs no other file."""
     if scene.shape is None or scene.shape.heights:
         return scene

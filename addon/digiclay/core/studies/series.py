@@ -7,8 +7,8 @@ pieces is kept as soon as it is done.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,6 +31,8 @@ LOCK = ".lock"
 
 Piece = TypeVar("Piece")
 Outcome = TypeVar("Outcome")
+#: Pieces as they are done, each with a function that returns its outcome or raises its error.
+Results = Generator[tuple[Piece, Callable[[], Outcome]], None, None]
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def _make_folder(path: Path, kind: Kind, while_it_is_made: ExitStack, until_the_
     for folder in reversed(above):  # the innermost goes first
         until_the_end.callback(_remove_empty, folder)
     path.mkdir(parents=True, exist_ok=True)
-    if any(path.iterdir()) and not _is_ours(path, kind):
+    if not (path / kind.mark).is_file() and not _is_bare(path, kind):
         raise OutputError(f"{path} holds other things than a {kind.name}: choose another folder with --out.")
     until_the_end.enter_context(hold_lock(path / LOCK, describe_claim(path, "being worked in")))
 
@@ -91,11 +93,6 @@ def _remove_empty(folder: Path) -> None:
     """Take away a folder that nothing was written into."""
     with suppress(OSError):
         folder.rmdir()
-
-
-def _is_ours(path: Path, kind: Kind) -> bool:
-    """Return whether a folder is of this kind, or is left of one that did not come so far."""
-    return (path / kind.mark).is_file() or _is_bare(path, kind)
 
 
 def _is_bare(path: Path, kind: Kind) -> bool:
@@ -107,24 +104,20 @@ def _is_bare(path: Path, kind: Kind) -> bool:
     return True
 
 
-def finish_here(
-    task: Callable[[Piece], Outcome],
-    pieces: Iterable[Piece],
+def finish(
+    results: Results[Piece, Outcome],
     keep: Callable[[Piece, Outcome], None],
     fail: Callable[[Piece, str], None],
-    *,
-    stopped: Callable[[], bool],
 ) -> None:
-    """Do what is left of a series in this process, piece by piece, until somebody asks to stop."""
-    for piece in pieces:
-        if stopped():
-            return
-        try:
-            outcome = task(piece)
-        except Exception as error:  # the other pieces are worth having
-            fail(piece, describe_error(error))
-        else:
-            keep(piece, outcome)
+    """Keep the outcome of each piece of a series as it arrives, or report why the piece failed."""
+    with closing(results):
+        for piece, take in results:
+            try:
+                outcome = take()
+            except Exception as error:  # the other pieces are worth having
+                fail(piece, describe_error(error))
+            else:
+                keep(piece, outcome)
 
 
 def describe_error(error: Exception) -> str:
@@ -132,5 +125,5 @@ def describe_error(error: Exception) -> str:
     if isinstance(error, DigiclayError):
         return one_line(error)
     if isinstance(error, MemoryError):
-        return "There is not enough memory."
+        return "There is not enough memory: use fewer cells, or a higher recorder.every."
     return f"{type(error).__name__}: {one_line(error)}"

@@ -205,8 +205,7 @@ def find_largest_speed(
 
 def find_free_speed(scene: Scene) -> float:
     """Return how fast a pin without load rises through an open valve, m/s."""
-    fastest: float = assemble(scene).fastest
-    return fastest
+    return float(assemble(scene).fastest)
 
 
 def find_unintended_losses(done: Result) -> list[float]:

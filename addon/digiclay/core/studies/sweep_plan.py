@@ -37,12 +37,14 @@ class Folder:
 
     path: Path
 
-    def read_records(self) -> dict[int, Record]:
-        """Return what is kept of the finished points, by their index."""
+    def read_records(self, *, errors: bool = False) -> dict[int, Record]:
+        """Return the finished points by index, with `errors` only those that have `ERRORS` or failed."""
         records = {}
         for path in self.path.glob(f"{POINTS}/*.json"):
             record = read_json(path)  # a file that cannot be read is a point to be done again
-            if path.stem.isdecimal() and record is not None and record.keys() & {"figures", "error"}:
+            if not path.stem.isdecimal() or record is None or not record.keys() & {"figures", "error"}:
+                continue
+            if not errors or "error" in record or record["figures"].keys() >= ERRORS.keys():
                 records[int(path.stem)] = record
         return records
 
@@ -50,35 +52,6 @@ class Folder:
         """Write the file of a finished point, whole or not at all. `keys`: the varied parameters."""
         values = dict(zip(keys, point.words, strict=True))
         write_whole(self.path / POINTS / f"{point.index:06d}.json", format_json({"values": values, **record}))
-
-    def keep_bundle(
-        self,
-        bundle: Sequence[Point],
-        found: Sequence[Record | None],
-        keys: Sequence[str],
-        records: dict[int, Record],
-    ) -> None:
-        """Write the files of the finished points of a bundle, and add their records to those of all."""
-        for point, record in zip(bundle, found, strict=True):
-            if record is not None and point.index not in records:
-                self.keep(point, keys, record)
-                records[point.index] = record
-
-
-def select_done(records: Mapping[int, Record], *, errors: bool) -> dict[int, Record]:
-    """Return the records of points that need not be run again; `errors`: whether they must have `ERRORS`."""
-    return {
-        index: record
-        for index, record in records.items()
-        if not errors or "error" in record or record["figures"].keys() >= ERRORS.keys()
-    }
-
-
-def find_unfinished(
-    bundles: Iterable[Sequence[Point]], records: Mapping[int, Record]
-) -> list[Sequence[Point]]:
-    """Return the bundles of which a point is missing, whole: alone its last bit would be another one."""
-    return [bundle for bundle in bundles if any(point.index not in records for point in bundle)]
 
 
 def hash_points(points: Sequence[Point]) -> str:
