@@ -15,25 +15,7 @@ CORNERS = ("top_left", "top_right", "bottom_left", "bottom_right")
 
 @dataclass(frozen=True)
 class Choices:
-    """Default preferences.
-
-    Attributes
-    ----------
-    redraw_rate : int
-        How often a running session is drawn, Hz, at most.
-    most_periods : int
-        Control periods a tick simulates, at most: what a slow machine does not manage is dropped.
-    palette : str
-        A key of `palettes.PALETTES`.
-    take_press_tool : bool
-        Whether the start of a session takes the Press tool in hand.
-    overlay_corner : str
-        One of `CORNERS`.
-    run_own_methods : bool
-        Whether the Python files of the folder are run, when Blender starts and after a change.
-    methods_folder : str
-        Folder of control methods of one's own; as Blender has paths.
-    """
+    """Default preferences; `Preferences` says what they mean."""
 
     redraw_rate: int = 30
     most_periods: int = 20

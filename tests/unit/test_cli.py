@@ -73,7 +73,10 @@ def test_a_mistake_is_one_line_exit_code_2_and_no_folder(
     assert left(here) == []
 
 
-def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(here: Path) -> None:
+def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("digiclay.plots.bed.fit_relief", lambda *given: None)  # takes seconds
     main(["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots"])
     added = {path.name for path in (here / "my").iterdir()}
     assert {"surface.stl", "surface.obj", "session.png", "surface.png"} <= added

@@ -70,14 +70,10 @@ def test_a_sweep_on_a_cluster_comes_to_the_table_of_this_machine(here: Path, add
     assert len(list((here / "far/points").iterdir())) == 8
 
 
-@pytest.mark.parametrize(
-    ("command", "size"), [("study", "--samples 4"), ("tune", "--population 4 --generations 2")]
-)
-def test_a_study_and_a_tuning_on_a_cluster_come_to_the_tables_of_this_machine(
-    command: str, size: str, here: Path, address: str
-) -> None:
+def test_a_tuning_on_a_cluster_comes_to_the_tables_of_this_machine(here: Path, address: str) -> None:
     varied = ["--vary", "control.force_gain=1:2", "--vary", "control.position_gain=100:900"]
-    words = [command, "my.toml", *varied, *size.split(), "--metric", "rfd,highest", "--quiet"]
+    size = ["--population", "4", "--generations", "2"]
+    words = ["tune", "my.toml", *varied, *size, "--metric", "rfd,highest", "--quiet"]
     assert main([*words, "--workers", "1", "--out", "own"]) == 0
     assert main([*words, "--scheduler", address, "--out", "far"]) == 0
     own, far = ({path.name: path.read_bytes() for path in (here / at).glob("*.csv")} for at in ("own", "far"))

@@ -27,6 +27,12 @@ OUT = "first run"
 pytestmark = pytest.mark.usefixtures("here")
 
 
+@pytest.fixture(autouse=True)
+def plain_relief(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the texts of a relief where they are: to move them apart takes seconds."""
+    monkeypatch.setattr("digiclay.plots.bed.fit_relief", lambda *given: None)
+
+
 def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> None:
     """Send Ctrl-C when a command comes to a step."""
     step: Callable[..., Any] = getattr(module, name)
@@ -87,6 +93,15 @@ def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(
         assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
 
 
+def test_plot_writes_into_a_folder_and_prints_its_files(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors"]) == 0
+    assert main(["plot", "o", "--out", "new/pictures"]) == 0
+    assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
+    assert files(here / "new") == {"pictures/session.png", "pictures/surface.png"}
+
+
 def test_a_run_stopped_before_its_errors_are_estimated_says_so(here: Path, stopped: Any) -> None:
     commands = stopped(run_command, "estimate_errors", "run", "my.toml")
     assert list(commands) == ["its errors were estimated"]
@@ -112,14 +127,6 @@ def test_form_that_is_stopped_before_its_session_writes_nothing(
     assert main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
     assert capsys.readouterr().err == "Stopped; no file is half-written.\n"
     assert left(here) == []
-
-
-def test_plot_draws_what_a_run_with_plots_draws(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors", "--plots"]) == 0
-    assert main(["plot", "o", "--out", "new/pictures"]) == 0
-    assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
-    assert files(here / "new") == {"pictures/session.png", "pictures/surface.png"}
-    assert (here / "new/pictures/surface.png").read_bytes() == (here / "o/surface.png").read_bytes()
 
 
 @pytest.mark.parametrize(

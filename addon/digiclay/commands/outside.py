@@ -35,8 +35,11 @@ def find_beside(package: str, module: str) -> ModuleType | None:
 
 def refuse_absent(name: str, extra: str) -> NoReturn:
     """Refuse a command of a package that is not installed."""
-    rule = f"is not part of the extension: run 'pip install digiclay[{extra}]' first."
-    raise DigiclayError(f"digiclay {name} {rule}")
+    _refuse(f"digiclay {name} is not part of the extension: run 'pip install digiclay[{extra}]' first.")
+
+
+def _refuse(rule: str) -> NoReturn:
+    raise DigiclayError(rule)
 
 
 def add(commands: Any) -> None:
@@ -47,13 +50,8 @@ def add(commands: Any) -> None:
         else:
             parser = _add_any(commands, name, help=f"{help} (not part of the extension)")
             parser.set_defaults(carry_out=lambda _, name=name, extra=extra: refuse_absent(name, extra))
-    _add_any(commands, "benchmark", description="Where the benchmarks are.").set_defaults(
-        carry_out=_refuse_benchmark
-    )
-
-
-def _refuse_benchmark(arguments: argparse.Namespace) -> NoReturn:
-    raise DigiclayError(NO_BENCHMARK)
+    place = _add_any(commands, "benchmark", description="Where the benchmarks are.")
+    place.set_defaults(carry_out=lambda _: _refuse(NO_BENCHMARK))
 
 
 def _add_any(commands: Any, name: str, **listed: str) -> argparse.ArgumentParser:

@@ -46,15 +46,12 @@ def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
 
 def noted(found: Fitted) -> dict[str, Any]:
     """Return what ``metrics.json`` holds of it."""
-    return {
-        "allowed": found.budget,
-        "measured": found.error,
-        "departure": found.departure,
+    lengths = {
+        "allowed": found.budget, "measured": found.error, "departure": found.departure,
         "own_error": found.own_error,
-        "work": found.work,
-        "left_out": found.left_out,
-        "units": {"allowed": "m", "measured": "m", "departure": "m", "own_error": "m", "work": "1"},
-    }
+    }  # fmt: skip
+    units = {**dict.fromkeys(lengths, "m"), "work": "1"}
+    return {**lengths, "work": found.work, "left_out": found.left_out, "units": units}
 
 
 def report(found: Fitted) -> Iterator[str]:

@@ -118,14 +118,14 @@ def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
         if steps % fewer == 0:
             step = simulation.control_period / fewer
             said = f"physics steps of {step * 1e3:g} ms, not {simulation.physics_step * 1e3:g} ms"
-            yield Omission("steps", said, partial(_with_step, step=step))
+            yield Omission("steps", said, partial(_change, section="simulation", physics_step=step))
     for section, said in PARTS.items():
         if scene.section(section) is not None:
-            yield Omission(section, said, partial(_without, section=section))
+            yield Omission(section, said, partial(_change, section=section))
     for band in (share * budget for share in BANDS):
         if getattr(scene.control, "dead_band", math.inf) < band:
             said = f"cells left alone within {band * 1e6:g} µm of their height"
-            yield Omission("cells", said, partial(_with_dead_band, band=band))
+            yield Omission("cells", said, partial(_change, section="control", dead_band=band))
 
 
 def find_omissions(scene: Scene, budget: float, *, told: Callable[[str], None] | None = None) -> Fitted:
@@ -163,20 +163,9 @@ def find_omissions(scene: Scene, budget: float, *, told: Callable[[str], None] |
     return replace(best, tried=tuple(one._replace(kept=one.said in kept) for one in best.tried))
 
 
-def _without(scene: Scene, section: str) -> Scene:
-    """Leave out a part."""
-    return scene.with_sections(**{section: None})
-
-
-def _with_step(scene: Scene, step: float) -> Scene:
-    """Integrate in longer steps."""
-    return replace(scene, simulation=replace(scene.simulation, physics_step=step))
-
-
-def _with_dead_band(scene: Scene, band: float) -> Scene:
-    """Let cells come to rest further from their commanded height."""
-    assert scene.control is not None
-    return replace(scene, control=replace(scene.control, dead_band=band))  # type: ignore[call-arg]
+def _change(scene: Scene, section: str, **values: float) -> Scene:
+    """Change parameters of a part, or leave the part out where none are given."""
+    return scene.with_sections(**{section: replace(scene.section(section), **values) if values else None})
 
 
 def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
