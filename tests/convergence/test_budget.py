@@ -68,7 +68,7 @@ def test_a_larger_budget_leaves_no_more_work_to_do() -> None:
 
 def test_what_is_left_out_is_left_out_of_the_scene() -> None:
     one = find_omissions(cut("tap"), 500e-6)
-    full = {omission.said: omission.leave_out for omission in propose_omissions(cut("tap"), 500e-6)}
+    full = {omission.text: omission.leave_out for omission in propose_omissions(cut("tap"), 500e-6)}
     rebuilt = cut("tap")
     for said in one.left_out:
         rebuilt = full[said](rebuilt)
@@ -77,7 +77,7 @@ def test_what_is_left_out_is_left_out_of_the_scene() -> None:
 
 
 def test_a_trial_that_leaves_the_budget_is_broken_off_and_not_kept() -> None:
-    relaxation = next(tried for tried in found("tap", 5e-6).tried if "relax" in tried.said)
+    relaxation = next(tried for tried in found("tap", 5e-6).tried if "relax" in tried.text)
     assert (relaxation.departure, relaxation.kept) == (math.inf, False)
 
 

@@ -29,11 +29,11 @@ class Help(argparse.RawDescriptionHelpFormatter):
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
     """Add SCENE, or --scene where there is a default, and the options that change it."""
-    said = "a .toml file, a sample's name, or the folder of a run"
+    scene = "a .toml file, a sample's name, or the folder of a run"
     if default:
-        parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{said}; default {default}")
+        parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{scene}; default {default}")
     else:
-        parser.add_argument("scene", metavar="SCENE", nargs="?" if optional else None, help=said)
+        parser.add_argument("scene", metavar="SCENE", nargs="?" if optional else None, help=scene)
     parser.add_argument(
         "--method", metavar="M",
         help="control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
@@ -71,7 +71,7 @@ def settings_of(arguments: argparse.Namespace) -> list[Setting]:
         settings.append(Setting("simulation.tolerance", arguments.tolerance, "--tolerance"))
         if arguments.stepper is None:
             settings.append(Setting("simulation.stepper", "adaptive", "--tolerance"))
-    return [_with_method(one) if one.key == METHOD else one for one in settings]
+    return [_with_method(setting) if setting.key == METHOD else setting for setting in settings]
 
 
 def _with_method(setting: Setting) -> Setting:
@@ -152,27 +152,20 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
     return read
 
 
-def seconds(text: str) -> float:
-    """Read a time: a number of seconds, or a quantity such as ``"300 ms"``."""
-    return _measured(text, "s", "s")
+def _measured(usual: str, unit: str) -> Callable[[str], float]:
+    """Return the reader of a quantity in SI; a bare number is in the usual unit."""
+
+    def read(text: str) -> float:
+        try:
+            return parse(text if text.strip()[-1:].isalpha() else f"{text} {usual}", unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(f"{error} (got {text!r})") from None
+
+    return read
 
 
-def length(text: str) -> float:
-    """Read a length: a number of meters, or a quantity such as ``"20 um"``; in m."""
-    return _measured(text, "m", "m")
-
-
-def millimeters(text: str) -> float:
-    """Read a length: a number of millimeters, or a quantity such as ``"500 um"``; in m."""
-    return _measured(text, "mm", "m")
-
-
-def _measured(text: str, usual: str, unit: str) -> float:
-    """Read a quantity in SI; a bare number is in the usual unit."""
-    try:
-        return parse(text if text.strip()[-1:].isalpha() else f"{text} {usual}", unit)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{error} (got {text!r})") from None
+#: Readers of a time, ``0.3`` or ``"300 ms"``, of a length in m, and of one that is in mm without a unit.
+seconds, length, millimeters = _measured("s", "s"), _measured("m", "m"), _measured("mm", "m")
 
 
 def size(text: str) -> tuple[int, int]:

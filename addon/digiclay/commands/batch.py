@@ -50,8 +50,8 @@ class JobProcess(Process):
 
     def __init__(self, arguments: Sequence[str], log: Path) -> None:
         self._log = log
-        with log.open("wb") as said:
-            super().__init__(arguments, stdout=said, stderr=subprocess.STDOUT)
+        with log.open("wb") as output:
+            super().__init__(arguments, stdout=output, stderr=subprocess.STDOUT)
 
     def read_fraction(self) -> float:
         """Return how much of the job is done, from 0 to 1."""
@@ -60,17 +60,17 @@ class JobProcess(Process):
     def read_error(self) -> str:
         """Return in one line why the job was not done."""
         lines = read_tail(self._log)
-        if told := find_error(lines):
-            return told
+        if error := find_error(lines):
+            return error
         others = [line for line in lines if line.strip() and not line.startswith(PROGRESS)]
-        said = f": {others[-1].strip()}" if others else ""
-        return one_line(f"The process ended with {self.wait()}{said}")
+        last = f": {others[-1].strip()}" if others else ""
+        return one_line(f"The process ended with {self.wait()}{last}")
 
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "run a job series in the background: scenes, exports, pictures and films"
-    parser = add_command(commands, "batch", said, EXAMPLES)
+    purpose = "run a job series in the background: scenes, exports, pictures and films"
+    parser = add_command(commands, "batch", purpose, EXAMPLES)
     parser.add_argument("file", metavar="JOBS", help="a .toml file, or a sample's name")
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="folder; default: the file's name in the working folder"
@@ -134,8 +134,8 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
             nonlocal due
             began = time.monotonic()
             if began >= due:
-                said = f"{before + len(ended)} of {len(made.jobs)} jobs ended so far"
-                folder.write_index(failed, f"{said}, {len(failed)} failed." if failed else f"{said}.")
+                summary = f"{before + len(ended)} of {len(made.jobs)} jobs ended so far"
+                folder.write_index(failed, f"{summary}, {len(failed)} failed." if failed else f"{summary}.")
                 due = time.monotonic() + max(PAUSE, REST * (time.monotonic() - began))
 
         def begin(job: Job) -> JobProcess:
@@ -167,16 +167,16 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
         stopped = stop()
     now = sum(folder.is_done(job) for job in todo)
     done = before - sum(bool(job.error) for job in made.jobs) + now
-    said = f"{done} of {len(made.jobs)} jobs done" + (f", {len(failed)} failed" if failed else "")
+    summary = folder.summarize(done, failed)
     took = time.monotonic() - started
     if todo:
         at_a_time = "1 process" if count == 1 else f"{count} processes"
-        said += f"; {now} of them now, in {format_duration(took)} on {at_a_time}"
+        summary += f"; {now} of them now, in {format_duration(took)} on {at_a_time}"
     ready = folder.measure_start_up()
     if ready is not None:
-        said += f"; a job's process takes {ready:.1f} s to start"
-    index = folder.write_index(failed, f"{said}.")
-    say(arguments, f"{said}.", f"written to {index}")
+        summary += f"; a job's process takes {ready:.1f} s to start"
+    index = folder.write_index(failed, f"{summary}.")
+    say(arguments, f"{summary}.", f"written to {index}")
     if stopped and done + len(failed) < len(made.jobs):
         say(arguments, "Stopped: what is done is kept, and the same command goes on from there.")
         return STOPPED

@@ -93,10 +93,10 @@ class Folder:
     def measure_start_up(self) -> float | None:
         """Return the seconds it usually took until a job's process began to work."""
         timings = (read_json(self.find_run(job) / TIMING) or {} for job in self.batch.jobs)
-        known = [timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)]
-        return median(known) if known else None
+        times = [timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)]
+        return median(times) if times else None
 
-    def write_index(self, failed: Mapping[str, str], said: str) -> Path:
+    def write_index(self, failed: Mapping[str, str], summary: str) -> Path:
         """Write the page about all jobs; `failed` has the reasons by name."""
         cards = []
         for job in self.batch.jobs:
@@ -112,16 +112,21 @@ class Folder:
         path = self.path / INDEX
         refresh = AGAIN if any(card.facts == UNDONE for card in cards) else 0
         with lock_name(path, PATIENCE):
-            write_whole(path, page(f"Batch {self.batch.name}", said, cards, refresh).encode())
+            write_whole(path, page(f"Batch {self.batch.name}", summary, cards, refresh).encode())
         return path
+
+    def summarize(self, done: int, failed: Mapping[str, str]) -> str:
+        """Write how many jobs are done, and how many have failed."""
+        text = f"{done} of {len(self.batch.jobs)} jobs done"
+        return f"{text}, {len(failed)} failed" if failed else text
 
     def write_page(self) -> str:
         """Write the page from what the folder holds, and return what it says of all jobs."""
         failed = self.read_failures()
         done = sum(self.is_done(job) for job in self.batch.jobs)
-        said = f"{done} of {len(self.batch.jobs)} jobs done" + (f", {len(failed)} failed" if failed else "")
-        self.write_index(failed, f"{said}.")
-        return said
+        summary = self.summarize(done, failed)
+        self.write_index(failed, f"{summary}.")
+        return summary
 
     def _make_card(self, job: Job) -> Card:
         """Return the content of the page for a finished job."""
@@ -144,30 +149,30 @@ class Folder:
             for path in sorted(run.iterdir())
             if path.name not in hidden and not path.name.startswith(".") and path.is_file()
         ]
-        shown = next((path for name in SHOWN for said, path in links if said == name), "")
+        shown = next((path for name in SHOWN for label, path in links if label == name), "")
         return Card(job.name, thumbnail, [fact for fact in facts if fact[1]], links, shown)
 
 
 @contextmanager
 def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
     """Make a batch's folder, or go on with one; nobody else may work in it meanwhile."""
-    known = {
+    description = {
         "batch": batch.name, "digiclay": __version__, "jobs": {job.name: job.error for job in batch.jobs},
     }  # fmt: skip
-    with open_series(path, Kind("batch", MARK, (JOBS, RUNS, LOGS)), known):
+    with open_series(path, Kind("batch", MARK, (JOBS, RUNS, LOGS)), description):
         yield Folder(path, batch)
 
 
 def read_batch(path: Path) -> Folder:
     """Return a batch's folder with the jobs it has, without their definitions."""
-    known = read_json(path / MARK)
-    if known is None or not isinstance(known.get("batch"), str):
+    description = read_json(path / MARK)
+    if description is None or not isinstance(description.get("batch"), str):
         raise OutputError(f"{path} is no folder of a job series: it has no {MARK} of 'digiclay batch'.")
-    named = known.get("jobs")
+    named = description.get("jobs")
     if not isinstance(named, dict):  # of an older version
         named = {job.name: "" for job in sorted((path / JOBS).glob("*/")) if (job / JOB).is_file()}
     jobs = tuple(Job(str(name), None, str(error)) for name, error in named.items())
-    return Folder(path, JobSeries(known["batch"], jobs, Outputs()))
+    return Folder(path, JobSeries(description["batch"], jobs, Outputs()))
 
 
 def _find_series(job: Path) -> Folder | None:
@@ -176,8 +181,8 @@ def _find_series(job: Path) -> Folder | None:
     path = full.parent.parent
     if full.parent.name != JOBS or not (path / MARK).is_file():
         return None
-    found = read_batch(path)
-    return found if any(other.name == full.name for other in found.batch.jobs) else None
+    series = read_batch(path)
+    return series if any(job.name == full.name for job in series.batch.jobs) else None
 
 
 def note_failure(job: Path, error: str) -> None:

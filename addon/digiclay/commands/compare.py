@@ -55,8 +55,8 @@ SUITE_ONLY = (
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Run control methods on the same input, and compare their metrics."
-    parser = add_command(commands, "compare", "compare control methods on the same input", EXAMPLES, said)
+    purpose = "Run control methods on the same input, and compare their metrics."
+    parser = add_command(commands, "compare", "compare control methods on the same input", EXAMPLES, purpose)
     add_scene(parser, optional=True)
     parser.add_argument(
         "--methods", metavar="M,...", type=_methods,
@@ -89,11 +89,11 @@ def _methods(text: str) -> tuple[str, ...]:
     if not names:
         raise argparse.ArgumentTypeError(f"must name at least one method (got {text!r})")
     for name in names:
-        known = list_methods()
-        if name not in known and not is_file_word(name) and find_installed(name) is None:
-            close = find_nearest_name(name, list(known))
+        methods = list_methods()
+        if name not in methods and not is_file_word(name) and find_installed(name) is None:
+            close = find_nearest_name(name, list(methods))
             asked = f"; did you mean {close}" if close else ""
-            raise argparse.ArgumentTypeError(f"must be among {', '.join(known)} (got {name!r}{asked})")
+            raise argparse.ArgumentTypeError(f"must be among {', '.join(methods)} (got {name!r}{asked})")
     return names
 
 
@@ -113,24 +113,24 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
     settings = settings_of(arguments)
     scenes = {name: load(path, [*settings, Setting(METHOD, name, "--methods")]) for name in methods}
-    found: dict[str, Metrics] = {}
+    measured: dict[str, Metrics] = {}
     forces: dict[str, tuple[Any, Any, Any]] = {}
     beyond: dict[str, str] = {}
     with allow_interrupt(), write_folder(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
             done = _run(scene, method, quiet=arguments.quiet)
-            found[method] = done.figures | (_speeds(scene) if arguments.speed else {})
+            measured[method] = done.figures | (_speeds(scene) if arguments.speed else {})
             wanted = find_set_point(scene.set_point, sum_cells(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
             beyond[method] = done.metrics.get("beyond_a_finger", "")
         units = {name: metric.unit for name, metric in {**RUN_METRICS, **SPEEDS}.items()}
-        known = {"scene": scene.name, "methods": found, "units": units, "beyond_a_finger": beyond}
-        said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)
-        (folder / "metrics.json").write_text(said + "\n", encoding="utf-8")
-        save(comparison(found, forces, scene.name), folder / "compare.png")
+        content = {"scene": scene.name, "methods": measured, "units": units, "beyond_a_finger": beyond}
+        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+        save(comparison(measured, forces, scene.name), folder / "compare.png")
     notes = [f"{method}: {words}" for method, words in beyond.items() if words]
     notes += [f"Followed: {Criterion()}."] if arguments.speed else []
-    say(arguments, *table(found), *notes, f"written to {out}")
+    say(arguments, *table(measured), *notes, f"written to {out}")
     return 0
 
 
@@ -162,23 +162,23 @@ def _run(scene: Scene, method: str, *, quiet: bool) -> Result:
 
 def _speeds(scene: Scene) -> Metrics:
     """Measure the largest speeds; None where the slowest is too fast, or the bed too small."""
-    found: Metrics = {}
+    measured: Metrics = {}
     ways: tuple[Drag | Lift, ...] = Drag(), Lift()
     for name, way in zip(SPEEDS, ways, strict=True):
         try:
-            found[name] = find_largest_speed(scene, way, Criterion())
+            measured[name] = find_largest_speed(scene, way, Criterion())
         except ParameterError:
-            found[name] = None
-    return found
+            measured[name] = None
+    return measured
 
 
-def table(found: dict[str, Metrics]) -> Iterator[str]:
+def table(measured: dict[str, Metrics]) -> Iterator[str]:
     """Give the lines of the table: a metric a line, a method a column, units people read."""
-    known, columns = {**RUN_METRICS, **SPEEDS}, list(found)
-    names = [name for name in known if name in found[columns[0]]]
+    metrics, columns = {**RUN_METRICS, **SPEEDS}, list(measured)
+    names = [name for name in metrics if name in measured[columns[0]]]
     rows = []
     for name in names:
-        factor, unit = READ.get(known[name].unit, (1.0, known[name].unit))
-        values = (found[method][name] for method in columns)
+        factor, unit = READ.get(metrics[name].unit, (1.0, metrics[name].unit))
+        values = (measured[method][name] for method in columns)
         rows.append([name, unit, *("–" if value is None else f"{value * factor:.4g}" for value in values)])
     yield from aligned(("metric", "unit", *columns), rows, left=2)

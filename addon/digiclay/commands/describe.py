@@ -57,15 +57,16 @@ def list_parameters(scene: Scene) -> Iterator[str]:
     yield "Sources: P the paper, D derived, C chosen, or a reference of docs/nomenclature.md."
     for section in SECTIONS:
         part = scene.section(section)
-        for name, known in list_quantities(part).items() if part else ():
-            yield f"{section}.{name} = {write_value(getattr(part, name))} {known.unit}".rstrip()
-            said = "; ".join(filter(None, (describe_meaning(known), write_range(known), known.source)))
-            yield textwrap.fill(said, 110, initial_indent="    ", subsequent_indent="    ")
+        for name, declared in list_quantities(part).items() if part else ():
+            yield f"{section}.{name} = {write_value(getattr(part, name))} {declared.unit}".rstrip()
+            parts = describe_meaning(declared), write_range(declared), declared.source
+            text = "; ".join(filter(None, parts))
+            yield textwrap.fill(text, 110, initial_indent="    ", subsequent_indent="    ")
 
 
-def describe_meaning(known: Quantity) -> str:
+def describe_meaning(declared: Quantity) -> str:
     """Write the meaning of a parameter, with its choices."""
-    return known.doc + (f" ({', '.join(known.choices)})" if known.choices else "")
+    return declared.doc + (f" ({', '.join(declared.choices)})" if declared.choices else "")
 
 
 def write_value(value: object) -> str:
@@ -75,9 +76,9 @@ def write_value(value: object) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
-def write_range(known: Quantity) -> str:
+def write_range(declared: Quantity) -> str:
     """Write the range of a parameter, in its unit."""
-    return ", ".join(f"{word.replace('_', ' ')} {write_value(end)}" for word, end in known.list_bounds())
+    return ", ".join(f"{word.replace('_', ' ')} {write_value(end)}" for word, end in declared.list_bounds())
 
 
 def description(scene: Scene, system: System) -> Iterator[str]:
@@ -159,10 +160,10 @@ def _filled(place: str, text: str) -> str:
 def _parameters(part: Parameters) -> str:
     """Write a part's parameters on one line."""
     shown = []
-    for name, known in list_quantities(part).items():
+    for name, declared in list_quantities(part).items():
         value = getattr(part, name)
         values = value if isinstance(value, tuple) else (value,)
-        shown.append(f"{name.replace('_', ' ')} {' '.join(human(one, known.unit) for one in values)}")
+        shown.append(f"{name.replace('_', ' ')} {' '.join(human(one, declared.unit) for one in values)}")
     return ", ".join(shown)
 
 

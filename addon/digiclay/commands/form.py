@@ -47,9 +47,9 @@ SCENE = "dome_peaked"
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Display a mesh, a picture or an array of heights, form it with the fingertip, export it."
+    purpose = "Display a mesh, a picture or an array of heights, form it with the fingertip, export it."
     parser = add_command(
-        commands, "form", "display a shape, form it with the fingertip, export it", EXAMPLES, said
+        commands, "form", "display a shape, form it with the fingertip, export it", EXAMPLES, purpose
     )
     parser.add_argument("shape", metavar="SHAPE", help="a sample shape's name, or a file")
     add_scene(parser, SCENE)

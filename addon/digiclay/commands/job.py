@@ -62,8 +62,8 @@ GRACE = 20.0
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "run one job of a series from its files alone; for render farms"
-    parser = add_command(commands, "job", said, EXAMPLES, listed=False)
+    purpose = "run one job of a series from its files alone; for render farms"
+    parser = add_command(commands, "job", purpose, EXAMPLES, listed=False)
     parser.add_argument("job", metavar="JOB", type=Path, help="the folder of the job")
     parser.add_argument("--out", metavar="DIR", type=Path, help="default: ../../runs/JOB, as in a series")
     parser.add_argument("--only", choices=("run", *MOVING), help="a part: all but the films, or one film")
@@ -206,8 +206,8 @@ It needs neither the JOBS file nor Blender. Exit code 0 also while jobs are miss
 
 def add_page(commands: Any) -> None:
     """Add the command."""
-    said = "write the page of a job series from the runs that are done"
-    parser = add_command(commands, "page", said, PAGE_EXAMPLES, listed=False)
+    purpose = "write the page of a job series from the runs that are done"
+    parser = add_command(commands, "page", purpose, PAGE_EXAMPLES, listed=False)
     parser.add_argument("series", metavar="DIR", type=Path, help="the folder of the series")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     parser.set_defaults(carry_out=write_page)

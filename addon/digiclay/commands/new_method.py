@@ -29,8 +29,8 @@ TEMPLATE = Path(__file__).parents[1] / "sample_shapes" / "methods" / "template.t
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "write the file of a control method of your own, which runs as it is"
-    parser = add_command(commands, "new-method", said, EXAMPLES)
+    purpose = "write the file of a control method of your own, which runs as it is"
+    parser = add_command(commands, "new-method", purpose, EXAMPLES)
     parser.add_argument("name", metavar="NAME", type=_name, help="such as mine or soft_pad")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="default: the working folder")
     parser.add_argument("--overwrite", action="store_true", help="replace an older file")

@@ -45,8 +45,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print the error in the arguments, and exit."""
-        told = one_line(f"{self.prog}: {message}")
-        self.exit(WRONG, f"{told}.{self._hint or self._misspelt()} See '{self.prog} --help'.\n")
+        line = one_line(f"{self.prog}: {message}")
+        self.exit(WRONG, f"{line}.{self._hint or self._misspelt()} See '{self.prog} --help'.\n")
 
     def _misspelt(self) -> str:
         """Return a suggestion for an unknown option."""
@@ -76,11 +76,11 @@ class Parser(argparse.ArgumentParser):
         return known, unknown
 
 
-def _asked(word: str, known: Sequence[str]) -> str:
-    """Return a suggestion: the only known word with this beginning, or the nearest."""
-    bare = {one.lstrip("-").lower(): one for one in known}  # dashes say nothing about who is near
+def _asked(word: str, names: Sequence[str]) -> str:
+    """Return a suggestion: the only name with this beginning, or the nearest."""
+    bare = {name.lstrip("-").lower(): name for name in names}  # dashes say nothing about who is near
     meant = word.lstrip("-").lower()
-    longer = [one for one in bare if len(meant) > 1 and one.startswith(meant)]
+    longer = [name for name in bare if len(meant) > 1 and name.startswith(meant)]
     close = longer[0] if len(longer) == 1 else find_nearest_name(meant, list(bare), alike=0.6)
     return f" Did you mean {bare[close]}?" if close else ""
 

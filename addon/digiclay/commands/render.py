@@ -54,8 +54,8 @@ OF_TURNTABLES = ("rate", "frames")
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy"
-    parser = add_run(commands, "render", said, EXAMPLES)
+    purpose = "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy"
+    parser = add_run(commands, "render", purpose, EXAMPLES)
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument("--film", action="store_true", help="session as film.mp4, with a plot of the force")
     kind.add_argument("--turntable", action="store_true", help="one rotation at an instant, as turntable.mp4")
@@ -204,8 +204,8 @@ PLOTS = ("session.png", "surface.png")
 
 def add_plot(commands: Any) -> None:
     """Add the command."""
-    said = "draw heights and force of a run over time, and its final surface"
-    parser = add_run(commands, "plot", said, PLOT_EXAMPLES)
+    purpose = "draw heights and force of a run over time, and its final surface"
+    parser = add_run(commands, "plot", purpose, PLOT_EXAMPLES)
     parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")
     parser.set_defaults(carry_out=plot)
 

@@ -36,43 +36,43 @@ from .stop import STOPPED, Stop, refuse_without, refuse_without_blender, require
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is."""
     with Line(sys.stderr) as line:
-        told = None if quiet else lambda said: line.draw(f"trying: {said}")
+        show = None if quiet else lambda text: line.draw(f"trying: {text}")
         with told_as_options("run"):
-            found = find_omissions(scene, budget, told=told)
+            fit = find_omissions(scene, budget, show=show)
     if not quiet:
-        print("\n".join(report(found)))
-    return found
+        print("\n".join(report(fit)))
+    return fit
 
 
-def noted(found: Fitted) -> dict[str, Any]:
+def noted(fit: Fitted) -> dict[str, Any]:
     """Return what ``metrics.json`` holds of it."""
     lengths = {
-        "allowed": found.budget, "measured": found.error, "departure": found.departure,
-        "own_error": found.own_error,
+        "allowed": fit.budget, "measured": fit.error, "departure": fit.departure,
+        "own_error": fit.own_error,
     }  # fmt: skip
     units = {**dict.fromkeys(lengths, "m"), "work": "1"}
-    return {**lengths, "work": found.work, "left_out": found.left_out, "units": units}
+    return {**lengths, "work": fit.work, "left_out": fit.left_out, "units": units}
 
 
-def report(found: Fitted) -> Iterator[str]:
+def report(fit: Fitted) -> Iterator[str]:
     """Give the lines of the report."""
-    yield f"What {found.scene.name} can do without, within {found.budget * 1e6:g} µm of height:"
+    yield f"What {fit.scene.name} can do without, within {fit.budget * 1e6:g} µm of height:"
     rows = [
         [
-            one.said,
-            f"> {found.budget * 1e6:g}" if math.isinf(one.departure) else f"{one.departure * 1e6:.3g}",
-            "" if math.isnan(one.work) else f"{100 * one.work:.0f} %",
-            "left out" if one.kept else "",
+            trial.text,
+            f"> {fit.budget * 1e6:g}" if math.isinf(trial.departure) else f"{trial.departure * 1e6:.3g}",
+            "" if math.isnan(trial.work) else f"{100 * trial.work:.0f} %",
+            "left out" if trial.kept else "",
         ]
-        for one in found.tried
+        for trial in fit.tried
     ]
     yield from table(("it would have", "off by, µm", "work left", ""), rows)
-    said = "; ".join(found.left_out) or "nothing: all of it is needed"
-    yield f"Left out: {said}."
+    omitted = "; ".join(fit.left_out) or "nothing: all of it is needed"
+    yield f"Left out: {omitted}."
     yield (
-        f"Measured then: {found.error * 1e6:.3g} µm "
-        f"({found.departure * 1e6:.3g} µm from the full model, {found.own_error * 1e6:.3g} of integration), "
-        f"for {100 * found.work:.0f} % of its work."
+        f"Measured then: {fit.error * 1e6:.3g} µm "
+        f"({fit.departure * 1e6:.3g} µm from the full model, {fit.own_error * 1e6:.3g} of integration), "
+        f"for {100 * fit.work:.0f} % of its work."
     )
 
 
@@ -90,8 +90,8 @@ and method.py, the code of a method of your own. Ctrl-C keeps the computed rows,
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Simulate a scene and write its folder."
-    parser = add_command(commands, "run", "simulate a scene", EXAMPLES, said)
+    purpose = "Simulate a scene and write its folder."
+    parser = add_command(commands, "run", "simulate a scene", EXAMPLES, purpose)
     add_scene(parser)
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="folder; default: the scene's name in the working folder"
@@ -123,17 +123,17 @@ def carry_out(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out or Path(find_name(path))
     _refuse_early(arguments, scene)
     with claim_folder(out, overwrite=arguments.overwrite) as claim:
-        found = None
+        fit = None
         if arguments.budget is not None:
-            found = within(scene, arguments.budget, quiet=arguments.quiet)
-            scene = found.scene
+            fit = within(scene, arguments.budget, quiet=arguments.quiet)
+            scene = fit.scene
         with Stop() as stop:
             result = _simulated(scene, _find_error_origin(arguments, path), stop, quiet=arguments.quiet)
             unjudged = False
             if not arguments.no_errors:
                 result, unjudged = _evaluate(result, stop, quiet=arguments.quiet)
-            if found:
-                result = replace(result, metrics={**result.metrics, "budget": noted(found)})
+            if fit:
+                result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
             with claim.write() as folder:
                 save(result, folder)
                 write_code(scene, folder)

@@ -47,14 +47,14 @@ class Omission(NamedTuple):
     ----------
     kind : str
         Of one kind only one can be left out.
-    said : str
+    text : str
         What the scene then has.
     leave_out : callable
         Makes a scene without it.
     """
 
     kind: str
-    said: str
+    text: str
     leave_out: Callable[[Scene], Scene]
 
 
@@ -72,7 +72,7 @@ class Tried(NamedTuple):
         Whether the scene does without it.
     """
 
-    said: str
+    text: str
     departure: float
     work: float
     kept: bool
@@ -107,7 +107,7 @@ class Fitted:
     @property
     def left_out(self) -> list[str]:
         """Omissions of the scene."""
-        return [one.said for one in self.tried if one.kept]
+        return [trial.text for trial in self.tried if trial.kept]
 
 
 def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
@@ -117,50 +117,51 @@ def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
     for fewer in range(1, steps):
         if steps % fewer == 0:
             step = simulation.control_period / fewer
-            said = f"physics steps of {step * 1e3:g} ms, not {simulation.physics_step * 1e3:g} ms"
-            yield Omission("steps", said, partial(_change, section="simulation", physics_step=step))
-    for section, said in PARTS.items():
+            text = f"physics steps of {step * 1e3:g} ms, not {simulation.physics_step * 1e3:g} ms"
+            yield Omission("steps", text, partial(_change, section="simulation", physics_step=step))
+    for section, text in PARTS.items():
         if scene.section(section) is not None:
-            yield Omission(section, said, partial(_change, section=section))
+            yield Omission(section, text, partial(_change, section=section))
     for band in (share * budget for share in BANDS):
         if getattr(scene.control, "dead_band", math.inf) < band:
-            said = f"cells left alone within {band * 1e6:g} µm of their height"
-            yield Omission("cells", said, partial(_change, section="control", dead_band=band))
+            text = f"cells left alone within {band * 1e6:g} µm of their height"
+            yield Omission("cells", text, partial(_change, section="control", dead_band=band))
 
 
-def find_omissions(scene: Scene, budget: float, *, told: Callable[[str], None] | None = None) -> Fitted:
+def find_omissions(scene: Scene, budget: float, *, show: Callable[[str], None] | None = None) -> Fitted:
     """Leave out of a scene what its results can do without."""
     if not (math.isfinite(budget) and budget > 0.0):
         raise ParameterError("run", "budget", "must be above 0 m", f"{budget:g} m")
-    say = told or (lambda said: None)
-    say("the full scene")
+    show = show or (lambda text: None)
+    show("the full scene")
     own = _own_error(scene)
     if own > budget:
         hint = "Allow more, or take a shorter simulation.physics_step or the stepper 'richardson'."
         rule = f"must be at least the error of the full scene's own integration, {own * 1e6:.2g} µm"
         raise ParameterError("run", "budget", rule, f"{budget * 1e6:g} µm", hint)
     alone: list[tuple[Omission, Tried]] = []
-    for one in propose_omissions(scene, budget):
-        say(one.said)
-        alone.append((one, Tried(one.said, *_departure(scene, one.leave_out(scene), budget), False)))
+    for omission in propose_omissions(scene, budget):
+        show(omission.text)
+        trial = Tried(omission.text, *_departure(scene, omission.leave_out(scene), budget), False)
+        alone.append((omission, trial))
     fits = [pair for pair in alone if pair[1].departure <= budget and pair[1].work < 1.0]
     fits.sort(key=lambda pair: -(1.0 - pair[1].work) / (pair[1].departure + 1e-3 * budget))
     best = Fitted(scene, budget, 0.0, own, 1.0, tuple(tried for _, tried in alone))
     taken: list[Omission] = []
-    for one, _ in fits:
-        if any(one.kind == other.kind for other in taken):
+    for omission, _ in fits:
+        if any(omission.kind == other.kind for other in taken):
             continue
-        say(" + ".join(["together", one.said]))
-        less = one.leave_out(best.scene)
+        show(f"together + {omission.text}")
+        less = omission.leave_out(best.scene)
         departure, work = _departure(scene, less, budget)
         if departure > budget or work >= best.work:
             continue
         own = _own_error(less)
         if departure + own <= budget:
-            taken.append(one)
+            taken.append(omission)
             best = replace(best, scene=less, departure=departure, own_error=own, work=work)
-    kept = {one.said for one in taken}
-    return replace(best, tried=tuple(one._replace(kept=one.said in kept) for one in best.tried))
+    kept = {omission.text for omission in taken}
+    return replace(best, tried=tuple(trial._replace(kept=trial.text in kept) for trial in best.tried))
 
 
 def _change(scene: Scene, section: str, **values: float) -> Scene:
@@ -172,7 +173,7 @@ def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
     """Run two scenes in step."""
     apart, done = 0.0, np.zeros(2)
     pair = [assemble(full), assemble(less)]
-    runs = (periods(one, full.trajectories(), begin(one), full.periods) for one in pair)
+    runs = (periods(system, full.trajectories(), begin(system), full.periods) for system in pair)
     weights = [_weight(scene, system) for scene, system in zip((full, less), pair, strict=True)]
     for both in zip(*runs, strict=True):
         done += [each * state.active.cells.size for each, state in zip(weights, both, strict=True)]
