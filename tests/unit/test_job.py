@@ -68,7 +68,7 @@ def test_a_job_whose_files_changed_or_a_copy_broke_off_is_done_again_and_says_so
     assert main(["job", str(JOB)]) == 0
     assert "is of another definition: it is done again.\n" in capsys.readouterr().out
     assert written() > before
-    for harm, rest in (("history.npz", 100), ("scene.toml", 0)):
+    for harm, rest in (("history.npz", 100), ("scene.toml", 0), ("job.toml", 0)):
         whole = (RUN / harm).read_bytes()
         (RUN / harm).write_bytes(whole[:rest]) if rest else (RUN / harm).unlink()
         assert main(["job", str(JOB)]) == 0

@@ -115,18 +115,18 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("number", "workers"), [(signal.SIGINT, "2"), (signal.SIGTERM, "1")])
 def test_a_sweep_stopped_half_way_keeps_what_is_done_and_goes_on_from_there(
-    number: int, here: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch
+    number: int, workers: str, here: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
         interrupt_after(2, patch, number)
-        assert main([*QUICK, "--out", "out"]) == 130
+        assert main([*QUICK, "--workers", workers, "--out", "out"]) == 130
     files = {path: path.stat().st_mtime_ns for path in (here / "out").glob("points/*")}
     assert 2 <= len(files) < 10
     assert all("figures" in json.loads(path.read_text(encoding="utf-8")) for path in files)
     assert not (here / "out" / "sweep.csv").exists()
-    assert main([*QUICK, "--out", "out"]) == 0
+    assert main([*QUICK, "--workers", "1", "--out", "out"]) == 0
     assert {path: path.stat().st_mtime_ns for path in files} == files
     assert (here / "out" / "sweep.csv").read_bytes() == whole
 
