@@ -49,6 +49,9 @@ COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmar
 USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
 PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
+#: Row of the table of pictures, and a picture that a page shows.
+ROW = re.compile(r"^\| (`[\w.]+\.(?:jpg|png)`.*?) \| (.*) \|$", re.MULTILINE)
+SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 #: Pages of the navigation that `tools/site_pages.py` makes at the build.
 MADE = {"benchmarks.md", "changes.md", "contributing.md"}
 
@@ -247,3 +250,31 @@ def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
     pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
     assert sorted(written) == sorted(pages), "each page needs one line under nav in mkdocs.yml"
     assert {*listed} >= MADE
+
+
+def _pictures() -> dict[str, str]:
+    """Return the command of each picture of the docs, from the table in CONTRIBUTING.md."""
+    table = ROW.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
+    return {name: made for names, made in table for name in re.findall(r"`([^`]+)`", names)}
+
+
+def test_every_picture_is_shown_and_has_a_row_of_the_table() -> None:
+    targets = [(page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))]
+    shown = {(page.parent / target).resolve() for page, target in targets}
+    assert sorted(_pictures()) == sorted(path.name for path in shown)
+    assert sorted(set((ROOT / "docs" / "pictures").iterdir()) - shown) == []
+
+
+def test_what_makes_a_picture_exists() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for name, cell in _pictures().items():
+        command = next(iter(re.findall(r"`([^`]+)`", cell)), "")
+        if command.startswith("python tools/"):
+            source = (ROOT / command.split()[1]).read_text(encoding="utf-8")
+            assert f'"{name}"' in source, command
+        elif command.startswith("make "):
+            assert f"\n{command.removeprefix('make ')}:" in makefile
+        elif not command:  # a page has the command
+            assert re.search(r"\]\(docs/\w+\.md#|same section", cell), name
+        else:  # tests.form.test_pages.py checks the arguments
+            assert command.startswith(("python -m benchmarks ", "digiclay "))

@@ -40,10 +40,8 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(
     monkeypatch.chdir(tmp_path)
     Path("my film.toml").write_text(JOBS, encoding="utf-8")
     out = tmp_path / "das Büro's Laufwerk"
-    assert (
-        main(["batch", "my film.toml", "--out", str(out), "--submit", "openjd", "--chunk", "3", "--quiet"])
-        == 0
-    )
+    submit = ["--submit", "openjd", "--chunk", "3", "--quiet"]
+    assert main(["batch", "my film.toml", "--out", str(out), *submit]) == 0
     template = out / "openjd.json"
     assert "passes validation checks" in openjd("check", template)
     said = openjd("run", template, "-p", f"Python={sys.executable}")

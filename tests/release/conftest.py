@@ -1,14 +1,105 @@
-"""What the tests of the release share: a copy of this checkout, a release made in it, its wheel."""
+"""What the tests of the release share: a copy of this checkout, a release made in it, its files."""
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from digiclay import __version__
 
-from tests.release.copied_checkout import FOLDER, clone, copy_checkout, run_release
+from tests.timeouts import TIMEOUT
+
+ROOT = Path(__file__).parents[2]
+FOLDER = f"dist/digiclay-{__version__}"
+TAG = f"v{__version__}"
+CHANGELOG = "CHANGELOG.md"
+INIT = "addon/digiclay/__init__.py"
+MANIFEST = "addon/digiclay/blender_manifest.toml"
+#: Wheels fetched before; without a copy of them each release would fetch them again.
+WHEELS = "build/wheels"
+#: Git as nobody's settings have it.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")} | {
+    "GIT_CONFIG_GLOBAL": os.devnull,
+    "GIT_CONFIG_NOSYSTEM": "1",
+}
+
+
+def git(folder: Path, *words: str) -> str:
+    """Run git in a checkout; return what it printed."""
+    command = ["git", "-c", "safe.directory=*", *words]
+    done = subprocess.run(
+        command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=TIMEOUT, check=True
+    )
+    return done.stdout
+
+
+def commit(folder: Path) -> None:
+    """Commit all that a checkout has."""
+    git(folder, "add", "--all")
+    git(folder, "commit", "-q", "--allow-empty", "-m", "tests: a copy")
+
+
+def clone(source: Path, folder: Path) -> Path:
+    """Clone a repository, without its tags; return the checkout."""
+    git(source, "clone", "-q", "--no-tags", str(source), str(folder))
+    for name, value in {"user.name": "A Tester", "user.email": "tester@example.org"}.items():
+        git(folder, "config", name, value)
+    if (ROOT / WHEELS).is_dir():
+        shutil.copytree(ROOT / WHEELS, folder / WHEELS)
+    return folder
+
+
+def copy_checkout(folder: Path) -> Path:
+    """Return a clone of this checkout, with all that is not committed here committed there."""
+    clone(ROOT, folder)
+    listed = git(ROOT, "ls-files", "-co", "--exclude-standard", "-z").split("\0")
+    for name in filter(None, listed):
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, folder / name)
+        else:
+            (folder / name).unlink()
+    commit(folder)
+    return folder
+
+
+def release_command(folder: Path, version: str = __version__) -> list[str]:
+    """Return the command that makes a release in a checkout."""
+    return [sys.executable, str(folder / "tools" / "make_release.py"), version]
+
+
+def run_release(
+    folder: Path, version: str = __version__, umask: int = 0o022, **added: str
+) -> subprocess.CompletedProcess[str]:
+    """Make a release in a checkout, or try to."""
+    return subprocess.run(
+        release_command(folder, version), cwd=folder.parent, env=ENVIRONMENT | added, umask=umask,
+        capture_output=True, text=True, timeout=TIMEOUT,
+    )  # fmt: skip
+
+
+def leftovers(folder: Path) -> list[str]:
+    """Return what a release that was refused must not leave in a checkout."""
+    places = ("dist/*", "build/release-*", "build/lib", "addon/*.egg-info")
+    found = [str(path.relative_to(folder)) for place in places for path in folder.glob(place)]
+    return [*found, *git(folder, "tag").split(), *git(folder, "status", "--porcelain").splitlines()]
+
+
+def edit(name: str, old: str, new: str) -> Callable[[Path], None]:
+    """Return a change of a file, which is committed."""
+
+    def change(folder: Path) -> None:
+        text = (folder / name).read_text(encoding="utf-8")
+        assert old in text, f"{name} has no {old!r}"
+        (folder / name).write_text(text.replace(old, new, 1), encoding="utf-8")
+        commit(folder)
+
+    return change
 
 
 @pytest.fixture(scope="session")
@@ -24,16 +115,12 @@ def checkout(original: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def release(original: Path, tmp_path_factory: pytest.TempPathFactory) -> subprocess.CompletedProcess[str]:
-    """The release command, carried out in a clone; `released` has its checkout."""
-    return run_release(clone(original, tmp_path_factory.getbasetemp() / "released"))
-
-
-@pytest.fixture(scope="session")
-def released(release: subprocess.CompletedProcess[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The checkout of a release."""
-    assert release.returncode == 0, release.stderr
-    return tmp_path_factory.getbasetemp() / "released"
+def released(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The checkout of a release, made in a clone."""
+    folder = clone(original, tmp_path_factory.mktemp("release") / "released")
+    done = run_release(folder)
+    assert done.returncode == 0, done.stderr
+    return folder
 
 
 @pytest.fixture(scope="session")

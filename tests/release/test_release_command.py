@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from digiclay import __version__
 
-from tests.release.copied_checkout import (
+from tests.release.conftest import (
     CHANGELOG,
     ENVIRONMENT,
     FOLDER,

@@ -18,12 +18,14 @@ ADDON = HERE.parents[1] / "addon" / "digiclay"
 #: A run takes two minutes under a virtual screen with software GL, and has taken more than eight on a busy
 #: machine; beyond this it hangs, s.
 LIMIT = 1200
+#: What a script has seen, by name.
+Seen = dict[str, Any]
 
 
 def played(
     script: str, out: Path, size: tuple[int, int] = (1280, 800), by_hand: bool = False, display: str = ""
-) -> dict[str, Any]:
-    """Play a script of this folder in a Blender with the extension; return what it saw, and its "output".
+) -> Seen:
+    """Play a script of this folder in a Blender with the extension; return what it saw and its "output".
 
     Events come from the script, or `by_hand` from outside: Blender takes one of the two. The folder is empty
     at first. Software GL draws a window of a small size, pixels, much quicker; `display` is that of a screen.
@@ -48,8 +50,10 @@ def played(
             shutil.copy(picture, kept)
     said = f"{done.stdout[-6000:]}\n{done.stderr[-6000:]}"
     assert (out / "seen.json").is_file(), f"Blender ended with {done.returncode} and no result:\n{said}"
-    result: dict[str, Any] = json.loads((out / "seen.json").read_text())
+    result: Seen = json.loads((out / "seen.json").read_text())
     assert "error" not in result, f"{result['error']}\n{said}"
     assert "Traceback" not in said, said
+    # A blank screen has one color, a window without a bed hundreds.
+    assert [name for name, count in result.get("colors", {}).items() if count < 100] == []
     assert done.returncode == 0, f"Blender ended with {done.returncode}:\n{said}"
-    return result | {"output": done.stdout + done.stderr}
+    return result | {"output": done.stdout + done.stderr, "folder": out}

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,14 @@ def key(kind: str, at: tuple[int, int], **modifiers: Any) -> None:
     event(kind, "RELEASE", at, **{name: held for name, held in modifiers.items() if name != "unicode"})
 
 
+def click(at: tuple[int, int]) -> Iterator[float | None]:
+    """Click at a place of the window."""
+    event("MOUSEMOVE", "NOTHING", at)
+    yield 0.2
+    key("LEFTMOUSE", at)
+    yield 0.3
+
+
 def view() -> tuple[Any, Any]:
     """Return the first 3D view's area and its main region."""
     area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
@@ -71,18 +80,23 @@ def evaluate() -> None:
     window().view_layer.update()
 
 
-def pixel(place: Any) -> tuple[int, int]:
-    """Return where a place in the world is seen, window pixels."""
-    area, region = view()
-    at = location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
-    return region.x + round(at.x), region.y + round(at.y)
+def pixel(place: Any, region: Any = None) -> tuple[int, int]:
+    """Return where a place in the world is seen, in the first 3D view or another region, window pixels."""
+    area, first = view()
+    looking = region.data if region else area.spaces.active.region_3d
+    at = location_3d_to_region_2d(region or first, looking, place)
+    return (region or first).x + round(at.x), (region or first).y + round(at.y)
+
+
+def world(x: float, y: float, z: float = 40.0) -> Vector:
+    """Return where a place in the first bed's space, mm, is in the world; 40 mm: the pins at rest."""
+    evaluate()
+    return beds()[0].matrix_world @ (part("bridge").SCALE * 1e-3 * Vector((x, y, z)))
 
 
 def on_the_bed(x: float, y: float, z: float = 40.0) -> tuple[int, int]:
-    """Return where a place in the first bed's space, mm, is seen, window pixels; 40 mm: the pins at rest."""
-    evaluate()
-    scale = part("bridge").SCALE * 1e-3
-    return pixel(beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
+    """Return where a place in the first bed's space, mm, is seen, window pixels."""
+    return pixel(world(x, y, z))
 
 
 def call(operator: Any, *how: str | bool, **properties: Any) -> set[str]:
@@ -113,22 +127,18 @@ def empty_scene() -> Iterator[float | None]:
     yield None
 
 
-def add_bed() -> Iterator[float | None]:
-    """Add a bed from the Add menu, by typing its name, and look at all of it."""
-    key("A", middle(), shift=True)
-    yield None
-    for letter in "digital clay":
-        key("SPACE" if letter == " " else letter.upper(), middle(), unicode=letter)
-        yield 0.15
-    key("RET", middle())
-    yield from rounds()
+def add_paper_bed() -> Iterator[float | None]:
+    """Add the bed of the paper, 25 x 25 pins, and look at all of it."""
+    call(bpy.ops.mesh.digital_clay_add, bed="paper")
     key("HOME", middle())
     yield None
 
 
-def add_paper_bed() -> Iterator[float | None]:
-    """Add the bed of the paper, 25 x 25 pins, and look at all of it."""
-    call(bpy.ops.mesh.digital_clay_add, bed="paper")
+def scene_with_bed(**chosen: Any) -> Iterator[float | None]:
+    """Have a bed alone in the scene, in full view."""
+    yield from empty_scene()
+    call(bpy.ops.mesh.digital_clay_add, **chosen)
+    bpy.ops.ed.undo_push(message="Add")
     key("HOME", middle())
     yield None
 
@@ -141,6 +151,56 @@ def beds() -> list[Any]:
 def fingertip(number: int = 0) -> Any:
     """Return the fingertip of a bed."""
     return part("device.view").fingertip_of(beds()[number])
+
+
+def sessions() -> list[Any]:
+    """Return the sessions that run."""
+    running: list[Any] = part("sessions.running").list_sessions()
+    return running
+
+
+def stopped() -> Iterator[float | None]:
+    """Wait until no session runs."""
+    yield from until(lambda: not sessions())
+
+
+def heights() -> Any:
+    """Return the heights drawn of the first bed, mm, rows by columns."""
+    bed = beds()[0]
+    return 1e3 * part("bridge").read_cells(bed.data)["height"].reshape(bed.digiclay.layout.rows, -1)
+
+
+def preferences() -> Any:
+    """Return the extension's preferences; enabled by `main` it has none before."""
+    entry = bpy.context.preferences.addons.new()
+    entry.module = EXTENSION
+    return entry.preferences
+
+
+@contextmanager
+def unfolded(name: str, root: str, *sections: str) -> Iterator[str]:
+    """Show a panel with some sections unfolded in a tab of its own; Blender knows others as folded."""
+    panels = part("panels")
+    every = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
+    names = ("bl_idname", "bl_parent_id", "bl_category", "bl_options")
+    former = {kind: {key: getattr(kind, key) for key in names if hasattr(kind, key)} for kind in every}
+    tab = f"Look at {name}"
+    panels.unregister()
+    for kind in every:
+        if kind.bl_idname in (root, *(f"DIGICLAY_PT_part_{section}" for section in sections)):
+            kind.bl_category, kind.bl_options = tab, set()
+            kind.bl_idname = f"{kind.bl_idname}_{name}"
+        if getattr(kind, "bl_parent_id", "") == root:
+            kind.bl_parent_id = f"{root}_{name}"
+    panels.register()
+    yield tab
+    panels.unregister()
+    for kind, before in former.items():
+        for key, value in before.items():
+            setattr(kind, key, value)
+        if "bl_options" not in before and hasattr(kind, "bl_options"):
+            del kind.bl_options
+    panels.register()
 
 
 def select(thing: Any) -> None:
@@ -179,6 +239,27 @@ def grab(
             look(f"{look_as} {step}")
     key(end, key_at)
     yield None
+
+
+def start(thing: Any = None) -> Iterator[float | None]:
+    """Start a session on the active bed, or on that of a thing, which is selected."""
+    if thing is not None:
+        select(thing)
+    call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    yield from settle()
+
+
+def after(name: str, *keys: str, **modifiers: bool) -> Iterator[float | None]:
+    """Press keys over the 3D view; look when the sessions have taken up whatever has happened."""
+    for kind in keys:
+        key(kind, middle(), **modifiers)
+    yield from settle()
+    look(name)
+
+
+def undo(name: str, redo: bool = False) -> Iterator[float | None]:
+    """Undo, or redo, by its key; look."""
+    yield from after(name, "Z", ctrl=True, shift=redo)
 
 
 def until(found: Callable[[], bool]) -> Iterator[float | None]:
@@ -272,7 +353,7 @@ def main() -> None:
     bpy.context.preferences.view.use_save_prompt = False  # nobody would answer
     if addon_utils.enable(EXTENSION) is None:
         SEEN["error"] = f"{EXTENSION} cannot be enabled"
-    sys.path.insert(0, str(SCRIPT.parent))  # scripts share what a hand does
+    sys.path[:0] = [str(SCRIPT.parent), str(SCRIPT.parents[2])]  # scripts share what a hand does
     found = importlib.util.spec_from_file_location("script", SCRIPT)
     assert found is not None
     assert found.loader is not None
@@ -280,6 +361,8 @@ def main() -> None:
     found.loader.exec_module(played)
     if "error" not in SEEN and not getattr(played, "FINE_PINS", False):
         part("device.parts").MANY = 0  # the vertices of rounder pins cost software GL most of a frame
+        for area in (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"):
+            area.spaces.active.overlay.show_floor = False  # a sixth of what is left
     steps = played.script(sys.modules[__name__])
 
     def step() -> float | None:

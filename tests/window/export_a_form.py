@@ -15,8 +15,8 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.add_paper_bed()
     bed = blender.beds()[0]
     form(blender, bed)
-    with unfolded(blender.part("panels"), "Export", "DIGICLAY_PT_export"):
-        yield from blender.open_sidebar("Export")
+    with blender.unfolded("export", "DIGICLAY_PT_export") as tab:
+        yield from blender.open_sidebar(tab)
         blender.call(bpy.ops.digiclay.find_features)
         yield None
         yield None
@@ -79,24 +79,3 @@ def form(blender: Any, bed: Any) -> None:
         ),
     )  # fmt: skip
     bpy.ops.ed.undo_push(message="Form")
-
-
-class unfolded:
-    """One panel alone in a tab of its own, unfolded; Blender remembers by its name which one is folded."""
-
-    def __init__(self, panels: Any, tab: str, name: str) -> None:
-        self.panels, self.tab = panels, tab
-        self.kind = next(kind for kind in panels.CLASSES if kind.bl_idname == name)
-        self.former = {key: getattr(self.kind, key) for key in ("bl_idname", "bl_category", "bl_options")}
-
-    def __enter__(self) -> None:
-        self.panels.unregister()
-        self.kind.bl_idname += "_alone"
-        self.kind.bl_category, self.kind.bl_options = self.tab, set()
-        self.panels.register()
-
-    def __exit__(self, *raised: object) -> None:
-        self.panels.unregister()
-        for key, value in self.former.items():
-            setattr(self.kind, key, value)
-        self.panels.register()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,11 +10,10 @@ from typing import Any
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).parent))
-from hand_strokes import catch_up, drag, finish, focus_window, hand, note, on_the_screen, to
+from tests.window.hand_strokes import catch_up, drag, finish, focus_window, hand, note, on_the_screen, to
 
-#: The pictures show the pins as a user sees them.
-FINE_PINS = True
+#: The guide's pictures show the pins as a user sees them.
+FINE_PINS = "DIGICLAY_SCREENSHOTS" in os.environ
 #: Places in the sidebar, pixels from its upper right corner at a resolution scale of 1: the tab, and in it
 #: the first button.
 TAB, START = (-10, 178), (-130, 45)
@@ -64,7 +63,7 @@ def open_tab(blender: Any) -> Iterator[float | None]:
 def start(blender: Any) -> Iterator[float | None]:
     """Press the panel's first button."""
     yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
-    blender.SEEN["started"] = len(blender.part("sessions.running").list_sessions())
+    blender.SEEN["started"] = len(blender.sessions())
     blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
 
 
@@ -82,7 +81,7 @@ def draw(blender: Any) -> Iterator[float | None]:
 def stop(blender: Any) -> Iterator[float | None]:
     """End the session."""
     yield from done(blender, "key Escape")
-    blender.SEEN["left"] = len(blender.part("sessions.running").list_sessions())
+    blender.SEEN["left"] = len(blender.sessions())
 
 
 #: Steps of the guide's first page: the first sentence of each, and what a hand does.
@@ -103,7 +102,7 @@ def waiting() -> float:
 
 def along(blender: Any) -> float:
     """Return where the finger is along its line, mm; before the line where it begins."""
-    (session,) = blender.part("sessions.running").list_sessions()
+    (session,) = blender.sessions()
     dragging = blender.part("strokes.stroke").DRAGGING
     on_the_way = session.strokes and session.strokes[0].phase == dragging
     return 1e3 * float(session.pose[0]) if on_the_way else -HALF

@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
-from bpy_extras.view3d_utils import location_3d_to_region_2d
-from mathutils import Vector
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.window import space_mouse
 from tests.window.hand_strokes import (
     HALF,
     Pixel,
-    add_bed,
+    act,
     done,
     drag,
     ends,
-    finish,
     focus_window,
     hand,
     note,
     on_the_screen,
+    prepare,
     reset,
-    take_tool,
     to,
 )
 from tests.window.play_and_look import top_quarter
@@ -41,9 +35,7 @@ TURN = (0, 0, 0, 0, 15, 0)
 
 def script(blender: Any) -> Iterator[float | None]:
     """Do what a hand does."""
-    add_bed(blender)
-    take_tool(blender)
-    yield from focus_window()
+    yield from prepare(blender)
     yield from turned(blender)
     yield from reset(blender)
     yield from quarter(blender)
@@ -54,15 +46,20 @@ def script(blender: Any) -> Iterator[float | None]:
 
 def held_stroke(blender: Any) -> Any:
     """Return the stroke that the hand draws."""
-    (session,) = blender.part("sessions.running").list_sessions()
+    (session,) = blender.sessions()
     return session.strokes[-1] if session.strokes and session.strokes[-1].held else None
 
 
-def let_go(blender: Any, name: str) -> Iterator[float | None]:
-    """Wait until the finger follows the stroke that is held, note the path, and let go."""
+def followed(blender: Any) -> Iterator[float | None]:
+    """Wait until the fingertip follows the stroke that is held."""
     yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
+
+
+def let_go(blender: Any, name: str) -> Iterator[float | None]:
+    """Note the path of the stroke that is held once the fingertip follows it, and let go."""
+    yield from followed(blender)
     path = [[1e3 * sample.x, 1e3 * sample.y] for sample in held_stroke(blender).samples]
-    yield from finish(blender, hand("mouseup 1"))
+    yield from act(blender, "mouseup 1")
     note(blender, name)
     blender.SEEN[name]["path"] = path
 
@@ -76,7 +73,7 @@ def turned(blender: Any) -> Iterator[float | None]:
     # To and fro for as long as it takes to turn the view.
     there, back = drag(start, middle, 1.0, 60), drag(middle, start, 1.0, 60)
     process = hand(to(start), "mousedown 1", *[there, back] * 60)
-    yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
+    yield from followed(blender)
 
     def is_turned() -> bool:
         space_mouse.push(TURN)
@@ -108,31 +105,23 @@ def quarter(blender: Any) -> Iterator[float | None]:
 
 def draw_in(blender: Any, name: str, window: Any, region: Any, corner: Pixel) -> Iterator[float | None]:
     """Draw along the middle row in a region of a window whose top left corner is somewhere on the screen."""
-    scale = blender.part("bridge").SCALE * 1e-3
-    bed, places = blender.beds()[0].matrix_world, []
-    for x in (-HALF, HALF):
-        at = location_3d_to_region_2d(region, region.data, bed @ (Vector((x, 0.0, 40.0)) * scale))
-        across, up = round(region.x + at.x), round(region.y + at.y)
-        places.append((corner[0] + across, corner[1] + window.height - 1 - up))
-    start, end = places
+    seen = (blender.pixel(blender.world(x, 0.0), region) for x in (-HALF, HALF))
+    start, end = ((corner[0] + across, corner[1] + window.height - 1 - up) for across, up in seen)
     yield from done(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60)))
     yield from let_go(blender, name)
 
 
 def windows_on_screen() -> dict[str, dict[str, int]]:
     """Return place and size of Blender's windows on the screen, by their number."""
-    found = subprocess.run(
-        ["xdotool", "search", "--onlyvisible", "--class", "blender"],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    seen = {}
-    for number in found.stdout.split():
-        words = ["xdotool", "getwindowgeometry", "--shell", number]
-        lines = subprocess.run(words, check=True, capture_output=True, text=True).stdout.split()
-        seen[number] = {name: int(value) for name, value in (line.split("=") for line in lines)}
-    return seen
+
+    def told(*words: str) -> list[str]:
+        return subprocess.run(["xdotool", *words], check=True, capture_output=True, text=True).stdout.split()
+
+    lines = {
+        number: told("getwindowgeometry", "--shell", number)
+        for number in told("search", "--onlyvisible", "--class", "blender")
+    }
+    return {one: {k: int(v) for k, v in (text.split("=") for text in found)} for one, found in lines.items()}
 
 
 def second_window(blender: Any) -> Iterator[float | None]:

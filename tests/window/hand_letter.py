@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import bpy
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests.window.hand_strokes import add_bed, finish, focus_window, hand, note, on_the_screen, take_tool, to
+from tests.window.hand_strokes import act, brush, note, on_the_screen, prepare, to
 
 #: The strokes of the letter.
 FILE = Path(__file__).parents[2] / "benchmarks" / "strokes" / "letter_a.toml"
@@ -29,14 +25,10 @@ def draw(blender: Any, stroke: Any) -> str:
 def script(blender: Any) -> Iterator[float | None]:
     """Draw stroke by stroke, with the brush of each."""
     recorded = blender.part("recorded.pointer_strokes").read_strokes(FILE)
-    add_bed(blender, bed=recorded.bed)
-    blender.call(bpy.ops.view3d.view_axis, type="TOP")
-    take_tool(blender)
-    yield from focus_window()
-    settings = blender.part("press.brush").tool_settings(bpy.context)
+    yield from prepare(blender, "TOP", bed=recorded.bed)
+    settings = brush(blender)
     for number, stroke in enumerate(recorded.strokes, 1):
         settings.brush, settings.depth = stroke.kind.value, 1e3 * stroke.depth
-        process = hand(draw(blender, stroke))
-        yield from finish(blender, process)
+        yield from act(blender, draw(blender, stroke))
         blender.shot(f"letter_{number}")
     note(blender, "formed")

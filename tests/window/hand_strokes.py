@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,11 +12,12 @@ import numpy as np
 #: Half the length of a stroke, mm.
 HALF = 27.0
 #: Duration of a stroke, s, and moves a second.
-STROKES = ((0.3, 125), (1.0, 60), (3.0, 125), (8.0, 60))
+STROKES = ((0.3, 125), (3.0, 60))
 #: Places of three taps within a second, mm.
 TAPS = ((-24.0, 24.0), (0.0, 24.0), (24.0, 24.0))
 
 Pixel = tuple[int, int]
+Place = tuple[float, float]
 
 
 def on_the_screen(blender: Any, x: float, y: float) -> Pixel:
@@ -27,7 +27,7 @@ def on_the_screen(blender: Any, x: float, y: float) -> Pixel:
 
 
 def hand(*words: str) -> subprocess.Popen[bytes]:
-    """Start a hand that does what it is told, whatever Blender is about."""
+    """Start a hand that carries out words of xdotool, whatever Blender is about."""
     return subprocess.Popen(["xdotool", *" ".join(words).split()])
 
 
@@ -43,6 +43,16 @@ def drag(start: Pixel, end: Pixel, duration: float, rate: float) -> str:
     return " ".join(to((int(x), int(y)), duration / count) for x, y in way)
 
 
+def line(
+    blender: Any, start: Place, end: Place, duration: float = 1.0, rate: float = 60, key: str = "",
+    last: str = "mouseup 1",
+) -> subprocess.Popen[bytes]:  # fmt: skip
+    """Start a hand that draws a line over the bed, mm, with a key held down, and ends it by some words."""
+    first, final = on_the_screen(blender, *start), on_the_screen(blender, *end)
+    down, up = (f"keydown {key} sleep 0.2", f"keyup {key}") if key else ("", "")
+    return hand(to(first), down, "mousedown 1", drag(first, final, duration, rate), last, up)
+
+
 def done(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
     """Wait until the hand is done, and Blender has worked off what it has sent."""
     yield from blender.until(lambda: process.poll() is not None)
@@ -50,22 +60,42 @@ def done(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | Non
 
 
 def finish(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
-    """Wait until the hand is done, and then until the finger is, and the pins have come to rest."""
-    running = blender.part("sessions.running")
+    """Wait until the hand is done, and then until the fingertip is, and the pins have come to rest."""
     yield from done(blender, process)
-    yield from blender.until(lambda: not any(session.strokes for session in running.list_sessions()))
-    yield from blender.settle(10)
+    yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
+    yield from rest(blender)
+
+
+def rest(blender: Any) -> Iterator[float | None]:
+    """Let the pins come to rest: a tick simulates all the time since the one before, however long it was."""
+    yield 0.5
+    yield from blender.settle()
+
+
+def act(blender: Any, *words: str) -> Iterator[float | None]:
+    """Let the hand do something, and finish it."""
+    yield from finish(blender, hand(*words))
+
+
+def stroke(
+    blender: Any, name: str, start: Place, end: Place, *how: Any, picture: str = "", key: str = ""
+) -> Iterator[float | None]:
+    """Draw a line, finish it, and write it down; take a picture as soon as the hand is done."""
+    process = line(blender, start, end, *how, key=key)
+    if picture:
+        yield from blender.until(lambda: process.poll() is not None)
+        blender.shot(picture)
+    yield from finish(blender, process)
+    note(blender, name)
 
 
 def note(blender: Any, name: str) -> None:
-    """Write down the heights, how many strokes the finger has finished, and how the view is turned."""
+    """Write down the heights, how many strokes the fingertip has finished, and how the view is turned."""
     blender.look(name)
-    bed = blender.beds()[0]
-    session = blender.part("sessions.running").find(bed)
+    session = blender.part("sessions.running").find(blender.beds()[0])
     area, _ = blender.view()
-    height = blender.part("bridge").read_cells(bed.data)["height"].reshape(bed.digiclay.layout.rows, -1)
     blender.SEEN[name] |= {
-        "bed": (1e3 * height).round(3).tolist(),
+        "bed": blender.heights().round(3).tolist(),
         "drawn": session.finished_strokes if session else 0,
         "view": list(area.spaces.active.region_3d.view_rotation),
         "distance": area.spaces.active.region_3d.view_distance,
@@ -81,7 +111,7 @@ def reset(blender: Any) -> Iterator[float | None]:
     """Bring the bed back to rest."""
     if blender.call(bpy.ops.digiclay.session_reset.poll):
         blender.call(bpy.ops.digiclay.session_reset)
-    yield from blender.settle(5)
+    yield from blender.settle()
 
 
 def add_bed(blender: Any, **chosen: Any) -> None:
@@ -95,9 +125,7 @@ def add_bed(blender: Any, **chosen: Any) -> None:
 
 def catch_up(blender: Any) -> None:
     """Let the session catch up between two frames: one takes software GL half a second."""
-    entry = bpy.context.preferences.addons.new()
-    entry.module = blender.EXTENSION
-    entry.preferences.most_periods = 1000
+    blender.preferences().most_periods = 1000
 
 
 def take_tool(blender: Any) -> None:
@@ -113,21 +141,26 @@ def focus_window() -> Iterator[float | None]:
     yield None
 
 
-def script(blender: Any) -> Iterator[float | None]:
-    """Do what a hand does."""
-    add_bed(blender)
+def prepare(blender: Any, view: str = "", **chosen: Any) -> Iterator[float | None]:
+    """Have a bed alone in the scene, seen from a side, and the Press tool in hand."""
+    add_bed(blender, **chosen)
+    if view:
+        blender.call(bpy.ops.view3d.view_axis, type=view)
     take_tool(blender)
     yield from focus_window()
+
+
+def brush(blender: Any) -> Any:
+    """Return the settings of the Press tool."""
+    return blender.part("press.brush").tool_settings(bpy.context)
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what a hand does."""
+    yield from prepare(blender)
     for duration, rate in STROKES:
-        start, end = ends(blender)
-        began = time.perf_counter()
-        process = hand(to(start), "mousedown 1", drag(start, end, duration, rate), "mouseup 1")
-        yield from blender.until(lambda process=process: process.poll() is not None)
-        took = time.perf_counter() - began
-        blender.shot(f"hand_{duration:g}")
-        yield from finish(blender, process)
-        note(blender, f"stroke {duration:g}")
-        blender.SEEN[f"stroke {duration:g}"]["took"] = took
+        how, picture = (duration, rate), f"hand_{duration:g}"
+        yield from stroke(blender, f"stroke {duration:g}", (-HALF, 0.0), (HALF, 0.0), *how, picture=picture)
         yield from reset(blender)
     yield from message(blender)
     yield from taps(blender)
@@ -146,24 +179,16 @@ def message(blender: Any) -> Iterator[float | None]:
             lambda waits=waits: bool(running.find(blender.beds()[0]).blocking_reason) == waits
         )
     blender.SEEN["message"] = running.last_message()
-    start, end = ends(blender)
-    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "mouseup 1"))
-    note(blender, "stroke under a message")
+    yield from stroke(blender, "stroke under a message", (-HALF, 0.0), (HALF, 0.0))
     yield from reset(blender)
 
 
 def taps(blender: Any) -> Iterator[float | None]:
     """Press three times within a second; then Ctrl-Z takes back one of them."""
     note(blender, "before the taps")
-    began = time.perf_counter()
-    clicks = " ".join(to(on_the_screen(blender, *place), 0.08) + " click 1 sleep 0.15" for place in TAPS)
-    process = hand(clicks)
-    yield from blender.until(lambda: process.poll() is not None)
-    took = time.perf_counter() - began
-    yield from finish(blender, process)
+    yield from act(blender, *(to(on_the_screen(blender, *at), 0.08) + " click 1 sleep 0.15" for at in TAPS))
     note(blender, "taps")
-    blender.SEEN["taps"]["took"] = took
-    yield from finish(blender, hand(to(on_the_screen(blender, 0.0, -30.0)), "key ctrl+z"))
+    yield from act(blender, to(on_the_screen(blender, 0.0, -30.0)), "key ctrl+z")
     note(blender, "one tap undone")
     yield from reset(blender)
 
@@ -180,8 +205,7 @@ def navigation(blender: Any) -> Iterator[float | None]:
     )  # fmt: skip
     yield from done(blender, process)
     note(blender, "in mid-stroke")
-    process = hand(drag(end, on_the_screen(blender, HALF, 0.0), 0.3, 60), "mouseup 1")
-    yield from finish(blender, process)
+    yield from act(blender, drag(end, on_the_screen(blender, HALF, 0.0), 0.3, 60), "mouseup 1")
     note(blender, "after orbit")
     blender.shot("hand_orbit")
     yield from reset(blender)
@@ -189,23 +213,18 @@ def navigation(blender: Any) -> Iterator[float | None]:
 
 def pie_menu(blender: Any) -> Iterator[float | None]:
     """Pan in the middle of a stroke; then open the pie menu of the shading, and let go over Solid."""
-    running = blender.part("sessions.running")
     start, end = ends(blender)
-    middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
+    x, y = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
     area, _ = blender.view()
     before = list(area.spaces.active.region_3d.view_location)
     process = hand(
-        to(start), "mousedown 1", drag(start, middle, 0.5, 60),
-        "keydown shift mousedown 2 sleep 0.05", drag(middle, (middle[0], middle[1] + 40), 0.3, 60),
-        "mouseup 2 keyup shift sleep 0.3 key z sleep 1",
-        drag((middle[0], middle[1] + 40), (middle[0] + 60, middle[1] + 40), 0.3, 30),
-        "sleep 0.3 mouseup 1 sleep 0.5",
-        drag((middle[0] + 60, middle[1] + 40), (middle[0] + 90, middle[1] + 40), 0.3, 30),
+        to(start), "mousedown 1", drag(start, (x, y), 0.5, 60),
+        "keydown shift mousedown 2 sleep 0.05", drag((x, y), (x, y + 40), 0.3, 60),
+        "mouseup 2 keyup shift sleep 0.3 key z sleep 1", drag((x, y + 40), (x + 60, y + 40), 0.3, 30),
+        "sleep 0.3 mouseup 1 sleep 0.5", drag((x + 60, y + 40), (x + 90, y + 40), 0.3, 30),
     )  # fmt: skip
     yield from blender.until(lambda: process.poll() is not None)
-    yield from blender.until(
-        lambda: not any(one.held for session in running.list_sessions() for one in session.strokes)
-    )
+    yield from blender.until(lambda: not any(one.held for s in blender.sessions() for one in s.strokes))
     after = list(area.spaces.active.region_3d.view_location)
     yield from finish(blender, process)
     note(blender, "pie menu")
@@ -214,15 +233,11 @@ def pie_menu(blender: Any) -> Iterator[float | None]:
 
 
 def taken_back(blender: Any) -> Iterator[float | None]:
-    """Take a stroke back that the finger has not finished, by Ctrl-Z and by Esc."""
-    running = blender.part("sessions.running")
+    """Take a stroke back that the fingertip has not finished, by Ctrl-Z and by Esc."""
     for name, key in (("undone", "ctrl+z"), ("escaped", "Escape")):
-        start, end = ends(blender)
-        process = hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "sleep 2")
-        yield from blender.until(
-            lambda: any(s.strokes and s.strokes[0].reached for s in running.list_sessions())
-        )
-        yield from finish(blender, hand(f"key {key} sleep 0.2"))
+        process = line(blender, (-HALF, 0.0), (HALF, 0.0), last="sleep 2")
+        yield from blender.until(lambda: any(s.strokes and s.strokes[0].reached for s in blender.sessions()))
+        yield from act(blender, f"key {key} sleep 0.2")
         hand("mouseup 1")
         yield from finish(blender, process)
         note(blender, name)

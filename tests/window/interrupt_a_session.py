@@ -9,12 +9,6 @@ import addon_utils
 import bpy
 
 
-def start(blender: Any) -> Iterator[float | None]:
-    """Start a session on the active bed."""
-    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield from blender.settle()
-
-
 def press(blender: Any) -> Iterator[float | None]:
     """Form a hollow, as one undo step that ends with the fingertip lifted."""
     tip = blender.fingertip()
@@ -26,55 +20,42 @@ def press(blender: Any) -> Iterator[float | None]:
 
 
 def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
-    """Draw a stroke, go to Edit Mode before the finger has finished it, and take it back with Esc there."""
+    """Draw a stroke, go to Edit Mode before the fingertip has formed it, and take it back with Esc there."""
     blender.select(blender.beds()[0])
     yield None
     move, press = ("MOUSEMOVE", "NOTHING"), "LEFTMOUSE"
-    way = [(*move, x) for x in (15, -15) * 4]  # more than the finger goes until Tab
+    way = [(*move, x) for x in (15, -15) * 4]  # more than the fingertip forms until Tab
     for kind, value, x in ((*move, -15), (press, "PRESS", -15), *way, (press, "RELEASE", -15)):
         blender.event(kind, value, blender.on_the_bed(x, -25.0))  # beside the sidebar
         yield 0.05
-    (session,) = blender.part("sessions.running").list_sessions()
-    yield from blender.until(lambda: blender.part("sessions.running").list_sessions()[0].tick > session.tick)
-    blender.key("TAB", blender.middle())
-    yield from blender.settle()
-    strokes = [len(session.strokes) for session in blender.part("sessions.running").list_sessions()]
-    blender.look("edited")
+    (session,) = blender.sessions()
+    yield from blender.until(lambda: blender.sessions()[0].tick > session.tick)
+    strokes = blender.SEEN["strokes"] = []
+    for name, kind in (("edited", "TAB"), ("taken back", "ESC")):
+        yield from blender.after(name, kind)
+        strokes.append([len(session.strokes) for session in blender.sessions()])
     blender.shot("session_edited")
-    blender.key("ESC", blender.middle())
-    yield from blender.settle()
-    left = [len(session.strokes) for session in blender.part("sessions.running").list_sessions()]
-    blender.SEEN["strokes"] = [strokes, left]
-    blender.key("TAB", blender.middle())
-    yield from blender.settle()
-    blender.look("edited no more")
+    yield from blender.after("edited no more", "TAB")
 
 
 def script(blender: Any) -> Iterator[float | None]:
     """Do to a session what can be done to it."""
-    yield from blender.empty_scene()
-    blender.call(bpy.ops.mesh.digital_clay_add)
-    bpy.ops.ed.undo_push(message="Add")
+    after = blender.after
+    yield from blender.scene_with_bed()
     yield from blender.open_sidebar()
-    blender.key("HOME", blender.middle())
-    yield from start(blender)
+    yield from blender.start()
     yield from press(blender)
     blender.look("formed")
 
     blender.select(blender.fingertip())
-    blender.key("DEL", blender.middle())
-    yield from blender.settle()
-    blender.look("fingertip deleted")
+    yield from after("fingertip deleted", "DEL")
     blender.shot("session_waits")
-    blender.key("Z", blender.middle(), ctrl=True)
-    yield from blender.settle()
-    blender.look("fingertip back")
+    yield from blender.undo("fingertip back")
 
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Animation"]
     yield None
-    yield from blender.settle()
-    blender.look("in another workspace")
+    yield from after("in another workspace")
     blender.shot("session_workspace")
     blender.window().workspace = home
     yield None
@@ -82,46 +63,37 @@ def script(blender: Any) -> Iterator[float | None]:
     scene = blender.window().scene
     blender.window().scene = bpy.data.scenes.new("Other")
     yield None
-    yield from blender.settle()
-    blender.look("in another scene")
-    blender.SEEN["in another scene"]["waits"] = (
-        blender.part("sessions.running").list_sessions()[0].blocking_reason
-    )
+    yield from after("in another scene")
+    blender.SEEN["in another scene"]["waits"] = blender.sessions()[0].blocking_reason
     blender.window().scene = scene
-    yield from blender.settle()
-    blender.look("scene back")
+    yield from after("scene back")
 
     yield from edit_in_mid_stroke(blender)
 
     blender.beds()[0].scale = (1.0, 1.0, 1.5)
-    yield from blender.settle()
-    blender.look("scaled")
+    yield from after("scaled")
     blender.key("F", blender.on_the_bed(0.0, -25.0))  # at every redraw it would fail
     yield 1.0
     blender.SEEN["adjusting"] = [operator.bl_idname for operator in blender.window().modal_operators]
     blender.beds()[0].scale = (1.0, 1.0, 1.0)
-    yield from blender.settle()
-    blender.look("scaled no more")
+    yield from after("scaled no more")
 
     blender.call(bpy.ops.mesh.digital_clay_add, rows=9, columns=9)
     bpy.context.view_layer.objects.active.location.x = 1.5
-    yield from start(blender)
+    yield from blender.start()
     blender.look("two beds")
     blender.select(bpy.context.view_layer.objects.active)
-    blender.key("DEL", blender.middle())
-    yield from blender.settle()
-    blender.look("second bed deleted")
+    yield from after("second bed deleted", "DEL")
 
     bpy.ops.ed.undo_push(message="Before")
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.key("DEL", blender.middle())
-    yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
+    yield from blender.stopped()
     blender.look("all deleted")
     blender.key("Z", blender.middle(), ctrl=True)
     yield 1.0
     blender.look("all back")
-    blender.select(blender.beds()[0])
-    yield from start(blender)
+    yield from blender.start(blender.beds()[0])
     blender.look("started again")
 
     addon_utils.disable(blender.EXTENSION)
@@ -132,7 +104,7 @@ def script(blender: Any) -> Iterator[float | None]:
     addon_utils.enable(blender.EXTENSION)
     yield None
     blender.look("enabled again")
-    yield from start(blender)
+    yield from blender.start()
     blender.look("going on")
 
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -141,7 +113,7 @@ def script(blender: Any) -> Iterator[float | None]:
     drawing = getattr(bpy.types.STATUSBAR_HT_header.draw, "_draw_funcs", [])
     blender.SEEN["keys drawn"] = [f.__module__ for f in drawing if f.__module__.startswith(blender.EXTENSION)]
     blender.call(bpy.ops.mesh.digital_clay_add)
-    yield from start(blender)
+    yield from blender.start()
     blender.look("before quitting")
     blender.hand_over()
     bpy.ops.wm.quit_blender()  # with the session on: nobody disables the extension before

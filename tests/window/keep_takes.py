@@ -1,16 +1,14 @@
-"""Records a take, draws a ridge, keeps, exports, replays and bakes what was recorded, and plays the bake."""
+"""Records takes, keeps, exports, replays, bakes and plays them; leaves files in mid-recording."""
 
 from __future__ import annotations
 
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
 
 
 def script(blender: Any) -> Iterator[float | None]:
@@ -18,19 +16,15 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     # Software GL draws a frame or two a second; in between the session is to catch up.
-    entry = bpy.context.preferences.addons.new()
-    entry.module = blender.EXTENSION
-    entry.preferences.most_periods = 100
+    blender.preferences().most_periods = 100
     # The least there is. Blender counts it from the start of the program.
     bpy.context.preferences.filepaths.auto_save_time = 1
-    blender.select(blender.fingertip())
-    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield from blender.settle()
+    yield from blender.start(blender.fingertip())
     blender.call(bpy.ops.digiclay.take_record)
     yield from to_height(blender, 36.0, steps=3)
     yield from to_height(blender, 50.0, steps=2)
-    with takes_alone(blender.part("panels")):
-        yield from blender.open_sidebar("Look at Takes")
+    with blender.unfolded("takes", "DIGICLAY_PT_takes") as tab:
+        yield from blender.open_sidebar(tab)
         blender.shot("takes_recording")
         blender.SEEN["kept"] = sorted(blender.call(bpy.ops.digiclay.take_keep, name="A press"))
         yield None
@@ -48,16 +42,19 @@ def script(blender: Any) -> Iterator[float | None]:
         yield from ridge(blender)
         yield from saved(blender, earlier)
         blender.key("ESC", blender.middle())
-        yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
+        yield from blender.stopped()
         yield 1.0
         note(blender, "stopped")
-        yield from blender.open_sidebar("Look at Takes")
+        yield from blender.open_sidebar(tab)
         yield from replayed(blender)
         yield from baked(blender)
     yield from blender.open_sidebar()
     bpy.ops.wm.open_mainfile(filepath=str(blender.OUT / "recovered.blend"))
     yield 1.0
     note(blender, "recovered")
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 1.0
+    yield from leave_files(blender)
 
 
 def to_height(blender: Any, height: float, steps: int) -> Iterator[float | None]:
@@ -136,9 +133,7 @@ def baked(blender: Any) -> Iterator[float | None]:
     note(blender, "baked")
     bed = blender.beds()[0]
     blender.window().view_layer.objects.active = bed
-    area, region = blender.view()
-    with bpy.context.temp_override(window=blender.window(), area=area, region=region):
-        blender.SEEN["session on a bake"] = bpy.ops.digiclay.session.poll()
+    blender.SEEN["session on a bake"] = blender.call(bpy.ops.digiclay.session.poll)
     scene.frame_set(1)
     scene.sync_mode = "FRAME_DROP"  # software GL draws two frames a second
     places = [fingertip(blender)]
@@ -167,31 +162,51 @@ def note(blender: Any, name: str) -> None:
     """Write down what stands in the scene, and what there is to tell of takes."""
     blender.look(name)
     bed = blender.beds()[0]
-    area, region = blender.view()
-    with bpy.context.temp_override(window=blender.window(), area=area, region=region):
-        replay = bpy.ops.digiclay.take_replay.poll()
-    height = blender.part("bridge").read_cells(bed.data)["height"]
     blender.SEEN[name] |= {
         "takes": [list(one) for one in blender.part("recorded.takes").list_takes(bed)],
         "is baked": blender.part("recorded.bake").is_baked(bed),
-        "replay can be pressed": replay,
+        "replay can be pressed": blender.call(bpy.ops.digiclay.take_replay.poll),
         "frame": blender.window().scene.frame_current,
-        "highest": np.sort(1e3 * height)[-40:].round(3).tolist(),
-        "bed": (1e3 * height).round(4).tolist(),
+        "bed": blender.heights().round(4).tolist(),
     }
 
 
-@contextmanager
-def takes_alone(panels: Any) -> Iterator[None]:
-    """Show the Takes panel unfolded, in a tab of its own: below the others it is out of sight."""
-    (kind,) = [one for one in panels.CLASSES if getattr(one, "bl_idname", "") == "DIGICLAY_PT_takes"]
-    former = kind.bl_idname, kind.bl_category, kind.bl_options
-    panels.unregister()
-    kind.bl_idname, kind.bl_category, kind.bl_options = "DIGICLAY_PT_takes_alone", "Look at Takes", set()
-    panels.register()
-    try:
-        yield
-    finally:
-        panels.unregister()
-        kind.bl_idname, kind.bl_category, kind.bl_options = former
-        panels.register()
+def leave_files(blender: Any) -> Iterator[float | None]:
+    """Record, and let the file go away: load another one, save it first, and quit Blender."""
+    yield from recording(blender)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 1.0
+    blender.look("loaded")
+    yield from blender.open_sidebar()
+    blender.shot("takes_closed_file")
+    left = blender.part("live.handlers").file_path()
+    bpy.ops.wm.recover_auto_save("EXEC_DEFAULT", filepath=str(left))
+    yield 1.0
+    blender.SEEN["kept when another was loaded"] = names(blender)
+
+    yield from recording(blender)
+    left.unlink()
+    bpy.ops.wm.save_as_mainfile(filepath=str(blender.OUT / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(blender.OUT / "saved.blend"))
+    yield 1.0
+    blender.SEEN["kept when saved before"] = names(blender)
+    blender.SEEN["left although saved"] = left.exists()
+
+    yield from recording(blender)
+    blender.hand_over()
+    bpy.ops.wm.quit_blender()  # with the session on: nobody disables the extension before
+    yield 60.0
+
+
+def recording(blender: Any) -> Iterator[float | None]:
+    """Have the session of a bed, a new one if there is none, record for a moment."""
+    if not blender.beds():
+        blender.call(bpy.ops.mesh.digital_clay_add, rows=9, columns=9)
+    yield from blender.start(blender.beds()[0])
+    blender.call(bpy.ops.digiclay.take_record)
+    yield from blender.settle()
+
+
+def names(blender: Any) -> list[str]:
+    """Return the names of the bed's takes."""
+    return [entry.name for entry in blender.part("recorded.takes").list_takes(blender.beds()[0])]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import bpy
 
+#: Pins as a user sees them.
+FINE_PINS = True
 #: Panels unfolded in one picture, so that each is seen whole in a window of 800 pixels.
 PICTURES = {
     "device": ("DIGICLAY_PT_device", "layout actuator supply fluid valve"),
@@ -26,47 +28,47 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.add_paper_bed()
     blender.shot("panels_all")
     for picture, (root, sections) in PICTURES.items():
-        with unfolded(blender.part("panels"), picture, {root}, sections.split()) as tab:
+        with blender.unfolded(picture, root, *sections.split()) as tab:
             yield from blender.open_sidebar(tab)
             blender.shot(f"panels_{picture}")
     bed = blender.beds()[0]
     bed.digiclay.layout.columns = 20
     bed.digiclay.layout.pitch = 1.0
     bed.digiclay.use_delay = False
-    with unfolded(blender.part("panels"), "stale", {"DIGICLAY_PT_device"}, ["layout", "delay"]) as tab:
+    with blender.unfolded("stale", "DIGICLAY_PT_device", "layout", "delay") as tab:
         yield from blender.open_sidebar(tab)
         blender.shot("panels_stale")
     blender.SEEN["rebuild refused"] = refused(blender)
     bed.digiclay.layout.pitch = 3.0
     blender.SEEN["rebuilt"] = sorted(blender.call(bpy.ops.digiclay.rebuild))
     blender.SEEN["pins"] = len(blender.beds()[0].data.vertices)
+    yield from own_methods(blender)
+
+
+def own_methods(blender: Any) -> Iterator[float | None]:
+    """Allow a folder with a method and a mistake, look at its parameters; take the permission back."""
+    folder = Path(blender.OUT, "methods")
+    blender.part("command_line").run(["new-method", "soft_pad", "--out", str(folder), "--quiet"])
+    (folder / "broken.py").write_text("x = (", encoding="utf-8")
+    chosen = blender.preferences()
+    chosen.methods_folder, chosen.run_own_methods = str(folder), True
+    blender.beds()[0].digiclay.chosen_method = "soft_pad"
+    with blender.unfolded("own", "DIGICLAY_PT_control", "control") as tab:
+        yield from blender.open_sidebar(tab)
+        blender.shot("panels_own")
+        chosen.run_own_methods = False
+        yield from blender.open_sidebar(tab)
+        blender.shot("panels_own_missing")
+    chosen.run_own_methods = True
+    area, _ = blender.view()
+    area.type = "PREFERENCES"
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.context.window_manager.addon_search = "Digital Clay"
+    bpy.ops.preferences.addon_expand(module=blender.EXTENSION)
+    yield 1.0
+    blender.shot("panels_preferences")
+    area.type = "VIEW_3D"
     yield from blender.open_sidebar()
-
-
-@contextmanager
-def unfolded(panels: Any, name: str, roots: set[str], sections: list[str]) -> Iterator[str]:
-    """Show some panels unfolded in a tab of their own; Blender remembers by its name which one is folded."""
-    wanted = roots | {f"DIGICLAY_PT_part_{section}" for section in sections}
-    every = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
-    names = ("bl_idname", "bl_parent_id", "bl_category", "bl_options")
-    former = {kind: {key: getattr(kind, key) for key in names if hasattr(kind, key)} for kind in every}
-    tab = f"Look at {name}"
-    panels.unregister()
-    for kind in every:
-        if kind.bl_idname in wanted:
-            kind.bl_category, kind.bl_options = tab, set()
-            kind.bl_idname = f"{kind.bl_idname}_{name}"
-        if getattr(kind, "bl_parent_id", "") in roots:
-            kind.bl_parent_id = f"{kind.bl_parent_id}_{name}"
-    panels.register()
-    yield tab
-    panels.unregister()
-    for kind, known in former.items():
-        for key, value in known.items():
-            setattr(kind, key, value)
-        if "bl_options" not in known and hasattr(kind, "bl_options"):
-            del kind.bl_options
-    panels.register()
 
 
 def refused(blender: Any) -> str:

@@ -13,21 +13,9 @@ def modal() -> list[str]:
     return [one.bl_idname for one in bpy.context.window_manager.windows[0].modal_operators]
 
 
-def click(blender: Any, at: tuple[int, int]) -> Iterator[float | None]:
-    """Click at a place of the window."""
-    blender.event("MOUSEMOVE", "NOTHING", at)
-    yield 0.2
-    blender.key("LEFTMOUSE", at)
-    yield 0.3
-
-
 def script(blender: Any) -> Iterator[float | None]:
-    """Do both."""
-    yield from blender.empty_scene()
-    blender.call(bpy.ops.mesh.digital_clay_add, rows=9, columns=9)
-    bpy.ops.ed.undo_push(message="Add")
-    blender.key("HOME", blender.middle())
-    yield None
+    """Do all three."""
+    yield from blender.scene_with_bed(rows=9, columns=9)
     yield from pick(blender)
     yield from escape(blender)
     yield from units(blender)
@@ -38,18 +26,18 @@ def pick(blender: Any) -> Iterator[float | None]:
     picked = blender.part("device.view").picked_pins
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
-    yield from click(blender, blender.on_the_bed(-6, -9))
+    yield from blender.click(blender.on_the_bed(-6, -9))
     blender.SEEN["picked"] = list(picked(blender.beds()[0]))
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Animation"]
     yield None
     yield None
     timeline = next(area for area in blender.window().screen.areas if area.type == "DOPESHEET_EDITOR")
-    yield from click(blender, (timeline.x + timeline.width // 2, timeline.y + timeline.height // 2))
+    yield from blender.click((timeline.x + timeline.width // 2, timeline.y + timeline.height // 2))
     blender.SEEN["clicked in the timeline"] = list(picked(blender.beds()[0]))
     blender.key("HOME", blender.middle())
     yield None
-    yield from click(blender, blender.on_the_bed(6, -9))
+    yield from blender.click(blender.on_the_bed(6, -9))
     blender.SEEN["picked elsewhere"] = list(picked(blender.beds()[0]))
     blender.SEEN["told in"] = list(blender.part("operators.status")._TOLD)
     blender.key("RET", blender.middle())
@@ -64,7 +52,7 @@ def escape(blender: Any) -> Iterator[float | None]:
     loop, session_loop = blender.part("live.loop"), blender.part("operators.session_loop")
     # Long enough that the key comes in it for sure; else it is a tenth of a second every 20 s.
     usual = session_loop.EVERY, session_loop.MOMENT
-    session_loop.EVERY, session_loop.MOMENT = 0.5, 8.0
+    session_loop.EVERY, session_loop.MOMENT = 0.5, 5.0
     for name in ("VIEW_3D", "PROPERTIES"):
         blender.select(blender.beds()[0])
         blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
@@ -72,10 +60,10 @@ def escape(blender: Any) -> Iterator[float | None]:
         at = area.x + area.width // 2, area.y + area.height // 2
         blender.event("MOUSEMOVE", "NOTHING", at)
         yield from blender.until(loop.is_aside)
-        before = modal(), len(blender.part("sessions.running").list_sessions())
+        before = modal(), len(blender.sessions())
         blender.key("ESC", at)
         yield 0.5
-        after = len(blender.part("sessions.running").list_sessions())
+        after = len(blender.sessions())
         yield session_loop.MOMENT
         blender.SEEN[f"Esc over {name}"] = [*before, after, modal(), loop.token()]
     session_loop.EVERY, session_loop.MOMENT = usual
@@ -85,24 +73,18 @@ def counted(blender: Any, name: str) -> None:
     """Count the beds, those with a fingertip, the objects of the scene, those hidden, and the sessions."""
     view, scene = blender.part("device.view"), blender.window().scene
     tips = [view.fingertip_of(bed) for bed in blender.beds()]
+    whole = sum(tip is not None for tip in tips)
     hidden = sum(thing.hide_get() for thing in scene.objects)
-    sessions = len(blender.part("sessions.running").list_sessions())
-    blender.SEEN[name] = [
-        len(tips),
-        sum(tip is not None for tip in tips),
-        len(scene.objects),
-        hidden,
-        sessions,
-    ]
+    blender.SEEN[name] = [len(tips), whole, len(scene.objects), hidden, len(blender.sessions())]
 
 
 def looked(blender: Any, name: str) -> Iterator[float | None]:
     """Wait until Blender has done what was asked for and it was looked at; count."""
-    watch, tick = blender.part("device.unit"), blender.part("sessions.running").list_sessions
+    watch = blender.part("device.unit")
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
-    if tick():
-        yield from blender.until(lambda: not all(one.stale for one in tick()))
+    if blender.sessions():
+        yield from blender.until(lambda: not all(one.stale for one in blender.sessions()))
     yield 0.5
     counted(blender, name)
 
@@ -137,9 +119,7 @@ def units(blender: Any) -> Iterator[float | None]:
     blender.select(blender.beds()[0])
     yield from pressed(blender, "hidden", "H")
     yield from pressed(blender, "shown", "H", alt=True)
-    blender.select(blender.beds()[1])
-    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield from blender.settle()
+    yield from blender.start(blender.beds()[1])
     counted(blender, "session")
     # A bed with a session is not selected, so that no outline encloses its pins.
     blender.select(blender.beds()[1])

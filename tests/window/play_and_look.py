@@ -15,11 +15,7 @@ ARROW = 65
 
 def script(blender: Any) -> Iterator[float | None]:
     """Do one after the other, each on a bed that is at rest."""
-    yield from blender.empty_scene()
-    blender.call(bpy.ops.mesh.digital_clay_add)
-    bpy.ops.ed.undo_push(message="Add")
-    blender.key("HOME", blender.middle())
-    yield None
+    yield from blender.scene_with_bed()
     yield from gizmo(blender)
     yield from playback(blender)
     yield from windows(blender)
@@ -27,20 +23,9 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from views(blender)
 
 
-def start(blender: Any, window: Any = None) -> Iterator[float | None]:
-    """Start a session on the bed, at rest, in the first window or another one."""
-    blender.select(blender.beds()[0])
-    if window is None:
-        blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    else:
-        with bpy.context.temp_override(window=window):
-            bpy.ops.digiclay.session("INVOKE_DEFAULT")
-    yield from blender.settle()
-
-
 def gizmo(blender: Any) -> Iterator[float | None]:
     """Press the bed by dragging the gizmo's blue arrow."""
-    yield from start(blender)
+    yield from blender.start(blender.beds()[0])
     blender.select(blender.fingertip())
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.move")
     yield None
@@ -49,22 +34,24 @@ def gizmo(blender: Any) -> Iterator[float | None]:
     below.z -= 0.12
     here, there = np.array(blender.pixel(tip)), np.array(blender.pixel(below))
     arrow = here - ARROW * (there - here) / np.linalg.norm(there - here)
+
+    def mouse(at: Any, *kind: str) -> None:
+        blender.event(*(kind or ("MOUSEMOVE", "NOTHING")), tuple(np.rint(at).astype(int).tolist()))
+
     # The arrow is lit up by one move over it, and taken by the next event.
     for shift in (3, 1, 0):
-        blender.event("MOUSEMOVE", "NOTHING", tuple(np.rint(arrow + shift).astype(int).tolist()))
+        mouse(arrow + shift)
         yield None
-    blender.event("LEFTMOUSE", "PRESS", tuple(np.rint(arrow).astype(int).tolist()))
+    mouse(arrow, "LEFTMOUSE", "PRESS")
     for step in range(1, 7):
-        at = arrow + step / 6 * (there - here)
-        blender.event("MOUSEMOVE", "NOTHING", tuple(np.rint(at).astype(int).tolist()))
+        mouse(arrow + step / 6 * (there - here))
         yield None
         if step == 6:  # the pins give way as fast as the machine simulates them
             yield from blender.until(lambda: lowest(blender) < 39.9)
         blender.look(f"gizmo {step}")
     blender.shot("play_gizmo")
-    blender.event("LEFTMOUSE", "RELEASE", tuple(np.rint(arrow + there - here).astype(int).tolist()))
+    mouse(arrow + there - here, "LEFTMOUSE", "RELEASE")
     yield from blender.settle()
-    blender.look("gizmo")
     blender.key("ESC", blender.middle())
     yield 0.5
     at_rest(blender)
@@ -80,7 +67,7 @@ def playback(blender: Any) -> Iterator[float | None]:
     scene.frame_end = 48
     scene.sync_mode = "FRAME_DROP"  # software GL draws two frames a second
     scene.frame_set(1)
-    yield from start(blender)
+    yield from blender.start(blender.beds()[0])
     blender.call(bpy.ops.screen.animation_play)
     yield from blender.until(lambda: lowest(blender) < 39.5)
     blender.look("played")
@@ -96,12 +83,12 @@ def playback(blender: Any) -> Iterator[float | None]:
 
 def lowest(blender: Any) -> float:
     """Return the lowest pin drawn, mm."""
-    return float(1e3 * blender.part("bridge").read_cells(blender.beds()[0].data)["height"].min())
+    return float(blender.heights().min())
 
 
 def windows(blender: Any) -> Iterator[float | None]:
     """Close a second window in mid-session; then close the one the session was started in."""
-    yield from start(blender)
+    yield from blender.start(blender.beds()[0])
     bpy.ops.wm.window_new()
     yield 1.0
     yield from closed(blender, "second window closed")
@@ -109,20 +96,20 @@ def windows(blender: Any) -> Iterator[float | None]:
     yield 0.5
     bpy.ops.wm.window_new()
     yield 1.0
-    yield from start(blender, bpy.context.window_manager.windows[-1])
+    blender.select(blender.beds()[0])
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
+        bpy.ops.digiclay.session("INVOKE_DEFAULT")
+    yield from blender.settle()
     blender.look("started in the second")
     blender.call(bpy.ops.digiclay.take_record)
     yield from blender.settle()
-    yield from closed(
-        blender, "its own window closed", lambda: not blender.part("sessions.running").list_sessions()
-    )
-    kept = blender.part("recorded.takes").list_takes
-    blender.SEEN["kept when its window was closed"] = [entry.name for entry in kept(blender.beds()[0])]
-    bpy.ops.ed.undo()
-    yield 0.5
-    bpy.ops.ed.redo()
-    yield 0.5
-    blender.SEEN["kept after undo and redo"] = [entry.name for entry in kept(blender.beds()[0])]
+    yield from closed(blender, "its own window closed", lambda: not blender.sessions())
+    list_takes = blender.part("recorded.takes").list_takes
+    kept = blender.SEEN["kept"] = [[entry.name for entry in list_takes(blender.beds()[0])]]
+    for turn in (bpy.ops.ed.undo, bpy.ops.ed.redo):
+        turn()
+        yield 0.5
+    kept.append([entry.name for entry in list_takes(blender.beds()[0])])
 
 
 def closed(blender: Any, name: str, then: Callable[[], bool] = lambda: True) -> Iterator[float | None]:
@@ -142,34 +129,30 @@ def render(blender: Any) -> Iterator[float | None]:
     scene.collection.objects.link(scene.camera)
     scene.camera.location.z = 3.0
     scene.render.engine = "CYCLES"
-    scene.cycles.samples, scene.cycles.use_denoising = 256, False
-    scene.render.resolution_x, scene.render.resolution_y = 320, 240
+    scene.cycles.samples, scene.cycles.use_denoising = 128, False
+    scene.render.resolution_x, scene.render.resolution_y = 240, 180
     bpy.context.preferences.view.render_display_type = "NONE"
-    yield from start(blender)
+    yield from blender.start(blender.beds()[0])
     blender.call(bpy.ops.render.render, "INVOKE_DEFAULT")
     waits: list[str] = []
     blender.SEEN["waits in a render"] = waits
 
     def rendered() -> bool:
-        waits.extend(
-            {session.blocking_reason for session in blender.part("sessions.running").list_sessions()}
-            - set(waits)
-        )
+        waits.extend({session.blocking_reason for session in blender.sessions()} - set(waits))
         return not bpy.app.is_job_running("RENDER")
 
     yield from blender.until(rendered)
-    yield from blender.settle()
-    blender.look("rendered")
+    yield from blender.after("rendered")
 
 
 def views(blender: Any) -> Iterator[float | None]:
     """Press in an orthographic view, and in the top view of a quad view, and see what is written there."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
-    area, region = blender.view()
+    area, _ = blender.view()
     area.spaces.active.region_3d.view_perspective = "ORTHO"
     # Blender works out the matrices of a view when it draws it.
     yield from blender.until(lambda: area.spaces.active.region_3d.window_matrix[3][2] == 0.0)
-    yield from tapped(blender, region, area.spaces.active.region_3d, (-15.0, 9.0), "orthographic")
+    yield from tapped(blender, blender.pixel(blender.world(-15.0, 9.0)), "orthographic")
     blender.shot("play_orthographic")
     areas = len(blender.window().screen.areas)
     blender.call(bpy.ops.screen.screen_full_area)  # a quarter of a small view has no room for the overlay
@@ -177,8 +160,7 @@ def views(blender: Any) -> Iterator[float | None]:
     blender.part("operators.pin_view").pick_pins(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter(blender) is not None)
-    region = top_quarter(blender)
-    yield from tapped(blender, region, region.data, (15.0, -9.0), "quad view")
+    yield from tapped(blender, blender.pixel(blender.world(15.0, -9.0), top_quarter(blender)), "quad view")
     with drawn(blender) as marks:
         yield from blender.until(lambda: len(marks) == 4)
     blender.SEEN["drawn in the quarters"] = sorted(marks.values())
@@ -224,31 +206,17 @@ def drawn(blender: Any) -> Iterator[dict[int, tuple[bool, bool]]]:
         module.draw = draw
 
 
-def tapped(
-    blender: Any, region: Any, looking: Any, place: tuple[float, float], name: str
-) -> Iterator[float | None]:
-    """Press at a place of the bed, mm, in a region, and write down where the finger went down."""
-    from bpy_extras.view3d_utils import location_3d_to_region_2d
-    from mathutils import Vector
-
-    blender.evaluate()
-    scale = blender.part("bridge").SCALE * 1e-3
-    world = blender.beds()[0].matrix_world @ (Vector((*place, 40.0)) * scale)
-    seen = location_3d_to_region_2d(region, looking, world)
-    at = region.x + round(seen.x), region.y + round(seen.y)
+def tapped(blender: Any, at: tuple[int, int], name: str) -> Iterator[float | None]:
+    """Press at a pixel, and write down where the fingertip went down."""
     blender.event("MOUSEMOVE", "NOTHING", at)
     yield 0.3
     blender.event("LEFTMOUSE", "PRESS", at)
-    yield from blender.until(lambda: pressed(blender))
+    # The Press tool presses 4 mm below the pins.
+    yield from blender.until(lambda: blender.part("bridge").pose(blender.fingertip())[2] < 36.1e-3)
     blender.look(name)
     blender.event("LEFTMOUSE", "RELEASE", at)
     # Until the gesture has ended it takes the next press for its own.
     yield from blender.until(lambda: not held(blender))
-
-
-def pressed(blender: Any) -> bool:
-    """Tell whether the finger is down where the Press tool presses it, 4 mm below the pins."""
-    return bool(blender.part("bridge").pose(blender.fingertip())[2] < 36.1e-3)
 
 
 def held(blender: Any) -> bool:

@@ -10,7 +10,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from hand_strokes import add_bed, finish, focus_window, note, on_the_screen, take_tool
+
+from tests.window.hand_strokes import finish, note, on_the_screen, prepare
 
 HAND = Path(__file__).parent / "tablet" / "pen_hand.py"
 #: Row, mm, pressure, and tilt to the right and to the user, of each stroke; half its length, mm.
@@ -34,7 +35,7 @@ def draw(blender: Any, row: float, pressure: float, right: float, near: float) -
 
 def pressed(blender: Any, since: int) -> dict[str, Any]:
     """Return how low the finger came in a recording since a period, mm, and its turns there, w first."""
-    (session,) = blender.part("sessions.running").list_sessions()
+    (session,) = blender.sessions()
     poses = session.path[since:, 0]
     low = poses[:, 2].min()
     return {"lowest": 1e3 * float(low), "inside": poses[poses[:, 2] < low + 1e-5, 3:].tolist()}
@@ -42,18 +43,14 @@ def pressed(blender: Any, since: int) -> dict[str, Any]:
 
 def script(blender: Any) -> Iterator[float | None]:
     """Draw the strokes while a take is recorded."""
-    add_bed(blender)
-    take_tool(blender)
-    blender.call(bpy.ops.view3d.view_axis, type="TOP")
-    yield from focus_window()
-    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield from blender.settle()
+    yield from prepare(blender, "TOP")
+    yield from blender.start()
     blender.call(bpy.ops.digiclay.take_record)
     for name, stroke in STROKES.items():
-        (session,) = blender.part("sessions.running").list_sessions()
+        (session,) = blender.sessions()
         since = len(session.path)
         yield from finish(blender, draw(blender, *stroke))
         note(blender, name)
-        (session,) = blender.part("sessions.running").list_sessions()
+        (session,) = blender.sessions()
         blender.SEEN[name] |= {"outside": session.pose[3:].tolist(), **pressed(blender, since)}
     blender.shot("pen")

@@ -7,8 +7,9 @@ from typing import Any
 
 import bpy
 import numpy as np
-from hand_strokes import add_bed, drag, finish, focus_window, hand, on_the_screen, reset, to
 from mathutils import Vector
+
+from tests.window.hand_strokes import act, add_bed, finish, focus_window, line, on_the_screen, reset, to
 
 #: Places of the pins, mm: behind the cube, and beside it.
 COVERED, BARE = (15.0, -15.0), (-27.0, -27.0)
@@ -16,18 +17,12 @@ COVERED, BARE = (15.0, -15.0), (-27.0, -27.0)
 DISTANCE = 0.25
 
 
-def covered_place(blender: Any) -> Vector:
-    """Return where the covered place is in the world."""
-    scale = blender.part("bridge").SCALE * 1e-3
-    return blender.beds()[0].matrix_world @ Vector((scale * COVERED[0], scale * COVERED[1], 40.0 * scale))
-
-
 def put(blender: Any) -> None:
     """Put the cube between the eye of the view and the covered place."""
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)  # a view that has changed knows so when drawn
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
-    place = covered_place(blender)
+    place = blender.world(*COVERED)
     level = looking.view_perspective == "ORTHO" or looking.window_matrix[3][3] == 1.0
     eye = looking.view_matrix.inverted()
     way = eye.col[2].to_3d() if level else (eye.translation - place).normalized()
@@ -42,9 +37,8 @@ def try_both(blender: Any, name: str) -> Iterator[float | None]:
     blender.shot(f"past_{name}")
     seen = {}
     for what, place in (("covered", COVERED), ("bare", BARE)):
-        yield from finish(blender, hand(to(on_the_screen(blender, *place), 0.3), "click 1 sleep 0.3"))
-        sessions = blender.part("sessions.running").list_sessions()
-        seen[what] = sum(session.finished_strokes for session in sessions)
+        yield from act(blender, to(on_the_screen(blender, *place), 0.3), "click 1 sleep 0.3")
+        seen[what] = sum(session.finished_strokes for session in blender.sessions())
         seen[f"{what} selected"] = [thing.name for thing in blender.window().view_layer.objects.selected]
     blender.SEEN[name] = seen
     yield from reset(blender)
@@ -95,17 +89,14 @@ def drawn_under(blender: Any) -> Iterator[float | None]:
     """Press beside the cube and drag on behind it."""
     put(blender)
     yield 0.5
-    start, end = (on_the_screen(blender, x, COVERED[1]) for x in (-24.0, 24.0))
-    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "mouseup 1"))
-    bed = blender.beds()[0]
-    height = blender.part("bridge").read_cells(bed.data)["height"].reshape(25, 25)
-    blender.SEEN["drawn under"] = (1e3 * height[7]).tolist()
+    yield from finish(blender, line(blender, (-24.0, COVERED[1]), (24.0, COVERED[1])))
+    blender.SEEN["drawn under"] = blender.heights()[7].tolist()
     yield from reset(blender)
 
 
 def quarters(blender: Any) -> Iterator[float | None]:
     """Point at the covered place and the bare one in each quarter of a quad view, the cube above the bed."""
-    bpy.data.objects["Cube"].location = covered_place(blender) + Vector((0.0, 0.0, DISTANCE))
+    bpy.data.objects["Cube"].location = blender.world(*COVERED) + Vector((0.0, 0.0, DISTANCE))
     yield 1.0
     blender.shot("past_quarters")
     aim, found = blender.part("press.aim"), {}

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
 
-sys.path.append(str(Path(__file__).parents[2]))
-
 from tests.window.hand_strokes import (
-    add_bed,
+    act,
+    brush,
     drag,
     finish,
-    focus_window,
     hand,
+    line,
     note,
     on_the_screen,
+    prepare,
     reset,
-    take_tool,
+    rest,
+    stroke,
     to,
 )
 
@@ -34,43 +33,43 @@ WIDER = 4.0
 
 def script(blender: Any) -> Iterator[float | None]:
     """Do what a hand does."""
-    add_bed(blender)
-    blender.call(bpy.ops.view3d.view_axis, type="TOP")
+    yield from prepare(blender, "TOP")
     blender.call(bpy.ops.view3d.view_all)
-    take_tool(blender)
-    yield from focus_window()
     # The first press starts the session.
-    yield from finish(blender, hand(to(on_the_screen(blender, -24.0, -24.0)), "click 1"))
+    yield from act(blender, to(on_the_screen(blender, -24.0, -24.0)), "click 1")
     yield from sizes(blender)
     yield from reset(blender)
-    # What Ctrl-Z goes back to: a reset has no step of its own.
-    bpy.ops.ed.undo_push(message="Reset")
     yield from symmetric(blender)
-
-
-def settings(blender: Any) -> Any:
-    """Return the tool's settings."""
-    return blender.part("press.brush").tool_settings(bpy.context)
+    yield from shapes(blender)
 
 
 def write_down(blender: Any, name: str) -> None:
     """Note the sizes, in mm, and the sessions."""
     note(blender, name)
-    bed, tip = blender.beds()[0], blender.fingertip()
+    bed, settings = blender.beds()[0], brush(blender)
     session = blender.part("sessions.running").find(bed)
     blender.SEEN[name] |= {
         "size": bed.digiclay.size,
-        "drawn size": 2e3 * blender.part("bridge").finger_of(tip).width,
+        "drawn size": 2e3 * blender.part("bridge").finger_of(blender.fingertip()).width,
         "simulated": 2e3 * session.scene.fingers[0].fingertip.width if session else 0.0,
         "blister": bed.digiclay.blister.radius,
-        "depth": settings(blender).depth,
-        "strength": settings(blender).strength,
+        "depth": settings.depth,
+        "strength": settings.strength,
     }
 
 
-def keys(*names: str) -> str:
+def done(blender: Any, *words: str, name: str = "") -> Iterator[float | None]:
+    """Let the hand do it, and the sessions take it up; write down what there is then."""
+    process = hand(*words)
+    yield from blender.until(lambda: process.poll() is not None)
+    yield from rest(blender)
+    if name:
+        write_down(blender, name)
+
+
+def keys(names: str) -> str:
     """Return what types keys, one after the other."""
-    return " ".join(f"key {name} sleep 0.15" for name in names)
+    return " ".join(f"key {name} sleep 0.15" for name in names.split())
 
 
 def sizes(blender: Any) -> Iterator[float | None]:
@@ -79,75 +78,50 @@ def sizes(blender: Any) -> Iterator[float | None]:
     write_down(blender, "begun")
     yield from done(blender, to(start), keys("f"), drag(start, end, 0.4, 60))
     blender.shot("size_f")
-    yield from done(blender, "click 1")
-    write_down(blender, "larger")
-    yield from done(blender, keys("ctrl+z"))
-    write_down(blender, "undone")
-    yield from done(blender, to(start), keys("f"), drag(start, end, 0.4, 60), keys("Escape"))
-    write_down(blender, "escaped")
-    yield from done(blender, to(start), keys("f", "2", "4", "Return"))
-    write_down(blender, "typed")
-    yield from done(blender, to(start), keys("f", "1", "c", "m", "Return"))
-    write_down(blender, "typed cm")
-    yield from done(blender, keys("bracketright", "bracketright", "bracketleft"))
-    write_down(blender, "brackets")
-    yield from done(blender, keys("f", "1", "6", "Return"))
+    yield from done(blender, "click 1", name="larger")
+    yield from done(blender, keys("ctrl+z"), name="undone")
+    wider = to(start), keys("f"), drag(start, end, 0.4, 60)
+    yield from done(blender, *wider, keys("Escape"), name="escaped")
+    yield from done(blender, to(start), keys("f 2 4 Return"), name="typed")
+    yield from done(blender, to(start), keys("f 1 c m Return"), name="typed cm")
+    yield from done(blender, keys("bracketright bracketright bracketleft"), name="brackets")
+    yield from done(blender, keys("f 1 6 Return"))
     yield from done(blender, to(start), keys("shift+f"), drag(start, (start[0] + 40, start[1]), 0.4, 60))
     blender.shot("size_depth")
-    yield from done(blender, "click 1")
-    write_down(blender, "deeper")
-    yield from done(blender, keys("shift+f", "4", "Return", "ctrl+f", "5", "0", "Return"))
-    write_down(blender, "strength")
-    yield from done(blender, keys("ctrl+f", "1", "0", "0", "Return"))
-
-
-def done(blender: Any, *words: str) -> Iterator[float | None]:
-    """Let the hand do it, and the sessions take it up."""
-    process = hand(*words)
-    yield from blender.until(lambda: process.poll() is not None)
-    yield 0.5
-    yield from blender.settle(10)
+    yield from done(blender, "click 1", name="deeper")
+    yield from done(blender, keys("shift+f 4 Return ctrl+f 5 0 Return"), name="strength")
+    yield from done(blender, keys("ctrl+f 1 0 0 Return"))
 
 
 def symmetric(blender: Any) -> Iterator[float | None]:
     """Draw a stroke in one quarter of the bed, with both symmetries."""
-    settings(blender).symmetry = "XY"
-    start, end = (on_the_screen(blender, *place) for place in MIRRORED)
-    process = hand(to(start), "mousedown 1", drag(start, end, 0.8, 60), "mouseup 1")
-    yield from blender.until(lambda: process.poll() is not None)
-    blender.shot("symmetric")
-    yield from finish(blender, process)
-    note(blender, "symmetric")
-    yield from finish(blender, hand(keys("ctrl+z")))
+    brush(blender).symmetry = "XY"
+    yield from stroke(blender, "symmetric", *MIRRORED, 0.8, picture="symmetric")
+    yield from act(blender, keys("ctrl+z"))
     note(blender, "symmetric undone")
-    settings(blender).symmetry = "NONE"
+    brush(blender).symmetry = "NONE"
     yield from reset(blender)
-    yield from shapes(blender)
 
 
 def shapes(blender: Any) -> Iterator[float | None]:
     """Drag a line, then click with Shift; drag a ring; draw with a stabilizer."""
-    brush = settings(blender)
-    brush.path = "LINE"
-    start, end = on_the_screen(blender, -27.0, -24.0), on_the_screen(blender, 27.0, -24.0)
-    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 0.4, 60), "mouseup 1"))
-    brush.path = "FREE"
+    settings = brush(blender)
+    settings.path = "LINE"
+    yield from finish(blender, line(blender, (-27.0, -24.0), (27.0, -24.0), 0.4))
+    settings.path = "FREE"
     corner = on_the_screen(blender, 27.0, 27.0)
-    yield from finish(blender, hand(to(corner), "keydown shift sleep 0.1 click 1 sleep 0.1 keyup shift"))
+    yield from act(blender, to(corner), "keydown shift sleep 0.1 click 1 sleep 0.1 keyup shift")
     note(blender, "lines")
     yield from reset(blender)
-    brush.path = "RING"
-    start, end = on_the_screen(blender, 0.0, 0.0), on_the_screen(blender, RADIUS, 0.0)
-    process = hand(to(start), "mousedown 1", drag(start, end, 0.4, 60))
+    settings.path = "RING"
+    process = line(blender, (0.0, 0.0), (RADIUS, 0.0), 0.4, last="")
     yield from blender.until(lambda: process.poll() is not None)
     yield 0.5
     blender.shot("ring_preview")
-    yield from finish(blender, hand("mouseup 1"))
+    yield from act(blender, "mouseup 1")
     note(blender, "ring")
     blender.shot("ring")
     yield from reset(blender)
-    brush.path, brush.stabilizer = "FREE", 9.0
-    start, end = on_the_screen(blender, -27.0, 0.0), on_the_screen(blender, 27.0, 0.0)
-    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "mouseup 1"))
-    note(blender, "stabilized")
-    brush.stabilizer = 0.0
+    settings.path, settings.stabilizer = "FREE", 9.0
+    yield from stroke(blender, "stabilized", (-27.0, 0.0), (27.0, 0.0))
+    settings.stabilizer = 0.0

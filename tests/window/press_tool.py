@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import Any
 
 import addon_utils
 import bpy
-import numpy as np
 
-#: The pictures show the pins as a user sees them.
-FINE_PINS = True
+#: The guide's pictures show the pins as a user sees them.
+FINE_PINS = "DIGICLAY_SCREENSHOTS" in os.environ
 #: A finger that is on its way moves in each of so many ticks of its session.
-TICKS = 5
+TICKS = 3
 
 
 def drag(blender: Any, way: list[tuple[float, float]], pause: float = 0.3) -> Iterator[float | None]:
@@ -37,9 +37,7 @@ def come(blender: Any) -> Iterator[float | None]:
     for _ in range(480):
         yield 0.25
         now = tuple(blender.fingertip().location)
-        moment = max(
-            (session.tick for session in blender.part("sessions.running").list_sessions()), default=0
-        )
+        moment = max((session.tick for session in blender.sessions()), default=0)
         if now != last:
             last, still, since = now, 0, moment
             continue
@@ -55,18 +53,12 @@ def let_go(blender: Any, x: float, y: float) -> Iterator[float | None]:
     yield from come(blender)
 
 
-def heights(blender: Any) -> np.ndarray:
-    """Return the heights drawn, mm, rows by columns."""
-    bed = blender.beds()[0]
-    return 1e3 * blender.part("bridge").read_cells(bed.data)["height"].reshape(25, 25)
-
-
 def note(blender: Any, name: str) -> None:
     """Write down heights, where the finger is, what pins are picked, and whether the overlay is drawn."""
     blender.look(name)
     tip = blender.fingertip()
     blender.SEEN[name] |= {
-        "bed": heights(blender).round(4).tolist(),
+        "bed": blender.heights().round(4).tolist(),
         "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
         "overlay": blender.part("overlay.views").shown(),
         "forces written": bool(blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()),
@@ -79,9 +71,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     # Software GL draws a frame or two a second; in between the session is to catch up.
-    entry = bpy.context.preferences.addons.new()
-    entry.module = blender.EXTENSION
-    entry.preferences.most_periods = 100
+    blender.preferences().most_periods = 100
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     yield None
     note(blender, "added")
@@ -99,15 +89,9 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from drag(blender, [(0.0, -18.0)])
     yield from let_go(blender, 0.0, -18.0)
     note(blender, "tapped")
-    blender.key("Z", blender.middle(), ctrl=True)
-    yield from blender.settle()
-    note(blender, "tap undone")
-    blender.key("Z", blender.middle(), ctrl=True)
-    yield from blender.settle()
-    note(blender, "valley undone")
-    blender.key("Z", blender.middle(), ctrl=True, shift=True)
-    yield from blender.settle()
-    note(blender, "valley redone")
+    for name in ("tap undone", "valley undone", "valley redone"):
+        yield from blender.undo(name, redo="redone" in name)
+        note(blender, name)
 
     yield from depths(blender)
     yield from shown(blender)
@@ -143,12 +127,12 @@ def depths(blender: Any) -> Iterator[float | None]:
 def disabled(blender: Any) -> Iterator[float | None]:
     """Disable the extension with the tool in hand and the mouse over the bed, and go on moving it."""
     yield from blender.add_paper_bed()
-    workspace, at = bpy.context.window_manager.windows[0].workspace, blender.on_the_bed(-15, 5)
-    held = [workspace.tools.from_space_view3d_mode("OBJECT").idname]
+    tools, at = blender.window().workspace.tools, blender.on_the_bed(-15, 5)
+    held = [tools.from_space_view3d_mode("OBJECT").idname]
     blender.event("MOUSEMOVE", "NOTHING", at)
     yield 1.0
     addon_utils.disable(blender.EXTENSION)
-    held.append(workspace.tools.from_space_view3d_mode("OBJECT").idname)
+    held.append(tools.from_space_view3d_mode("OBJECT").idname)
     for step in range(3):
         blender.event("MOUSEMOVE", "NOTHING", (at[0] + 5 * step, at[1]))
         yield 1.0
@@ -158,16 +142,11 @@ def disabled(blender: Any) -> Iterator[float | None]:
 
 def shown(blender: Any) -> Iterator[float | None]:
     """Pick pins, color by force, show arrows, in the light theme and at another scale."""
-    bed = blender.beds()[0]
-    window = bpy.context.window_manager.windows[0]
-    window.view_layer.objects.active = bed
+    blender.window().view_layer.objects.active = blender.beds()[0]
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
     for x in (-12.0, 0.0, 12.0):
-        blender.event("MOUSEMOVE", "NOTHING", blender.on_the_bed(x, -27))
-        yield 0.2
-        blender.key("LEFTMOUSE", blender.on_the_bed(x, -27))
-        yield 0.3
+        yield from blender.click(blender.on_the_bed(x, -27))
     blender.key("RET", blender.middle())
     yield 0.5
     note(blender, "picked")
@@ -204,12 +183,12 @@ def shown(blender: Any) -> Iterator[float | None]:
 def ended(blender: Any) -> Iterator[float | None]:
     """End the session; then a press starts it anew, and losing the bed under the mouse ends the gesture."""
     blender.key("ESC", blender.middle())
-    yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
+    yield from blender.stopped()
     note(blender, "ended")
     yield from drag(blender, [(20.0, 20.0)])
     note(blender, "started anew")
     bpy.data.objects.remove(blender.beds()[0])
-    yield from blender.until(lambda: not blender.part("sessions.running").list_sessions())
+    yield from blender.stopped()
     blender.look("bed deleted")
     blender.event("LEFTMOUSE", "RELEASE", blender.middle())
     yield 0.5

@@ -1,4 +1,4 @@
-"""Three hundred random events at a running session: moves, undos, mode switches, deletes, and all keys."""
+"""Random events at a running session: moves, undos, mode switches, deletes, and all keys."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-EVENTS = 300
+EVENTS = 150
 #: After so many of them a session is started where none runs any more.
 REVIVED = 4
 #: What is done, and how often out of the sum.
@@ -18,10 +18,16 @@ CHOICES = {
     "add": 6, "start": 40, "stop": 4, "pause": 12, "step": 8, "rewind": 12, "reset": 6, "method": 8,
     "scale": 5, "workspace": 5, "scene": 5, "play": 6, "parameter": 5, "duplicate": 4, "save": 3, "load": 2,
 }  # fmt: skip
+#: Those of them that are a key.
+KEYS: dict[str, tuple[str, dict[str, bool]]] = {
+    "undo": ("Z", {"ctrl": True}), "redo": ("Z", {"ctrl": True, "shift": True}), "edit": ("TAB", {}),
+    "delete": ("DEL", {}), "stop": ("ESC", {}), "pause": ("P", {}), "step": ("P", {"shift": True}),
+    "rewind": ("BACK_SPACE", {}), "reset": ("BACK_SPACE", {"shift": True}),
+}  # fmt: skip
 
 
 class Events:
-    """The events, each a method that does one thing a user can do."""
+    """The events: a key, or a method that does one thing a user can do."""
 
     def __init__(self, blender: Any, source: random.Random) -> None:
         self.blender, self.source = blender, source
@@ -33,13 +39,20 @@ class Events:
         tips = [tip for tip in found if tip is not None]
         return self.source.choice(tips) if tips else None
 
+    def happen(self, name: str) -> None:
+        """Press the key of an event, or do what it is."""
+        if name in KEYS:
+            kind, modifiers = KEYS[name]
+            self.blender.key(kind, self.somewhere(), **modifiers)
+        else:
+            getattr(self, name)()
+
     def somewhere(self) -> tuple[int, int]:
         """Return a place in the 3D view."""
         _, region = self.blender.view()
         pick = self.source.random
-        return region.x + int(region.width * (0.2 + 0.5 * pick())), region.y + int(
-            region.height * (0.2 + 0.6 * pick())
-        )
+        x = region.x + int(region.width * (0.2 + 0.5 * pick()))
+        return x, region.y + int(region.height * (0.2 + 0.6 * pick()))
 
     def move(self) -> None:
         if self.tip is not None:
@@ -58,22 +71,10 @@ class Events:
             self.blender.event("MOUSEMOVE", "NOTHING", at)
         self.blender.key(self.source.choice(["LEFTMOUSE", "RIGHTMOUSE", "ESC", "RET"]), at)
 
-    def undo(self) -> None:
-        self.blender.key("Z", self.somewhere(), ctrl=True)
-
-    def redo(self) -> None:
-        self.blender.key("Z", self.somewhere(), ctrl=True, shift=True)
-
-    def edit(self) -> None:
-        self.blender.key("TAB", self.somewhere())
-
     def select(self) -> None:
         things = list(self.blender.window().view_layer.objects)
         if things and bpy.context.mode == "OBJECT":
             self.blender.select(self.source.choice(things))
-
-    def delete(self) -> None:
-        self.blender.key("DEL", self.somewhere())
 
     def add(self) -> None:
         if len(self.blender.beds()) < 3 and bpy.context.mode == "OBJECT":
@@ -101,7 +102,7 @@ class Events:
 
     def revive(self) -> None:
         """Have a session run again: what happens to none tells nothing about it."""
-        if self.blender.part("sessions.running").list_sessions():
+        if self.blender.sessions():
             return
         if bpy.context.mode != "OBJECT":
             self.operator(bpy.ops.object.mode_set, mode="OBJECT")
@@ -109,21 +110,6 @@ class Events:
             bed.scale = 1, 1, 1
         self.add()
         self.start()
-
-    def stop(self) -> None:
-        self.blender.key("ESC", self.somewhere())
-
-    def pause(self) -> None:
-        self.blender.key("P", self.somewhere())
-
-    def step(self) -> None:
-        self.blender.key("P", self.somewhere(), shift=True)
-
-    def rewind(self) -> None:
-        self.blender.key("BACK_SPACE", self.somewhere())
-
-    def reset(self) -> None:
-        self.blender.key("BACK_SPACE", self.somewhere(), shift=True)
 
     def method(self) -> None:
         methods = ["virtual_master", "cell_states", "plastic", "push_pull"]
@@ -165,9 +151,8 @@ class Events:
 
 def check(blender: Any) -> None:
     """Check that every session is a state that can be kept, and every bed shows finite pins."""
-    running, snapshot = blender.part("sessions.running"), blender.part("core.session.snapshot")
-    for session in running.list_sessions():
-        state = snapshot.load(session.system, session.snapshot)
+    for session in blender.sessions():
+        state = blender.part("core.session.snapshot").load(session.system, session.snapshot)
         height = state.row(0)
         assert np.isfinite(height).all()
         assert height.min() >= 0.0
@@ -182,11 +167,7 @@ def check(blender: Any) -> None:
 
 def script(blender: Any) -> Iterator[float | None]:
     """Do random things, checking after each; then form a bed in peace."""
-    yield from blender.empty_scene()
-    blender.call(bpy.ops.mesh.digital_clay_add, rows=15, columns=15)
-    bpy.ops.ed.undo_push(message="Add")
-    blender.key("HOME", blender.middle())
-    yield None
+    yield from blender.scene_with_bed(rows=15, columns=15)
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
     source = random.Random(20)
     events = Events(blender, source)
@@ -198,10 +179,10 @@ def script(blender: Any) -> Iterator[float | None]:
         done.append(name)
         if len(done) % REVIVED == 0:
             events.revive()
-        getattr(events, name)()
+        events.happen(name)
         yield 0.1
         check(blender)
-        live += bool(blender.part("sessions.running").list_sessions())
+        live += bool(blender.sessions())
     blender.SEEN["live"] = live
     blender.shot("session_random")
 
@@ -213,8 +194,7 @@ def script(blender: Any) -> Iterator[float | None]:
     bpy.ops.wm.read_homefile()
     yield 1.0
     blender.call(bpy.ops.mesh.digital_clay_add, rows=15, columns=15)
-    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield from blender.settle()
+    yield from blender.start()
     blender.fingertip().location.z = 0.45
     yield from blender.settle(5)
     blender.look("formed")

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
-sys.path.insert(0, str(Path(__file__).parent))
-from hand_strokes import add_bed, done, drag, finish, focus_window, hand, on_the_screen, to
+from tests.window.hand_strokes import act, add_bed, done, finish, focus_window, hand, line, on_the_screen, to
 
 
 def count_orange(name: str, blender: Any) -> int:
@@ -29,12 +27,10 @@ def count_orange(name: str, blender: Any) -> int:
 def rectangle_of_the_bed(blender: Any) -> list[float]:
     """Return left, bottom, right and top of the bed in its 3D view, pixels."""
     bed = blender.beds()[0]
-    from mathutils import Vector
-
     corners = np.array([blender.pixel(bed.matrix_world @ Vector(corner)) for corner in bed.bound_box])
     _, region = blender.view()
-    low, high = corners.min(axis=0) - (region.x, region.y), corners.max(axis=0) - (region.x, region.y)
-    return [float(value) for value in (*low, *high)]
+    corners -= (region.x, region.y)
+    return [float(value) for value in (*corners.min(axis=0), *corners.max(axis=0))]
 
 
 def note(blender: Any, name: str) -> None:
@@ -76,25 +72,23 @@ def script(blender: Any) -> Iterator[float | None]:
     middle = on_the_screen(blender, 0.0, 0.0)
     yield from levels_of_detail(blender)
     for name in ("alt s", "alt s again", "alt s once more"):
-        process = hand(to(middle), "key alt+s")
-        yield from done(blender, process)
+        yield from done(blender, hand(to(middle), "key alt+s"))
         note(blender, name)
     blender.call(bpy.ops.digiclay.session)
     yield from blender.settle(5)
-    start, end = on_the_screen(blender, -24.0, -12.0), on_the_screen(blender, 24.0, -12.0)
-    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "mouseup 1"))
+    yield from finish(blender, line(blender, (-24.0, -12.0), (24.0, -12.0)))
     note(blender, "pressed on the skin")
     blender.SEEN["bed"] = rectangle_of_the_bed(blender)
     bed = blender.beds()[0]
     bed.digiclay_display.overlay_full = True
-    yield from finish(blender, hand(to(on_the_screen(blender, 24.0, -8.0), 0.3)))
+    yield from act(blender, to(on_the_screen(blender, 24.0, -8.0), 0.3))
     note(blender, "overlay details")
     bed.digiclay_display.overlay_full = False
     for shown, kind in (("pins", "smooth"), ("skin", "membrane"), ("both", "smooth")):
         bed.digiclay_display.form, bed.digiclay_display.skin = shown, kind
-        yield from finish(blender, hand(to(on_the_screen(blender, 23.0, -9.0), 0.3)))
+        yield from act(blender, to(on_the_screen(blender, 23.0, -9.0), 0.3))
         note(blender, f"{shown} {kind}")
-    yield from finish(blender, hand("key Escape"))
+    yield from act(blender, "key Escape")
     note(blender, "stopped")
 
 
@@ -103,13 +97,8 @@ def levels_of_detail(blender: Any) -> Iterator[float | None]:
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
     distance = looking.view_distance
-    for name, times in (
-        ("near", 1.0),
-        ("between", 0.0),
-        ("far", 14.0),
-        ("between again", 0.0),
-        ("back", 1.0),
-    ):
+    steps = {"near": 1.0, "between": 0.0, "far": 14.0, "between again": 0.0, "back": 1.0}
+    for name, times in steps.items():
         # Between the limits: 3.5 pixels a pitch.
         looking.view_distance = distance * (times or pitch_in_pixels(blender, distance) / 3.5)
         area.tag_redraw()

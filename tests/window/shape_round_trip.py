@@ -11,7 +11,7 @@ import bpy
 def script(blender: Any) -> Iterator[float | None]:
     """Do what a user does; every yield lets Blender work off the events."""
     yield from blender.empty_scene()
-    yield from blender.add_bed()
+    yield from blender.add_paper_bed()
     yield from blender.open_sidebar()
     blender.key("HOME", blender.middle())
     yield None
@@ -26,13 +26,10 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.key("ESC", blender.middle())
     yield None
 
-    blender.select(blender.fingertip())
-    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield from blender.settle()
+    yield from blender.start(blender.fingertip())
     blender.look("started")
     yield from blender.grab((0, 0, -10), "Z", look_as="pressing")
     yield from blender.settle()
-    blender.look("pressed")
     blender.shot("shape_pressed")
     yield from blender.grab((0, 0, 25), "Z")
     yield from blender.settle()

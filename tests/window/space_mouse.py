@@ -30,9 +30,8 @@ def driver(folder: Path, blender: str) -> Iterator[str]:
     """Run the stand-in; yield the path of its socket."""
     path, mark = str(folder / "space_mouse"), folder / "made"
     # Where a true driver runs, the file is there already, and stays.
-    _run(
-        blender, f"import os; os.path.exists({USUAL!r}) or [open(n, 'x') for n in ({USUAL!r}, {str(mark)!r})]"
-    )
+    files = (USUAL, str(mark))
+    _run(blender, f"import os; os.path.exists({USUAL!r}) or [open(name, 'x') for name in {files!r}]")
     try:
         yield from _listen(path)
     finally:
@@ -42,16 +41,8 @@ def driver(folder: Path, blender: str) -> Iterator[str]:
 
 def _run(blender: str, words: str) -> None:
     """Run a line of Python in a Blender without a window."""
-    command = [
-        blender,
-        "--background",
-        "--factory-startup",
-        "--python-exit-code",
-        "3",
-        "--python-expr",
-        words,
-    ]
-    subprocess.run(command, check=True, timeout=300, capture_output=True)
+    options = "--background --factory-startup --python-exit-code 3 --python-expr"
+    subprocess.run([blender, *options.split(), words], check=True, timeout=300, capture_output=True)
 
 
 def _listen(path: str) -> Iterator[str]:

@@ -4,51 +4,34 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pytest
 from digiclay.settings.devices import BEDS, FIRST
 
-from tests.window.blender_window import played
+from tests.window.blender_window import Seen
 
+PLAYED = {"script": "first_minute.py", "size": (1100, 720), "by_hand": True}
 REST = 40.0
 GUIDE = Path(__file__).parents[2] / "docs" / "guide.md"
 
 
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Play the script once; return what stood in the scene after each of its steps."""
-    return played("first_minute.py", tmp_path_factory.mktemp("first"), size=(1100, 720), by_hand=True)
-
-
-def test_the_script_takes_the_steps_of_the_page(seen: dict[str, Any]) -> None:
+def test_the_script_takes_the_steps_of_the_page(seen: Seen) -> None:
     page = GUIDE.read_text(encoding="utf-8").partition("## First ridge")[2].partition("##")[0]
     steps = re.findall(r"^\d\. (.*?\.)(?=\s)", page, re.MULTILINE | re.DOTALL)
     assert [" ".join(step.split()) for step in steps] == seen["steps"]
 
 
-def test_add_frames_the_bed(seen: dict[str, Any]) -> None:
-    assert seen["added"] == 1
+def test_each_step_does_what_it_says(seen: Seen) -> None:
+    assert (seen["added"], seen["tab"]) == (1, "Digital Clay")
     # The factory file looks from 17 units away at its cube; bed and fingertip are 1.6 units wide.
     assert 1.0 < seen["distance"] < 6.0
-
-
-def test_all_the_factory_file_has_is_kept_and_no_pin_has_an_outline(seen: dict[str, Any]) -> None:
-    assert {"Cube", "Camera", "Light"} <= set(seen["things"])
-    assert seen["selected"] == []
-
-
-def test_add_makes_a_bed_to_design_on(seen: dict[str, Any]) -> None:
+    # No pin has an outline, and all the factory file has is kept.
+    assert (seen["selected"], {"Cube", "Camera", "Light"} <= set(seen["things"])) == ([], True)
     assert np.array(seen["drawn"]["bed"]).shape == (BEDS[FIRST].rows, BEDS[FIRST].columns) == (100, 100)
+    assert (seen["started"], seen["tool"], seen["left"]) == (1, "digiclay.press_tool", 0)
 
 
-def test_start_sculpting_takes_the_press_tool_in_hand(seen: dict[str, Any]) -> None:
-    assert seen["tab"] == "Digital Clay"
-    assert (seen["started"], seen["tool"]) == (1, "digiclay.press_tool")
-
-
-def test_a_ridge_stands_within_a_minute(seen: dict[str, Any]) -> None:
+def test_a_ridge_stands_within_a_minute(seen: Seen) -> None:
     bed = BEDS[FIRST]
     height = np.array(seen["drawn"]["bed"]) - REST
     x, y = (1e3 * bed.pitch * (np.arange(count) - (count - 1) / 2) for count in (bed.columns, bed.rows))
@@ -63,10 +46,6 @@ def test_a_ridge_stands_within_a_minute(seen: dict[str, Any]) -> None:
     assert seen["took"] - seen["waited"] < 60.0
 
 
-def test_esc_ends_the_session(seen: dict[str, Any]) -> None:
-    assert seen["left"] == 0
-
-
-def test_a_click_on_the_ball_takes_hold_of_the_fingertip_and_g_moves_it(seen: dict[str, Any]) -> None:
+def test_a_click_on_the_ball_takes_hold_of_the_fingertip_and_g_moves_it(seen: Seen) -> None:
     assert seen["taken hold of"]
     assert np.hypot(*seen["moved"][:2]) > 0.02

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-from tests.window.blender_window import BLENDER, played
+from tests.window.blender_window import BLENDER, Seen, played
 from tests.window.hand_strokes import HALF
 from tests.window.space_mouse import VARIABLE, driver
 
@@ -17,19 +15,16 @@ FORMED = 1.0
 
 
 @pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def seen(tmp_path_factory: pytest.TempPathFactory) -> Seen:
     """Play the script once, with a 3D mouse; return what stood in the scene after each of its steps."""
-    with (
-        driver(tmp_path_factory.mktemp("mouse"), BLENDER) as path,
-        pytest.MonkeyPatch.context() as environment,
-    ):
-        environment.setenv(VARIABLE, path)
+    with driver(tmp_path_factory.mktemp("mouse"), BLENDER) as path, pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, path)
         out = tmp_path_factory.mktemp("elsewhere")
         return played("hand_elsewhere.py", out, size=(800, 560), by_hand=True)
 
 
 @pytest.mark.parametrize("name", ["turned", "quarter", "second window"])
-def test_a_stroke_is_formed_wherever_the_hand_has_drawn(seen: dict[str, Any], name: str) -> None:
+def test_a_stroke_is_formed_wherever_the_hand_has_drawn(seen: Seen, name: str) -> None:
     # The path is that of the samples that the tool has queued while the button was held.
     path, bed = np.array(seen[name]["path"]), np.array(seen[name]["bed"])
     np.testing.assert_allclose(path[[0, -1]], [[-HALF, 0.0], [HALF, 0.0]], rtol=0, atol=2.0)
@@ -37,19 +32,13 @@ def test_a_stroke_is_formed_wherever_the_hand_has_drawn(seen: dict[str, Any], na
     assert (REST - bed[rows, columns] > FORMED).mean() >= 0.95
 
 
-def test_a_3d_mouse_turns_the_view_while_the_hand_draws(seen: dict[str, Any]) -> None:
+def test_a_3d_mouse_turns_the_view_and_the_wheels_of_a_trackpad_zoom_in_mid_stroke(seen: Seen) -> None:
     assert seen["turned"]["held"]
     assert seen["turned"]["turned"] > 0.03
-
-
-def test_the_wheels_of_a_trackpad_zoom_in_mid_stroke(seen: dict[str, Any]) -> None:
     assert seen["turned"]["nearer"] > 1.05
 
 
-def test_a_stroke_in_a_second_window_leaves_the_session_to_the_first(seen: dict[str, Any]) -> None:
+def test_a_second_window_leaves_the_session_to_the_first_and_one_click_leaves_sculpt_mode(seen: Seen) -> None:
     assert (seen["second window"]["windows"], seen["second window"]["sessions"]) == (2, 1)
-
-
-def test_one_click_leads_back_from_the_sculpting_workspace(seen: dict[str, Any]) -> None:
     assert seen["mode before"] == "SCULPT"
     assert seen["back"] == {"mode": "OBJECT", "tool": "digiclay.press_tool"}

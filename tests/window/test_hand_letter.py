@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import pytest
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.settings.devices import BEDS
 
 from benchmarks.made import find_relief
-from tests.window.blender_window import played
+from tests.window.blender_window import Seen
 
+PLAYED = {"script": "hand_letter.py", "size": (800, 560), "by_hand": True}
 REST = 40.0
 
 
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Play the script once; return what stood in the scene at its end."""
-    return played("hand_letter.py", tmp_path_factory.mktemp("letter"), size=(800, 560), by_hand=True)
-
-
-def test_a_letter_drawn_by_a_hand_is_what_was_intended(seen: dict[str, Any]) -> None:
+def test_a_letter_drawn_by_a_hand_is_what_was_intended(seen: Seen) -> None:
     bed = BEDS["design"]
     grid = make_grid(Layout(rows=bed.rows, columns=bed.columns, pitch=bed.pitch))
     intended = find_relief("letter_a", *grid.positions.T)

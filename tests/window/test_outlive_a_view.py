@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
-from tests.window.blender_window import played
+from tests.window.blender_window import Seen
+
+PLAYED = {"script": "outlive_a_view.py", "size": (800, 600)}
 
 
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Play the script once; a traceback anywhere in it ends `played`."""
-    return played("outlive_a_view.py", tmp_path_factory.mktemp("outlive"), (800, 600))
-
-
-def test_pins_are_picked_in_whichever_view_the_mouse_is_in(seen: dict[str, Any]) -> None:
+def test_pins_are_picked_in_whichever_view_the_mouse_is_in_and_its_workspace_has_the_keys(seen: Seen) -> None:
     # Row 1 of 9 lies 9 mm before the middle; columns 2 and 6, 6 mm to either side.
-    assert seen["picked"] == [9 + 2]
-    assert seen["clicked in the timeline"] == [9 + 2]
-    assert seen["picked elsewhere"] == [9 + 2, 9 + 6]
-
-
-def test_the_keys_stand_in_the_workspace_that_is_shown_and_go_with_the_operator(seen: dict[str, Any]) -> None:
-    assert seen["told in"] == ["Animation"]
-    assert seen["after Enter"] == [[], []]
+    places = ("picked", "clicked in the timeline", "picked elsewhere")
+    assert [seen[name] for name in places] == [[9 + 2], [9 + 2], [9 + 2, 9 + 6]]
+    assert (seen["told in"], seen["after Enter"]) == (["Animation"], [[], []])
 
 
 @pytest.mark.parametrize("area", ["VIEW_3D", "PROPERTIES"])
-def test_esc_stops_a_session_that_has_stepped_aside_for_a_moment(seen: dict[str, Any], area: str) -> None:
-    modal, running, after, later, token = seen[f"Esc over {area}"]
-    assert (modal, running) == ([], 1)
-    assert (after, later, token) == (0, [], 0)
+def test_esc_stops_a_session_that_has_stepped_aside_for_a_moment(seen: Seen, area: str) -> None:
+    # Modal operators and sessions before, and with the session's token after.
+    assert seen[f"Esc over {area}"] == [[], 1, 0, [], 0]
 
 
 #: Beds, those with a fingertip, objects in the scene (an ellipsoid each), hidden ones, sessions.
@@ -59,5 +47,5 @@ WHOLE = {
 
 
 @pytest.mark.parametrize("name", WHOLE)
-def test_a_bed_and_its_fingertip_are_one_under_the_hand(seen: dict[str, Any], name: str) -> None:
+def test_a_bed_and_its_fingertip_are_one_under_the_hand(seen: Seen, name: str) -> None:
     assert seen[name] == WHOLE[name]

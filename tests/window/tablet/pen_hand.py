@@ -20,13 +20,9 @@ class Device(ctypes.Structure):
     """Xlib's XDeviceInfo."""
 
     _fields_ = [
-        ("id", ctypes.c_ulong),
-        ("type", ctypes.c_ulong),
-        ("name", ctypes.c_char_p),
-        ("num_classes", ctypes.c_int),
-        ("use", ctypes.c_int),
-        ("classes", ctypes.c_void_p),
-    ]
+        ("id", ctypes.c_ulong), ("type", ctypes.c_ulong), ("name", ctypes.c_char_p),
+        ("num_classes", ctypes.c_int), ("use", ctypes.c_int), ("classes", ctypes.c_void_p),
+    ]  # fmt: skip
 
 
 class Pen:

@@ -1,30 +1,30 @@
-"""Smooths pins with the Press tool as a hand does: X events from outside, in continuous motion."""
+"""Raises, levels and smooths clay with the Press tool as a hand does: X events from outside."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.window.hand_strokes import (
-    add_bed,
-    drag,
+    act,
+    brush,
     finish,
-    focus_window,
-    hand,
+    line,
     note,
     on_the_screen,
-    take_tool,
+    prepare,
+    reset,
+    stroke,
     to,
 )
 
-#: Half the length of a stroke, mm; how long the hand takes for it, s, and moves a second.
-HALF, DURATION, RATE = 15.0, 0.6, 125
+#: Half the length of a stroke that raises, and of one that smooths, mm.
+LONG, HALF = 30.0, 15.0
+#: How long the hand takes for a stroke, s, and moves a second.
+QUICK, SLOWER = (0.5, 125), (0.6, 125)
 #: How far the pins stand out that are smoothed, m, and where, mm.
 SPIKE, SPIKES = 12e-3, ((0.0, 0.0), (0.0, 18.0))
 
@@ -52,23 +52,43 @@ def put_spikes(blender: Any) -> None:
     blender.call(bpy.ops.ed.undo_push, message="Spikes")
 
 
-def way(blender: Any, y: float) -> tuple[str, str]:
-    """Return what moves the hand to the start of a stroke along x, and along it."""
-    start, end = (on_the_screen(blender, x, y) for x in (-HALF, HALF))
-    return to(start), drag(start, end, DURATION, RATE)
-
-
 def script(blender: Any) -> Iterator[float | None]:
+    """Do both on the same bed."""
+    yield from prepare(blender)
+    yield from raise_and_level(blender)
+    yield from reset(blender)
+    yield from smooth(blender)
+
+
+def raise_and_level(blender: Any) -> Iterator[float | None]:
+    """Raise by the header's brush, by Ctrl, and lower by Ctrl; level the middle of what was lowered."""
+    settings = brush(blender)
+    for name, kind, y, key in (
+        ("raised", "RAISE", 0.0, ""),
+        ("inverted", "LOWER", -21.0, "ctrl"),
+        ("lowered", "RAISE", 0.0, "ctrl"),
+    ):
+        settings.brush, picture = kind, f"raise_{name}_under_way"
+        yield from stroke(blender, name, (-LONG, y), (LONG, y), *QUICK, key=key, picture=picture)
+        if name == "raised":
+            blender.shot("raise_ridge")
+        if name == "inverted":
+            yield from act(blender, "key ctrl+z")
+            note(blender, "raising undone")
+        if name != "lowered":
+            yield from reset(blender)
+    settings.brush = "LEVEL"
+    yield from stroke(blender, "leveled", (0.0, -24.0), (0.0, 24.0), *QUICK)
+    blender.shot("raise_level")
+    settings.brush = "LOWER"
+
+
+def smooth(blender: Any) -> Iterator[float | None]:
     """Smooth by Shift and by the header's brush, undo, cancel, and form a line by Shift and a click."""
-    add_bed(blender)
-    take_tool(blender)
-    yield from focus_window()
-    corner = on_the_screen(blender, -27.0, -27.0)
-    yield from finish(blender, hand(to(corner), "click 1"))
+    yield from act(blender, to(on_the_screen(blender, -27.0, -27.0)), "click 1")
     put_spikes(blender)
     yield from blender.settle(5)
     note(blender, "before")
-    start, along = way(blender, 0.0)
     first: list[list[float]] = []
 
     def started() -> bool:
@@ -77,7 +97,7 @@ def script(blender: Any) -> Iterator[float | None]:
             first.append([1e3 * strokes[-1].samples[0].x, 1e3 * strokes[-1].samples[0].y])
         return bool(strokes)
 
-    process = hand(start, "keydown shift sleep 0.2 mousedown 1", along, "mouseup 1 keyup shift")
+    process = line(blender, (-HALF, 0.0), (HALF, 0.0), *SLOWER, key="shift")
     yield from blender.until(started)
     yield from blender.until(lambda: process.poll() is not None)
     blender.shot("smooth_shift_under_way")
@@ -85,7 +105,7 @@ def script(blender: Any) -> Iterator[float | None]:
     note(blender, "smoothed")
     blender.SEEN["smoothed"]["first"] = first[-1]
     blender.shot("smooth_shift")
-    yield from finish(blender, hand(to(on_the_screen(blender, 0.0, -30.0)), "key ctrl+z"))
+    yield from act(blender, to(on_the_screen(blender, 0.0, -30.0)), "key ctrl+z")
     note(blender, "undone")
     yield from by_brush(blender)
     yield from click(blender)
@@ -93,19 +113,17 @@ def script(blender: Any) -> Iterator[float | None]:
 
 def by_brush(blender: Any) -> Iterator[float | None]:
     """Smooth with the brush of the header; then once more, and take that back by Esc."""
-    settings = blender.part("press.brush").tool_settings(bpy.context)
+    settings = brush(blender)
     settings.brush = "SMOOTH"
-    start, along = way(blender, 18.0)
-    process = hand(start, "mousedown 1", along)
+    process = line(blender, (-HALF, 18.0), (HALF, 18.0), *SLOWER, last="")
     yield from blender.until(lambda: process.poll() is not None)
     blender.shot("smooth_brush_under_way")
-    yield from finish(blender, hand("mouseup 1"))
+    yield from act(blender, "mouseup 1")
     note(blender, "by brush")
     blender.shot("smooth_brush")
-    start, along = way(blender, 0.0)
-    process = hand(start, "mousedown 1", along, "sleep 2")
+    process = line(blender, (-HALF, 0.0), (HALF, 0.0), *SLOWER, last="sleep 2")
     yield from blender.until(lambda: any(one.reached for one in find_session(blender).strokes))
-    yield from finish(blender, hand("key Escape sleep 0.2 mouseup 1"))
+    yield from act(blender, "key Escape sleep 0.2 mouseup 1")
     yield from finish(blender, process)
     note(blender, "escaped")
     settings.brush = "LOWER"
@@ -114,6 +132,6 @@ def by_brush(blender: Any) -> Iterator[float | None]:
 def click(blender: Any) -> Iterator[float | None]:
     """Press once, then click with Shift: the line between the two."""
     ends = [on_the_screen(blender, x, -24.0) for x in (-27.0, 27.0)]
-    yield from finish(blender, hand(to(ends[0]), "click 1"))
-    yield from finish(blender, hand(to(ends[1]), "keydown shift sleep 0.2 click 1 sleep 0.2 keyup shift"))
+    yield from act(blender, to(ends[0]), "click 1")
+    yield from act(blender, to(ends[1]), "keydown shift sleep 0.2 click 1 sleep 0.2 keyup shift")
     note(blender, "line")

@@ -1,0 +1,71 @@
+"""A quick drag raises all along its way, Shift smooths or forms a line: X events from outside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.window.blender_window import Seen
+from tests.window.hand_brushes import HALF, LONG, SPIKE
+
+PLAYED = {"script": "hand_brushes.py", "size": (1100, 640), "by_hand": True}
+REST = 40.0
+#: The columns of the bed that lie on the strokes that raise, 3 mm a pin.
+COLUMNS = np.abs(np.arange(-36, 37, 3)) <= LONG
+#: Rows and column of the pins that stand out.
+MIDDLE, ABOVE = (12, 12), (18, 12)
+
+
+def up(seen: Seen, name: str) -> np.ndarray:
+    """Return how far the pins are up, mm, rows by columns."""
+    return np.array(seen[name]["bed"]) - REST
+
+
+@pytest.mark.parametrize(("name", "row"), [("raised", 12), ("inverted", 5)])
+def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen: Seen, name: str, row: int) -> None:
+    risen = up(seen, name)[row, COLUMNS]
+    assert (np.abs(risen - 15.0) < 2.0).mean() >= 0.95
+
+
+def test_ctrl_makes_raise_lower_and_level_fills_a_valley_that_it_crosses(seen: Seen) -> None:
+    assert (up(seen, "lowered")[12, COLUMNS] < -1.0).mean() >= 0.95
+    assert up(seen, "lowered")[12, 12] < -1.0
+    # The pin in the middle of the crossing, and its neighbors along the stroke.
+    np.testing.assert_allclose(up(seen, "leveled")[10:15, 12], 0.0, rtol=0, atol=1.5)
+
+
+def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen: Seen) -> None:
+    before, smoothed = up(seen, "before"), up(seen, "smoothed")
+    assert before[MIDDLE] == pytest.approx(1e3 * SPIKE, abs=1e-3)
+    assert smoothed[MIDDLE] < 0.4e3 * SPIKE
+    assert seen["smoothed"]["drawn"] == seen["before"]["drawn"] + 1
+    # What one pin gives the others get, and those outside the ring stay.
+    assert smoothed.sum() == pytest.approx(before.sum(), abs=625 * 0.01)
+    outside = np.abs(np.arange(25) - 12) > 3
+    np.testing.assert_array_equal(smoothed[outside], before[outside])
+    # It begins where the mouse went down, by 0.3 mm a pixel: a drag is told from a click after 3 of them.
+    np.testing.assert_allclose(seen["smoothed"]["first"], [-HALF, 0.0], atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "tolerance"),
+    [
+        # The script's reset before it was no undo step: what it removed is there again, as it was when the
+        # stroke ended; pins still settled then by some µm.
+        pytest.param("raising undone", "raised", 0.05, id="a raised ridge is one undo step"),
+        pytest.param("undone", "before", 1e-3, id="Ctrl-Z takes the smoothing back"),
+        pytest.param("escaped", "by brush", 1e-3, id="Esc in mid-stroke leaves the bed as before"),
+    ],
+)
+def test_what_is_taken_back_is_as_before(seen: Seen, name: str, before: str, tolerance: float) -> None:
+    np.testing.assert_allclose(up(seen, name), up(seen, before), rtol=0, atol=tolerance)
+    assert seen[name]["sessions"] == 1
+    assert np.abs(up(seen, "inverted") - up(seen, "raised")).max() > 10.0
+
+
+def test_the_brush_of_the_header_smooths_without_shift(seen: Seen) -> None:
+    assert up(seen, "by brush")[ABOVE] < 0.4e3 * SPIKE
+
+
+def test_shift_and_a_click_still_form_a_line(seen: Seen) -> None:
+    assert up(seen, "line")[4, 3:22].max() < -1.0
