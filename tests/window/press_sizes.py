@@ -39,6 +39,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from act(blender, to(on_the_screen(blender, -24.0, -24.0)), "click 1")
     yield from sizes(blender)
     yield from reset(blender)
+    bpy.ops.ed.undo_push(message="Reset")  # what Ctrl-Z goes back to: a reset has no step of its own
     yield from symmetric(blender)
     yield from shapes(blender)
 
