@@ -21,8 +21,9 @@ from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.features import Finding
-from digiclay.core.surface.formed import Body, Formed, compute_volume
+from digiclay.core.surface.formed import Body, Formed
 
+from tests.prisms import compute_volume
 from tests.timeouts import TIMEOUT
 
 BED = Layout(rows=7, columns=5, arrangement="hexagonal")

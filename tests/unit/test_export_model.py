@@ -11,9 +11,9 @@ from digiclay.core.mesh_io.export_model import KINDS, Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.features import Finding
-from digiclay.core.surface.formed import NO_PIN, Body, Formed, compute_volume, make_formed
+from digiclay.core.surface.formed import NO_PIN, Body, Formed, make_formed
 
-from tests.prisms import prism_volume
+from tests.prisms import compute_volume, prism_volume
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 

@@ -162,7 +162,9 @@ class CellStatesControl:
 
     def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, Disc | None]:
         """Find where the fingertip presses, and how far its blister can reach; see `Controller`."""
-        pressed = touched.force > self._least(touched.mode)
+        # A cell that follows counts with what it reads: of a fingertip that rises the few readings above the
+        # noise would draw the centroid to and fro.
+        pressed = touched.force > (~_under_finger(touched.mode) * self.floor if self.floor else 0.0)
         if not any_true(pressed):
             return memory, None
         force, basis = touched.force[pressed], touched.quadratic_basis[:, pressed]
@@ -194,14 +196,6 @@ class CellStatesControl:
         mode = self._resting(mode, target, seen.force)
         seen.own[0] = np.where(mode == Mode.CRITICAL, seen.own[0] + 1.0, 0.0)
         return memory, Commands(target, mode, self._commands(seen, mode, target, under))
-
-    def _least(self, mode: Modes) -> Floats | float:
-        """Return the force above which a cell counts to the patch, N: one that follows keeps what it reads.
-
-        The forces fall below the noise when the fingertip rises; the few readings that do not would draw the
-        centroid to and fro.
-        """
-        return np.where(_under_finger(mode), 0.0, self.floor) if self.floor else 0.0
 
     def _by_force(self, seen: Measurement) -> dict[str, Flags]:
         """Return the conditions of `BY_FORCE`."""

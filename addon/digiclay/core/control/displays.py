@@ -32,7 +32,7 @@ from .drive import (
     make_drive,
     raise_felt_force,
 )  # fmt: skip
-from .servo import take_cells
+from .servo import declare_again, take_cells
 
 #: How the name of a file of values ends.
 FILE = ".npy"
@@ -207,11 +207,8 @@ class ShapeDisplay(DriveParameters):
         source="Zhu 2005",
         choices=("one_time", "gradual", "approximate_gradual"),
     )
-    surfaces: int = quantity(
-        5, "number of intermediate surfaces of a gradual refresh, including the last", symbol="n_s",
-        at_least=1, at_most=1000,
-    )  # fmt: skip
-    patience: float = quantity(2.0, "time limit of a move", unit="s", symbol="t_p", above=0.0)
+    surfaces: int = declare_again(Shape, "surfaces")
+    patience: float = declare_again(Shape, "patience")
 
     def check(self) -> None:
         """The shape has a name, or is a file."""

@@ -242,7 +242,8 @@ class HybridControl:
         expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
         (here,) = self.pulp.observe(own[at.pulp], force, expected).nonzero()
         own[at.coming] = own[at.later]
-        if not felt.size and not self._is_felt(force.take(here)):
+        # Forces under the predicted fingertip are felt where they are more than their noise together.
+        if not felt.size and not float(np.add.reduce(force.take(here))) > self.felt * math.sqrt(here.size):
             own[at.residual] = 0.0
             waiting: Follower = self._loss.wait(memory)
             return waiting
@@ -252,10 +253,6 @@ class HybridControl:
         if felt.size and self._has_jumped(memory.estimate, touched.quadratic_basis[1:3, felt]):
             return self._find(memory._replace(losses=memory.losses + 1), touched, felt)
         return self._fit(memory, touched, here, touched.quadratic_basis.take(here, 1))
-
-    def _is_felt(self, force: Floats) -> bool:
-        """Tell whether forces under the predicted fingertip, N, are more than their noise together."""
-        return float(np.add.reduce(force)) > self.felt * math.sqrt(force.size)
 
     def _holds(self, memory: Follower, force: float) -> bool:
         """Tell whether a fingertip is slow, and a total force, N, near the set point: then less is solved."""
@@ -342,7 +339,9 @@ class HybridControl:
         else:
             asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
             if memory.period % EVERY and self._holds(memory, force):
-                top, coming = self._keep_top(memory, seen)
+                top, coming = self._move_top(memory), asked + trim
+                later = seen.own[self._at.later]
+                later += top - memory.top
             else:
                 top, coming = self._solve_top(memory, seen, region, coasting)
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
@@ -369,13 +368,6 @@ class HybridControl:
             Phase.SHAPING, x, y, top, 0.0, top, memory.edge, memory.heading, top, 0, memory.losses
         )
         return memory._replace(master=master, doubt=0.0)
-
-    def _keep_top(self, memory: Follower, seen: Measurement) -> tuple[float, float]:
-        """Return the height of the top, m, along with the fingertip, and the force that it keeps, N."""
-        top = self._move_top(memory)
-        later = seen.own[self._at.later]
-        later += top - memory.top
-        return top, self.parameters.force_setpoint + memory.trim
 
     def _move_top(self, memory: Follower) -> float:
         """Return the height of the top, m, along with the fingertip for a period."""

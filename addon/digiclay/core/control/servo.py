@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Constants, Flags, Floats, Modes, any_true
-from ..base.quantity import quantity
+from ..base.quantity import Parameters, quantity
 from .methods import ControlParameters
 
 
@@ -55,7 +55,7 @@ class Tracking(ControlParameters):
         return Constants((self.position_gain, self.dead_band, 1.0, -1.0, 0.0))
 
 
-def declare_again(owner: type[ControlParameters], name: str, default: float | None = None) -> Any:
+def declare_again(owner: type[Parameters], name: str, default: float | None = None) -> Any:
     """Declare a parameter as another class does, with a default of its own or the same one."""
     field = next(field for field in dataclasses.fields(owner) if field.name == name)
     return dataclasses.field(default=field.default if default is None else default, metadata=field.metadata)

@@ -12,7 +12,7 @@ from ..base.quantity import Parameters, quantity
 from ..surface.features import Feature, Finding, find
 from ..surface.formed import NO_PIN, Body, Formed
 from ..surface.pins_solid import make_pins_solid
-from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
+from ..surface.skin_mesh import BASE_THICKNESS, make_solid
 from ..surface.skins import SKINS, SurfaceGrid, fit_skin
 
 #: Kinds of mesh, by name, with their lines in the help.
@@ -77,7 +77,12 @@ def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) ->
                 f"There is no feature of {wanted} off the former surface: lower the threshold or the "
                 "smallest number of pins."
             )
-        return [_feature(formed, feature) for feature in features]
+        solids = [make_feature_solid(feature) for feature in features]
+        nearest = [formed.nearest(body.vertices[:, :2]) for body in solids]
+        return [
+            replace(body, values=_of_pins(formed, body.vertices, owner))
+            for body, owner in zip(solids, nearest, strict=True)
+        ]
     features = find(skin, finding) if finding else []
     names = tuple(feature.name for feature in features)
     label = np.zeros(len(formed.height), np.int32)
@@ -94,9 +99,9 @@ def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Faces)
         vertices, faces = np.column_stack([grid.position, grid.height]), grid.faces
         values = grid.values()
     else:
-        level = find_base_level(grid.height, base_thickness=model.base_thickness)
-        vertices, faces = make_solid(grid.position, grid.height, grid.rows, grid.columns, base=level)
-        values = grid.values_with_base(level)
+        shape = grid.rows, grid.columns
+        vertices, faces = make_solid(grid.position, grid.height, *shape, model.base_thickness)
+        values = grid.values_with_base(vertices[-1, 2])
     group, vertex_group = np.empty((2, 0), np.int32)
     if names:
         group, vertex_group = np.zeros(len(faces), np.int32), np.zeros(len(vertices), np.int32)
@@ -109,7 +114,7 @@ def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Faces)
 
 def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Faces) -> Body:
     """Return the stepped bed; walls and undersides are in the feature of their pin."""
-    vertices, faces, pin = make_pins_solid(formed, base_thickness=model.base_thickness)
+    vertices, faces, pin = make_pins_solid(formed, model.base_thickness)
     owner = np.full(len(vertices), NO_PIN)
     # Every vertex above the base is a corner, or the middle, of some pin's top; these have the middle first.
     tops = faces[:, 0] < len(formed.height)
@@ -118,13 +123,6 @@ def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Faces) ->
     if names:
         group, vertex_group = label[pin], np.where(owner >= 0, label[owner], 0).astype(np.int32)
     return Body("pins", vertices, faces, _of_pins(formed, vertices, owner), names, group, vertex_group)
-
-
-def _feature(formed: Formed, feature: Feature) -> Body:
-    """Return the body of a feature; its vertices have force and mode of the nearest pin."""
-    body = make_feature_solid(feature)
-    nearest = formed.nearest(body.vertices[:, :2])
-    return replace(body, values=_of_pins(formed, body.vertices, nearest))
 
 
 def _of_pins(formed: Formed, vertices: Floats, owner: Indices) -> dict[str, Floats]:

@@ -36,11 +36,6 @@ class Read(NamedTuple):
     up: str
 
 
-def find_library(kind: str) -> str:
-    """Return the library that reads a format, ``""`` where none is needed."""
-    return "trimesh" if kind in CHECKS else ""
-
-
 def read(path: Path) -> Read:
     """Read a mesh in the format of its extension, one of `MESHES`; raises OSError or ParameterError."""
     kind = path.suffix.lower()

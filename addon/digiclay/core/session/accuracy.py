@@ -147,7 +147,12 @@ def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
     monitor = replace(monitor, age=monitor.age + 1)
     if monitor.state is None:
         return begin_stretch(monitor, after)
-    return _note_period(monitor, after, path) if monitor.age <= STRETCH else monitor
+    if monitor.age > STRETCH:
+        return monitor
+    kept = after._replace(active=replace(after.active, block=after.active.block.copy()))
+    ended = monitor.age == STRETCH
+    reached = np.stack([after.row(0), after.row(monitor.system.rows.force)]) if ended else None
+    return replace(monitor, waiting=(*monitor.waiting, (kept, path)), reached=reached)
 
 
 def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMonitor, Errors | None]:
@@ -155,31 +160,17 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
     # Ticks of more periods than the one before take the longest already.
     longer, monitor = count > monitor.before, replace(monitor, before=count)
     due = 0 if longer else min(monitor.age // SPREAD - monitor.done, max(1, count // SPREAD))
-    state, force = monitor.state, monitor.system.rows.force
+    state, system = monitor.state, monitor.system
     while state is not None and due > 0:
         due -= 1
         with np.errstate(over="ignore", invalid="ignore"):
-            state, waiting = _integrate(monitor.system, state, monitor.waiting)
+            (leader, way), *waiting = monitor.waiting
+            poses = interpolate_poses(way, system.instants / system.period)
+            state = repeat_period(system, state, trace_fingers(system, poses)[0], leader)
         if not np.isfinite(state.active.block).all():
             return begin_stretch(reset(monitor), after), None
         if not waiting and monitor.reached is not None:
-            found = compare(state.row(0), state.row(force), *monitor.reached)
+            found = compare(state.row(0), state.row(system.rows.force), *monitor.reached)
             return replace(monitor, state=None, waiting=(), reached=None), Errors.estimate(found)
-        monitor = replace(monitor, state=state, waiting=waiting, done=monitor.done + 1)
+        monitor = replace(monitor, state=state, waiting=tuple(waiting), done=monitor.done + 1)
     return monitor, None
-
-
-def _integrate(system: System, before: State, waiting: Noted) -> tuple[State, Noted]:
-    """Return the reference after one more period, and the periods that wait after that."""
-    (leader, way), *rest = waiting
-    finger = trace_fingers(system, interpolate_poses(way, system.instants / system.period))[0]
-    return repeat_period(system, before, finger, leader), tuple(rest)
-
-
-def _note_period(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
-    """Return the monitor with one more period that the reference has still to do."""
-    kept = after._replace(active=replace(after.active, block=after.active.block.copy()))
-    waiting, reached = (*monitor.waiting, (kept, path)), None
-    if monitor.age == STRETCH:
-        reached = np.stack([after.row(0), after.row(monitor.system.rows.force)])
-    return replace(monitor, waiting=waiting, reached=reached)

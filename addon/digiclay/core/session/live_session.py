@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..base.arrays import Floats
-from ..control.smoothing import ORDER
+from ..control.smoothing import ORDER, order_periods
 from ..engine.simulation import advance, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
@@ -60,19 +60,13 @@ def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int
         return 0, replace(clock, seen=now)
     gone = max(0.0, now - clock.seen)
     whole = math.floor((clock.left + gone) / period + SLACK)
-    count = max(0, min(whole, most, _count_affordable(clock, gone)))
+    affordable = max(1, int(SHARE * max(gone, SHORTEST) / clock.cost)) if clock.cost > 0.0 else most
+    count = max(0, min(whole, most, affordable))
     left = max(0.0, clock.left + gone - whole * period)
     ticks = (*clock.ticks, (gone, count * period))
     while len(ticks) > 1 and sum(time for time, _ in ticks[1:]) >= WINDOW:
         ticks = ticks[1:]
     return count, replace(clock, seen=now, left=left, ticks=ticks)
-
-
-def _count_affordable(clock: Clock, gone: float) -> int:
-    """Return how many periods this machine can do in the time between two ticks, at least 1."""
-    if clock.cost <= 0.0:
-        return 2**31
-    return max(1, int(SHARE * max(gone, SHORTEST) / clock.cost))
 
 
 def update_cost(clock: Clock, count: int, took: float) -> Clock:
@@ -113,8 +107,6 @@ def simulate_path(
 
 def _order_smoothing(system: System, smoothing: Floats) -> Iterator[System]:
     """Yield the system of each control period of a bed that is smoothed."""
-    from ..control.smoothing import order_periods
-
     method = system.controller
     for controller in order_periods(method, system.grid, system.cell, system.period, smoothing):
         yield system if controller is method else replace(system, controller=controller)

@@ -14,7 +14,12 @@ from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.actuator import Actuator
 from ..model.layout import Grid
-from .request import Placement, Relief, Shape, Tops
+from .heightmap import HeightMap
+from .mesh_relief import ShapeMesh
+from .request import Placement, Shape, Tops
+
+#: A shape from a file, in the unit of that.
+Relief = HeightMap | ShapeMesh
 
 HINT = "Take the shape in again."
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from ..base.arrays import Flags, Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..model.layout import Grid
 
 #: Lengths a file can be in: meters in one of them.
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
@@ -97,30 +96,3 @@ class Tops(NamedTuple):
     """(n,): Pins over which another part of the shape lies below the top: it cannot be displayed."""
     filled: int = 0
     """Pins under small holes, whose values are taken from around."""
-
-
-class Relief(Protocol):
-    """Shape in the unit of its file."""
-
-    @property
-    def name(self) -> str:
-        """Name in messages."""
-
-    @property
-    def box(self) -> tuple[float, float, float, float]:
-        """Least x, least y, largest x, largest y of its plan."""
-
-    @property
-    def length(self) -> float | None:
-        """Meters in the unit of its plan; None where that has no length, as a picture's pixels."""
-
-    @property
-    def value_length(self) -> float | None:
-        """Meters in the unit of its heights; None where they are no lengths, as a picture's."""
-
-    @property
-    def underside(self) -> float | None:
-        """Its lowest point; None where there is nothing below the top surface."""
-
-    def tops(self, grid: Grid, at: Placement) -> Tops:
-        """Return its top surface at the pins."""

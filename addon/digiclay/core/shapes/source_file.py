@@ -10,17 +10,19 @@ from ..base.errors import ParameterError, SceneError
 from ..files.formats import map_array
 from ..files.run_folder import find_file, list_files
 from ..mesh_io import mesh_reader
+from ..mesh_io.mesh_limits import make_refusal
 from ..mesh_io.mesh_reader import MESHES
 from ..model.actuator import Actuator
 from ..model.layout import Grid
-from .fitting import Fitted, fit_given, fit_relief
+from .fitting import Fitted, Relief, fit_given, fit_relief
 from .heightmap import PICTURES, HeightMap, make_height_map, read_pixels
 from .mesh_relief import ShapeMesh, make_shape_mesh
-from .request import AUTO, LENGTHS, Relief, Shape
+from .request import AUTO, LENGTHS, Shape
 
 #: Where the sample shapes are.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "shapes"
 ARRAY = ".npy"
+UNREADABLE = "must be a file that can be read"
 #: What a file of this kind of shape may end with.
 KINDS = (*MESHES, *PICTURES, ARRAY)
 
@@ -59,7 +61,7 @@ def read(shape: Shape) -> Relief:
 def import_reader(path: Path) -> None:
     """Import the library that reads a file before it can be interrupted; a missing one is refused later."""
     kind = path.suffix.lower()
-    reader = "PIL.Image" if kind in PICTURES else mesh_reader.find_library(kind)
+    reader = "PIL.Image" if kind in PICTURES else "trimesh" if kind in mesh_reader.CHECKS else ""
     if reader:
         with suppress(ImportError):
             importlib.import_module(reader)
@@ -70,15 +72,10 @@ def _array(path: Path) -> HeightMap:
     try:
         values = map_array(path)
     except OSError as error:
-        raise _make_error("a file", path, error.strerror or "not an array") from None
+        raise make_refusal(UNREADABLE, str(path), error.strerror or "not an array") from None
     except ValueError:
         raise ParameterError("shape", "file", "must hold one array of numbers", str(path)) from None
     return make_height_map(path.name, values, value_length=1.0)
-
-
-def _make_error(kind: str, path: Path, reason: str) -> ParameterError:
-    """Return the error of a file that cannot be read."""
-    return ParameterError("shape", "file", f"must be {kind} that can be read", f"{path}: {reason}")
 
 
 def _mesh(path: Path, shape: Shape) -> ShapeMesh:
@@ -91,11 +88,10 @@ def _mesh(path: Path, shape: Shape) -> ShapeMesh:
     except (ParameterError, MemoryError):
         raise
     except OSError as error:
-        raise _make_error("a file", path, error.strerror or str(error)) from None
+        raise make_refusal(UNREADABLE, str(path), error.strerror or str(error)) from None
     except Exception as error:  # trimesh raises all sorts of errors on a broken file
-        raise _make_error(
-            "a mesh", path, " ".join(str(error).split())[:120] or type(error).__name__
-        ) from None
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise make_refusal("must be a mesh that can be read", str(path), reason) from None
     up = shape.up if shape.up != AUTO else mesh.up
     length = LENGTHS[shape.unit] if shape.unit != AUTO else mesh.length or LENGTHS["mm"]
     return make_shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)

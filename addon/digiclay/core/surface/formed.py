@@ -158,12 +158,3 @@ def split_pieces(count: int) -> Iterator[slice]:
     """Give slices that together are ``range(count)``, none longer than `PIECE`."""
     for start in range(0, count, PIECE):
         yield slice(start, min(start + PIECE, count))
-
-
-def compute_volume(body: Body) -> float:
-    """Return the volume a closed body encloses, m³: the sum of tetrahedra to its first vertex."""
-    total = 0.0
-    for some in split_pieces(len(body.faces)):
-        a, b, c = np.moveaxis((body.vertices - body.vertices[:1])[body.faces[some]], 1, 0)
-        total += float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
-    return total

@@ -56,11 +56,9 @@ def make_parts(formed: Formed) -> Parts:
     return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, -1))
 
 
-def make_pins_solid(
-    formed: Formed, base: float | None = None, base_thickness: float = BASE_THICKNESS
-) -> tuple[Floats, Faces, Indices]:
+def make_pins_solid(formed: Formed, base_thickness: float = BASE_THICKNESS) -> tuple[Floats, Faces, Indices]:
     """Return vertices (v, 3), m, first the middles of tops, faces (f, 3) and their pins of the closed bed."""
-    level = find_base_level(formed.height, base=base, base_thickness=base_thickness)
+    level = find_base_level(formed.height, base_thickness)
     steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
     height = level + steps * STEP
     made, n = make_parts(replace(formed, height=height)), len(steps)

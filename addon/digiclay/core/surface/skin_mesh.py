@@ -72,17 +72,11 @@ def _triangles(place: Floats, top: Floats, index: Faces) -> Faces:
 
 
 def make_solid(
-    position: ArrayLike,
-    height: ArrayLike,
-    rows: int,
-    columns: int,
-    *,
-    base: float | None = None,
-    base_thickness: float = BASE_THICKNESS,
+    position: ArrayLike, height: ArrayLike, rows: int, columns: int, base_thickness: float = BASE_THICKNESS
 ) -> tuple[Floats, Faces]:
     """Return vertices (2 n, 3), m, tops first, and faces of the solid over a base: skin, base, walls."""
     place, top = check_heights(position, height, rows, columns)
-    level = find_base_level(top, base=base, base_thickness=base_thickness)
+    level = find_base_level(top, base_thickness)
     over = make_skin(place, top, rows, columns)
     n, faced = len(place), len(over)
     vertices = np.empty((2 * n, 3))
@@ -99,21 +93,12 @@ def make_solid(
     return vertices, faces
 
 
-def find_base_level(
-    height: ArrayLike, *, base: float | None = None, base_thickness: float = BASE_THICKNESS
-) -> float:
-    """Return the height of the flat base, m: `base`, or `base_thickness` below the lowest of the pin tops."""
-    lowest = float(np.min(height))
-    if base is None:
-        if not (np.isfinite(base_thickness) and base_thickness > 0.0):
-            thickness = f"{base_thickness * 1e3:.6g} mm"
-            raise ParameterError("Surface", "base_thickness", "must be above 0 mm", thickness)
-        return lowest - base_thickness
-    if not (np.isfinite(base) and base < lowest):
-        rule = f"must be below the lowest pin top at {lowest * 1e3:.6g} mm"
-        hint = "Leave it out to get a base of a given thickness under that pin."
-        raise ParameterError("Surface", "base", rule, f"{base * 1e3:.6g} mm", hint)
-    return float(base)
+def find_base_level(height: ArrayLike, base_thickness: float = BASE_THICKNESS) -> float:
+    """Return the height of the flat base, m, `base_thickness` below the lowest of the pin tops."""
+    if not (np.isfinite(base_thickness) and base_thickness > 0.0):
+        thickness = f"{base_thickness * 1e3:.6g} mm"
+        raise ParameterError("Surface", "base_thickness", "must be above 0 mm", thickness)
+    return float(np.min(height)) - base_thickness
 
 
 def _pins(position: ArrayLike) -> Floats:
