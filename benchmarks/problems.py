@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
-from digiclay.core.control.replay import Replay
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.accuracy import Replay
 from numpy.typing import NDArray
 
 #: Control period of all problems, s.

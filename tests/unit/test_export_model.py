@@ -31,10 +31,15 @@ def mesh(body: Body) -> trimesh.Trimesh:
     return trimesh.Trimesh(body.vertices, body.faces, process=False)
 
 
-@pytest.mark.parametrize("skin", ["bilinear", "smooth", "membrane"])
+#: Pins have no skin; between shifted rows each skin has rules of its own.
+KINDS_AND_SKINS = [("pins", "bilinear")] + [
+    (kind, skin) for kind in KINDS if kind != "pins" for skin in ("bilinear", "smooth", "membrane")
+]
+
+
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_is_consistent_and_all_but_the_skin_are_watertight(kind, arrangement, skin):
+@pytest.mark.parametrize(("kind", "skin"), KINDS_AND_SKINS)
+def test_every_kind_is_consistent_and_all_but_the_skin_are_watertight(kind, skin, arrangement):
     for body in make_bodies(formed(arrangement), Model(kind=kind, skin=skin), Finding()):
         made = mesh(body)
         assert made.is_watertight == body.closed == (kind != "surface")
@@ -59,20 +64,18 @@ def touching(arrangement: str, seed: int) -> Formed:
     return Formed.of(place, 0.04 + raised * 1e-3, 0.04, 0.0, 0)
 
 
-@pytest.mark.parametrize("skin", ["bilinear", "smooth", "membrane"])
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("kind", ["solid", "pins", "features"])
-def test_a_file_is_watertight_after_its_vertices_are_welded(tmp_path, kind, arrangement, skin):
-    for seed in range(2):
-        made = make_bodies(touching(arrangement, seed), Model(kind=kind, skin=skin, resolution=2))
-        assert len(made) == (4 if kind == "features" else 1)
-        for name in FORMATS if skin == "bilinear" else ("stl",):
-            path = write(made, tmp_path / f"welded{find_suffix(name)}", kind=name)
-            read = mesh_reader.read(path)
-            welded = trimesh.Trimesh(read.vertices.astype(np.float32), read.faces, process=False)
-            welded.merge_vertices()
-            _, counts = np.unique(welded.edges_sorted, axis=0, return_counts=True)
-            assert set(counts) == {2}, name
+@pytest.mark.parametrize(("kind", "skin"), [pair for pair in KINDS_AND_SKINS if pair[0] != "surface"])
+def test_a_file_is_watertight_after_its_vertices_are_welded(tmp_path, kind, skin, arrangement):
+    made = make_bodies(touching(arrangement, 1), Model(kind=kind, skin=skin, resolution=2))
+    assert len(made) == (4 if kind == "features" else 1)
+    for name in FORMATS if (skin, arrangement) == ("bilinear", "aligned") else ("stl",):
+        path = write(made, tmp_path / f"welded{find_suffix(name)}", kind=name)
+        read = mesh_reader.read(path)
+        welded = trimesh.Trimesh(read.vertices.astype(np.float32), read.faces, process=False)
+        welded.merge_vertices()
+        _, counts = np.unique(welded.edges_sorted, axis=0, return_counts=True)
+        assert set(counts) == {2}, name
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

@@ -182,7 +182,7 @@ def find_faults(name: str, found: list[Feature], slack: float = 0.0) -> list[str
     return faults
 
 
-@pytest.mark.parametrize(("arrangement", "pitch"), BEDS)
+@pytest.mark.parametrize(("arrangement", "pitch"), BEDS[::2])
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_is_found_as_what_it_is(name: str, arrangement: str, pitch: float) -> None:
     bed = formed(name, arrangement, pitch)

@@ -47,8 +47,9 @@ def test_the_sample_shapes_are_those_the_program_makes(maker: ModuleType, tmp_pa
     made = {path.name for path in maker.write(tmp_path)}
     assert made == {path.name for path in SAMPLES.iterdir() if path.name != "README.md"}
     for name in made:
-        # Sines of two machines differ in the last bit, which may turn a pixel by one level of 255.
-        assert np.abs(heights(SAMPLES / name) - heights(tmp_path / name)).max() < 15e-3 / 200, name
+        if (SAMPLES / name).read_bytes() != (tmp_path / name).read_bytes():
+            # Sines of two machines differ in the last bit, which may turn a pixel by one level of 255.
+            assert np.abs(heights(SAMPLES / name) - heights(tmp_path / name)).max() < 15e-3 / 200, name
 
 
 def test_every_sample_shape_has_a_note_of_its_origin() -> None:

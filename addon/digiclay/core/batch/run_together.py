@@ -27,7 +27,7 @@ from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
-from ..session.run_scene import Ended, Result, count_losses, evaluate, report
+from ..session.run_scene import Ended, Result, evaluate, report
 from .packing import Batch, begin, extend_path, find_diverged, make_batch, make_divergence_error, select_runs
 
 
@@ -85,7 +85,7 @@ class Instant:
     def ended(self, index: int) -> Ended:
         """Return how far the run at an index of the last axis has come."""
         state = self.play.state
-        return Ended(state.period, self.share, count_losses(state.memory[index]))
+        return Ended(state.period, self.share, getattr(state.memory[index], "losses", None))
 
 
 def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:

@@ -45,11 +45,7 @@ class Blister(Parameters):
         return self.interpolate(distance, 0.0, 1.0)
 
     def interpolate(self, distance: Floats, edge: Any, top: Any) -> Floats:
-        """Return heights ``edge + p(r) (top - edge)``, m, at distances (m[, b]) from the middle, m.
-
-        *cone*: p is 1 on the flat top, then falls linearly to 0 at the radius. *gaussian*: ``exp(-r²/(2
-        σ²))``. `edge`, `top` (m,) or (b,), heights of the surface around the blister and of its top, m.
-        """
+        """Return heights ``edge + p(r) (top - edge)``, m, at distances (m[, b]), m, from the middle."""
         if self.profile == "gaussian":
             height: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
             slope, start = top - edge, edge
@@ -143,10 +139,7 @@ class BlisterRule:
 
     @cached_property
     def _limits(self) -> Constants:
-        """How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N.
-
-        Circles are widened by a billionth, for the sake of cells exactly on them.
-        """
+        """How far ahead; radii of blister, edge and flat top, m, a billionth wider; a cosine; forces, N."""
         blister = self.blister
         wider = (
             radius * (1.0 + RELATIVE_TOLERANCE)

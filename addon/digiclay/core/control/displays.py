@@ -72,11 +72,8 @@ def evaluate_shape(shape: str, grid: Grid) -> Floats:
 
 
 def read_values(field: str, path: str, grid: Grid, low: float, high: float, unit: str) -> Floats:
-    """Return the values for all cells, (n,), from `low` to `high`, of a file of numpy's, (rows, columns).
-
-    Raises ParameterError about the key `field` of the section ``control`` when it cannot be read, or does not
-    fit the bed, whose first row lies at the lowest y. `path`: relative to where the command runs.
-    """
+    """Return values for all cells, (n,), from `low` to `high`, of a file (rows, columns), or refuse it."""
+    # The first row lies at the lowest y; the path is relative to where the command runs.
     plan = grid.layout
     try:
         read = map_array(Path(path))

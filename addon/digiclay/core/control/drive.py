@@ -80,10 +80,7 @@ class Drive:
         return np.where(speed > 0.0, _look_up(size, self.up), -_look_up(size, self.down))
 
     def approach(self, error: Floats) -> Floats:
-        """Return the speed that takes a pin to its height, m/s, for commanded less measured heights, m.
-
-        ``v = e / τ_s``, nothing within the dead band.
-        """
+        """Return the speed of a pin to its height, m/s, ``v = e / τ_s``; 0 in the dead band, m."""
         speed: Floats = np.where(np.abs(error) > self.dead_band, error / self.settling_time, 0.0)
         return speed
 
@@ -120,11 +117,9 @@ def _look_up(speed: Floats, speeds: Floats) -> Floats:
 
 
 def find_free_speeds(cell: Cell, pressure: float) -> Floats:
-    """Return the growing speeds, (129,), m/s, of a free pin at `OPENINGS` to a reservoir of a pressure, Pa.
-
-    A reservoir that cannot move a pin gets the valve wide open.
-    """
+    """Return speeds (129,), m/s, of a free pin at `OPENINGS`, to a reservoir of a pressure, Pa; growing."""
     free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / cell.actuator.area
+    # A reservoir that cannot move a pin gets the valve wide open.
     rising: Floats = np.maximum(free, 0.0) + 1e-12 * OPENINGS
     return rising
 

@@ -216,10 +216,7 @@ class FingerFilter:
         return step, noise
 
     def correct(self, guess: Estimate, at: Slopes, seen: Floats, variance: Floats) -> tuple[Estimate, Floats]:
-        """Return an estimate corrected by measured undersides, (m,), m, and the errors that it leaves, m.
-
-        `at`: undersides of `guess`; `variance` (m,), of the measured ones, m².
-        """
+        """Return the estimate after undersides (m,), m, with variances (m,), m², and the errors left, m."""
         slopes = at.slopes
         error = seen - at.under
         weighted = slopes / variance

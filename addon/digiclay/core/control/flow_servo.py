@@ -85,11 +85,7 @@ class FlowServo:
         return Constants((1.0 / self.span, self.dead_band, STILL * self.rise, 0.0))
 
     def serve(self, error: Floats, limits: Floats, force: Floats, speeds: Floats) -> Floats:
-        """Return the valve commands (m,); their speeds are put before the earlier ones, in place.
-
-        `error` (m,), commanded heights less those of `coast`, m; `limits` (2, m), from `find_limits`, m/s;
-        `speeds` (q, m), of earlier commands, the newest first, m/s.
-        """
+        """Return commands (m,) for errors off the coast (m,), m; speeds (q, m) get theirs in place."""
         fall, rise = limits
         per_span, band, slowest, none = self._numbers[error.shape]
         speed = error * per_span

@@ -124,11 +124,8 @@ def raise_blister(
     heights: tuple[Any, Any, int | Floats, bool | Flags],
     mode: Modes,
 ) -> Floats:
-    """Return the commanded heights, (m[, b]), m, with a blister in them; modes are set in place.
-
-    `heights` (b,): of the surface around and of the top, m; mode of touched cells; whether frozen cells stay,
-    which a blister that outgrows them else takes along.
-    """
+    """Return commanded heights (m[, b]), m, with a blister of `heights`; modes are set in place."""
+    # Of surface and top, m; mode of touched cells; whether frozen cells stay that the blister outgrows.
     edge, top, touched_mode, stays = heights
     level = ground.find(seen, edge)
     profile, uneven = ground.find_profile(rule.blister, cells.distance, cells.inside, level, top, seen)

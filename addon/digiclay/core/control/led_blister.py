@@ -42,10 +42,7 @@ class LeadProfile:
         return self.level + abs(height) * quickest / (self.rise if height > 0.0 else self.fall)
 
     def find_drop(self, distance: Floats, ahead: Floats, speed: float, *, raised: bool) -> Floats:
-        """Return how far from the top, below it if `raised` above the surface, pins may stand, (m,), m.
-
-        `distance`, `ahead` (m,), from the fingertip and ahead of it, m; `speed`: of it in the plane, m/s.
-        """
+        """Return how far from the top pins may stand, (m,), m, below it if `raised`, at a speed, m/s."""
         free = self.rise if raised else self.fall
         around = free / self.skirt if self.skirt else STEEP
         forward = free / speed if speed >= SLOWEST else STEEP

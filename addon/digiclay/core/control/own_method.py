@@ -329,10 +329,7 @@ def guard(build: Any, name: str, origin: str, file: str, period: float) -> Guard
 
 
 def describe_failure(error: BaseException, file: str) -> str:
-    """Return what an error of unknown code breaks, with the line of its file.
-
-    A rule that a check of ours found broken is the error's own text, ``must ...``.
-    """
+    """Return what an error of unknown code breaks, a rule ``must ...`` of ours, or with its file's line."""
     text = str(error).rstrip(".")
     if text.startswith("must ") and isinstance(error, (TypeError, ValueError)):
         return text

@@ -89,11 +89,7 @@ class PushPullControl:
         return Listening()
 
     def locate(self, memory: Listening, touched: Measurement) -> tuple[Listening, Disc | None]:
-        """Listen where a hand may be; see `Controller`.
-
-        The far pins of a real bed would listen as well; a free pin that listens stays where it is, so
-        they are left out.
-        """
+        """Listen where a hand may be: farther pins would stay where they are; see `Controller`."""
         memory = memory._replace(period=memory.period + 1, radius=-1.0)
         if not touched.height.size:
             return memory, None

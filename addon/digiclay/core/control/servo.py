@@ -71,10 +71,7 @@ def mark_formed(target: Floats, rest: float | Floats, band: float | Floats) -> M
 
 
 def lock_overloaded(command: Floats, force: Floats, limit: float | Floats) -> Floats:
-    """Lock cells pressed harder than the high reservoir lifts, `limit` N, in place; return the commands.
-
-    Opening to it would lower them, and a proportional controller would open further.
-    """
+    """Lock cells pressed harder than the high reservoir lifts, N, in place: opening would lower them."""
     overload = force >= limit
     if any_true(overload):
         overload &= command > 0.0

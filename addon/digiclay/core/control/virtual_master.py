@@ -241,11 +241,7 @@ class VirtualMasterControl(BatchControl):
     def follow(
         self, master: Master, total: float, x: float, y: float, near: float, near_x: float, near_y: float
     ) -> Master:
-        """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
-
-        `total`, `x`, `y`: sum of the forces on all cells, N, and their moments with x and y, N m; `near`,
-        `near_x`, `near_y`: those of the cells near the master.
-        """
+        """VM Locate: centroid of the forces near the master; at first touch, of all (equation 13); N, N m."""
         gains = self.parameters
         if total < gains.felt_force:
             waiting: Master = self._loss.wait(master)
@@ -265,11 +261,7 @@ class VirtualMasterControl(BatchControl):
         return not master.height > -math.inf
 
     def lead(self, master: Master, force: float, surface: float, noise: float = 0.0) -> Master:
-        """VM Control and VM Model: the effort, and the height a real cell would make of it.
-
-        `force`: sum of the forces on all cells, N; `surface`: sum of force times height, N m, which gives a
-        new master its height; `noise`: part of the controlled force that is below the noise floor, N.
-        """
+        """VM Control and VM Model: effort, and the height a real cell would make of it; N, N m, noise N."""
         gains, phase = self.parameters, master.phase
         if phase is Phase.IDLE:
             return master
@@ -310,10 +302,7 @@ class VirtualMasterControl(BatchControl):
         return master.with_edge(min(max(level / count, 0.0), self.actuator.stroke)) if count else master
 
     def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
-        """Return heights around a master and of itself, m, mode of felt cells, and whether frozen ones rise.
-
-        These do not once it has risen too far in search of the fingertip.
-        """
+        """Return heights around and of a master, m, mode of felt cells, whether frozen ones stay behind."""
         kind = FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING
         beyond = master.alone > 0 and master.height - master.felt > CARRIED * self.blister.radius
         return master.edge, master.height, kind, beyond

@@ -24,6 +24,13 @@ BROKEN = (
 )  # fmt: skip
 
 
+def read_count(value: Any) -> int:
+    """Return a whole number from 0 on, no larger than floating-point numbers hold exactly."""
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
+        raise ValueError(f"{str(value)[:20]} is no count")
+    return value
+
+
 class Head(NamedTuple):
     """Header of an array."""
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats, Indices
 from ..base.errors import ParameterError
+from ..files.formats import read_count
 from .mesh_limits import (
     IDENTITY,
     join_meshes,
@@ -80,13 +81,6 @@ def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
     return json.loads(chunks[0][1]), next((part for kind, part in chunks if kind == b"BIN\0"), None)
 
 
-def _count(value: Any) -> int:
-    """Return a whole number from 0 on."""
-    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**53:
-        raise ValueError(f"{str(value)[:20]} is no count")
-    return value
-
-
 class _File:
     """Tables of a glTF, and the buffers read so far."""
 
@@ -98,7 +92,7 @@ class _File:
     def _entry(self, table: str, index: Any) -> Any:
         """Return an entry of a table, by its number."""
         entries = self._tree.get(table, [])
-        if _count(index) >= len(entries):
+        if read_count(index) >= len(entries):
             raise ValueError(f"there is no entry {index} in {table}")
         return entries[index]
 
@@ -125,7 +119,7 @@ class _File:
 
     def size(self, accessor: Any) -> int:
         """Return how many items an accessor has."""
-        return _count(self._entry("accessors", accessor)["count"])
+        return read_count(self._entry("accessors", accessor)["count"])
 
     def triangles(self, primitive: Any) -> int:
         """Return how many triangles a part of a mesh has."""
@@ -161,8 +155,8 @@ class _File:
         number, width, count = np.dtype(NUMBERS[entry["componentType"]]), ITEMS[kind], self.size(accessor)
         view = self._entry("bufferViews", entry["bufferView"])
         item = number.itemsize * width
-        offset, stride = _count(entry.get("byteOffset", 0)), _count(view.get("byteStride", item))
-        start, length = _count(view.get("byteOffset", 0)), _count(view["byteLength"])
+        offset, stride = read_count(entry.get("byteOffset", 0)), read_count(view.get("byteStride", item))
+        start, length = read_count(view.get("byteOffset", 0)), read_count(view["byteLength"])
         buffer = self._buffer(view["buffer"])
         if stride < item or (count and offset + (count - 1) * stride + item > length):
             raise ValueError(f"accessor {accessor} reaches beyond its view")

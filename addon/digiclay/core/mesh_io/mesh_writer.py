@@ -293,10 +293,7 @@ def write(
     up: str = UP,
     forward: str = "",
 ) -> Path:
-    """Write bodies into one file in a unit of `UNITS`; return it. An older one stays until it is complete.
-
-    `kind`: a key of `FORMATS`, by default the extension of `path`; `up`, `forward`: axes of an OBJ.
-    """
+    """Write bodies into one file in a unit of `UNITS`; return it. An older one stays until it is complete."""
     target = Path(path)
     format_name = find_format(target.suffix if kind is None else kind)
     writer = partial(write_obj, up=up, forward=forward) if format_name == "obj" else WRITERS[format_name]

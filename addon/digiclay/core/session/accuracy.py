@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,11 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import DigiclayError
-from ..control.replay import Replay
 from ..engine.simulation import begin, periods, repeat_period, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
+from ..model.control_interface import Commands, Measurement
+from ..model.layout import Disc, Grid
 from ..model.trajectory import interpolate_poses
 from ..scene.assembly import assemble
 from ..scene.schema import Scene, Simulation
@@ -73,6 +75,42 @@ class ErrorMonitor:
     which only the active cells are as they were then, and the fingertip at both ends of it."""
     reached: Floats | None = None
     """(2, n): Heights, m, and forces, N, of the session at the end of the stretch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Replay of recorded valve commands, (t, n), a row a control period; none afterwards."""
+
+    grid: Grid
+    commands: Floats
+
+    name = "replay"
+    rows = 0
+
+    @cached_property
+    def disc(self) -> Disc | None:
+        """The disc that holds every cell that is ever commanded: x, y, radius, m."""
+        cells = np.flatnonzero(self.commands.any(axis=0))
+        if not cells.size:
+            return None
+        x, y = self.grid.x[cells], self.grid.y[cells]
+        at_x, at_y = float(x.min() + x.max()) / 2, float(y.min() + y.max()) / 2
+        return at_x, at_y, float(np.hypot(x - at_x, y - at_y).max())
+
+    def begin(self) -> int:
+        """Return the number of periods played."""
+        return 0
+
+    def locate(self, memory: int, touched: Measurement) -> tuple[int, Disc | None]:
+        """Take every commanded cell along."""
+        return memory, self.disc
+
+    def command(self, memory: int, seen: Measurement) -> tuple[int, Commands]:
+        """Return the commands of the period."""
+        command = np.zeros(seen.height.size)
+        if memory < len(self.commands):
+            command = self.commands[memory, seen.cells]
+        return memory + 1, Commands(seen.target, seen.mode, command)
 
 
 def has_every_command(scene: Scene) -> bool:

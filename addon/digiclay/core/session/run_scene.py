@@ -90,13 +90,7 @@ class Ended(NamedTuple):
     run_time: float
     """Time the simulation took, s."""
     losses: int | None
-    """From `count_losses`."""
-
-
-def count_losses(memory: object) -> int | None:
-    """Return the number of losses in a controller's memory; None if it does not count."""
-    losses: int | None = getattr(memory, "losses", None)
-    return losses
+    """In the controller's memory; None if that does not count."""
 
 
 def evaluate(
@@ -192,7 +186,7 @@ def run(
             progress(state.period, scene.periods)
         if stopped and stopped():
             break
-    took, losses = time.perf_counter() - started, count_losses(state.memory)
+    took, losses = time.perf_counter() - started, getattr(state.memory, "losses", None)
     rows = recording.finish(state.period) if recording else {}
     return evaluate(scene, system, rows, Ended(state.period, took, losses), versions or {})
 

@@ -21,6 +21,7 @@ from ..base.modes import Mode
 from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
 from ..engine.system import System
+from ..files.formats import read_count
 from ..model.fingertip import require_one
 from ..model.layout import Disc
 
@@ -76,10 +77,7 @@ def _rebuild_like(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
 
 
 def _check_number(template: Any, kept: Any) -> None:
-    """Refuse what is no number, or none that a controller comes to: whole numbers count something.
-
-    Infinite is only what begins so; no other number is so large that the square of its square is.
-    """
+    """Refuse what is no number a controller comes to: infinite only what begins so, counts whole."""
     if not isinstance(kept, (bool, int, float)) or math.isnan(kept):
         raise ValueError("no number")
     if isinstance(template, int) and not isinstance(template, bool):
@@ -220,20 +218,20 @@ def _read(data: bytes) -> Snapshot:
         first = len(START) + 4
         length = int.from_bytes(data[len(START) : first], "little")
         header = json.loads(data[first : first + length])
-        cells, held = _read_count(header["cells"]), header["gathered"]
+        cells, held = read_count(header["cells"]), header["gathered"]
         if data.startswith(FIRST):
             held = header["gathered"] = {**held, "fingers": [{"reach": held["reach"]}]}
-        count, taken = Rows(*map(_read_count, header["rows"])).count, _read_count(held["cells"])
+        count, taken = Rows(*map(read_count, header["rows"])).count, read_count(held["cells"])
         shapes: list[tuple[str, tuple[int, ...]]] = [
             ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),
             ("<i8", (taken,)), ("<f8", (count, taken)), ("i1", (taken,)),
         ]  # fmt: skip
-        shapes += [(str(kind), tuple(map(_read_count, shape))) for kind, shape in header["arrays"]]
+        shapes += [(str(kind), tuple(map(read_count, shape))) for kind, shape in header["arrays"]]
         arrays, end = _read_arrays(data, first + length, shapes)
         if end != len(data):
             raise _make_error(f"must have {end} bytes and has {len(data)}")
         numbers = [header["peak"], held["peak"], header["control_period"]]
-        numbers += [_read_count(value) for value in (header["period"], held["until"], held["near"])]
+        numbers += [read_count(value) for value in (header["period"], held["until"], held["near"])]
         discs = [held["control"], *(finger["reach"] for finger in held["fingers"])]
         numbers += [number for disc in discs for number in _read_disc(disc) or ()]
         names = ("rows", "modes", "aged", "cells", "block", "mode")
@@ -271,13 +269,6 @@ def _is_sound(kept: Snapshot, count: int) -> bool:
         and ((cells >= 0) & (cells < count)).all()
         and np.unique(cells).size == cells.size
     )
-
-
-def _read_count(value: Any) -> int:
-    """Return a whole number from 0 on, no larger than floating-point numbers hold exactly."""
-    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
-        raise ValueError(f"no count: {value!r}")
-    return value
 
 
 def _read_disc(values: Any) -> Disc | None:

@@ -81,10 +81,7 @@ def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: f
 
 
 def find_contact_outline(finger: Fingertip, turn: Floats, depth: float, count: int = 48) -> Floats:
-    """Return the outline of the fingertip (count, 2), m, a depth, m, above its lowest point, the origin.
-
-    `turn` (4,): its orientation, quaternion w, x, y, z; above its middle the widest section is the outline.
-    """
+    """Return the outline of the fingertip (count, 2), m, a depth, m, above its lowest point; `turn` (4,)."""
     rotation = make_matrices(np.asarray(turn, np.float64)[None])[0]
     axes = np.array([finger.length, finger.width, finger.height])
     shape = rotation @ np.diag(axes**-2.0) @ rotation.T
