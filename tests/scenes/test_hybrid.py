@@ -160,8 +160,8 @@ def test_the_trim_stays_within_half_the_set_point() -> None:
 
 @pytest.mark.parametrize(
     "sensors",
-    [{"force_noise": 2e-3}, {"force_noise": 10e-3}, {"force_noise": 15e-3}, {"delay": 1}],
-    ids=["noise", "much noise", "most noise", "delay"],
+    [{"force_noise": 2e-3}, {"force_noise": 15e-3}, {"delay": 1}],
+    ids=["noise", "most noise", "delay"],
 )
 def test_noise_and_delay_of_the_sensors_lose_no_finger(sensors: dict[str, float]) -> None:
     found = run(along(device(sensors=sensors), *STROKE)).metrics

@@ -44,17 +44,14 @@ SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
     "saddle": lambda x, y: x * x - y * y,
     "wave": lambda x, y: np.sin(2.0 * math.pi * x),
     "ripple": lambda x, y: np.cos(3.0 * math.pi * np.hypot(x, y)),
-    "crater": lambda x, y: _crater(np.hypot(x, y)),
+    # A ring wall, 1 high at radius 0.6, around a hollow of depth 0.6.
+    "crater": lambda x, y: (
+        np.exp(-(((np.hypot(x, y) - 0.6) / 0.18) ** 2)) - 0.6 * np.exp(-((np.hypot(x, y) / 0.3) ** 2))
+    ),
     "pyramid": lambda x, y: 1.0 - np.maximum(np.abs(x), np.abs(y)),
     "ramp": lambda x, y: x,
     "flat": lambda x, y: 0.0 * x,
 }
-
-
-def _crater(r: Floats) -> Floats:
-    """Return a ring wall, 1 high at radius 0.6, around a hollow of depth 0.6."""
-    ring: Floats = np.exp(-(((r - 0.6) / 0.18) ** 2)) - 0.6 * np.exp(-((r / 0.3) ** 2))
-    return ring
 
 
 def check_shape(owner: str, field: str, shape: str) -> None:

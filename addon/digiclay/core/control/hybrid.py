@@ -116,12 +116,6 @@ class OwnRows(NamedTuple):
     """Period in which its pulp was last observed, 0: never; commanded speeds, the newest first, m/s."""
 
 
-def number_rows(filters: int) -> OwnRows:
-    """Return the numbers of the rows of a cell with some relaxation filters."""
-    k = filters
-    return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
-
-
 #: Share of the set point within which the trim learns; it is at most as large.
 LEARNED = 0.5
 #: While the force is within this share of the set point, and the fingertip no faster than this, m/s, it is
@@ -195,7 +189,8 @@ class HybridControl:
     @cached_property
     def _at(self) -> OwnRows:
         """Numbers of a cell's rows."""
-        return number_rows(self.pulp.filters)
+        k = self.pulp.filters
+        return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
 
     @property
     def rows(self) -> int:

@@ -279,7 +279,12 @@ class Guarded:
             _check_alike(memory, after)
             commands = orders if type(self.inner) is OwnControl else self._check(orders, given)
             seen.own[:] = given.own
-        self._judge(time.thread_time() - start)
+        mean = self.pace.add(time.thread_time() - start)
+        # A live session would stand still.
+        if mean is not None and mean > MOST_PERIODS * self.period:
+            rule = f"must take at most {MOST_PERIODS:g} control periods of processor time a call"
+            got = f"{mean / self.period:.3g} of {self.period:.3g} s on average over {CALLS}"
+            raise MethodError(f"{self.origin}: command {rule} (got {got}).")
         return after, commands
 
     def _check(self, orders: Any, given: Measurement) -> Commands:
@@ -291,14 +296,6 @@ class Guarded:
             raise ValueError(f"must return commands from -1 to 1 (got {np.abs(command).max():.6g})")
         check_array(given.own, "rows", given.own.shape)
         return Commands(target, check_modes(mode, size), command)
-
-    def _judge(self, spent: float) -> None:
-        """Refuse a method that is too slow: a live session would stand still."""
-        mean = self.pace.add(spent)
-        if mean is not None and mean > MOST_PERIODS * self.period:
-            rule = f"must take at most {MOST_PERIODS:g} control periods of processor time a call"
-            got = f"{mean / self.period:.3g} of {self.period:.3g} s on average over {CALLS}"
-            raise MethodError(f"{self.origin}: command {rule} (got {got}).")
 
     @contextmanager
     def _report(self, function: str) -> Iterator[None]:

@@ -135,14 +135,6 @@ def interpolate_skin(formed: Formed, height: Floats, skin: str, parts: int, cap:
     return relax_membrane(formed, place_points(formed, parts), straight, parts, cap).ravel()
 
 
-def find_nearest_pin(formed: Formed, parts: int) -> Faces:
-    """Return the pin whose row and column each point of a skin is nearest to, row by row."""
-    row, column = (
-        (np.arange((count - 1) * parts + 1) + parts // 2) // parts for count in (formed.rows, formed.columns)
-    )
-    return (row[:, None] * formed.columns + column).ravel().astype(np.int32)
-
-
 def _linear(values: Floats, parts: int) -> Floats:
     """Divide each step along the first axis into straight parts."""
     share = (np.arange(parts) / parts).reshape((1, -1) + (1,) * (values.ndim - 1))
@@ -245,8 +237,12 @@ class SurfaceGrid:
         return index[:: self.parts, :: self.parts].ravel()
 
     def nearest(self, of_pins: NDArray[Any]) -> NDArray[Any]:
-        """Return at each point the value of the nearest pin."""
-        return np.asarray(of_pins[find_nearest_pin(self.formed, self.parts)])
+        """Return at each point the value of the pin in the nearest row and column."""
+        row, column = (
+            (np.arange((count - 1) * self.parts + 1) + self.parts // 2) // self.parts
+            for count in (self.formed.rows, self.formed.columns)
+        )
+        return np.asarray(of_pins[(row[:, None] * self.formed.columns + column).ravel()])
 
     def values(self) -> dict[str, NDArray[np.float64]]:
         """Return height, force and mode at each point: force straight between pins, mode of the nearest."""
