@@ -59,6 +59,8 @@ def here(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
     """Work in an empty folder with one scene, my.toml: the module's SCENE, or a tap on 3 x 4 pins."""
     from tests.scene_files import SCENE, folder_with
 
+    # One process unless a test asks for more: each takes a second to start.
+    monkeypatch.setattr("digiclay.commands.evaluation_pool.count_cores", lambda: 1)
     return folder_with(getattr(request.module, "SCENE", SCENE), tmp_path, monkeypatch)
 
 

@@ -23,20 +23,13 @@ History = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Extra:
-    """Files made of a session.
+    """Files made of a session."""
 
-    Attributes
-    ----------
-    files : sequence of str
-        Seen from the run's folder.
-    make : callable
-        Makes them in a folder.
-    later : callable
-        Returns the arguments of the command that makes them in the finished run's folder.
-    """
-
+    #: Seen from the run's folder.
     files: Sequence[str]
+    #: Makes them in a folder.
     make: Callable[[Path], object]
+    #: Returns the arguments of the command that makes them in the finished run's folder.
     later: Callable[[Path], list[str]]
 
 

@@ -88,27 +88,18 @@ p > img { max-width: 100%; background: #fff; }
 
 @dataclass(frozen=True)
 class Card:
-    """Content of the page for one job.
-
-    Attributes
-    ----------
-    thumbnail : bytes
-        A small JPEG or PNG; empty where there is none.
-    facts : sequence of (str, str)
-        What is measured, and its value with unit.
-    links : sequence of (str, str)
-        What a file is, and its path from the page.
-    leads : str
-        Path of what the thumbnail leads to; empty where it leads nowhere.
-    error : str
-        Why the job was not done; empty where it was.
-    """
+    """Content of the page for one job."""
 
     name: str
+    #: A small JPEG or PNG; empty where there is none.
     thumbnail: bytes = b""
+    #: What is measured, and its value with unit.
     facts: Sequence[tuple[str, str]] = field(default_factory=tuple)
+    #: What a file is, and its path from the page.
     links: Sequence[tuple[str, str]] = field(default_factory=tuple)
+    #: Path of what the thumbnail leads to; empty where it leads nowhere.
     leads: str = ""
+    #: Why the job was not done; empty where it was.
     error: str = ""
 
 

@@ -155,19 +155,13 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Work:
-    """A job that is being done.
+    """A job that is being done."""
 
-    Attributes
-    ----------
-    job, run : Path
-        Folder of the job's files, and that of its run.
-    stopped : callable
-        Returns whether to stop. All steps raise KeyboardInterrupt then; what is drawn is kept.
-    """
-
+    #: Folder of the job's files, and that of its run.
     job: Path
     run: Path
     outputs: Outputs
+    #: Returns whether to stop. All steps raise KeyboardInterrupt then; what is drawn is kept.
     stopped: Callable[[], bool]
     tell: Tell
 

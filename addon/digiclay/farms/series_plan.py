@@ -39,32 +39,22 @@ class Frames:
 
 @dataclass(frozen=True)
 class Task:
-    """A command of digiclay in the folder of a series.
+    """A command of digiclay in the folder of a series."""
 
-    Attributes
-    ----------
-    name : str
-        Unique.
-    stage : {"runs", "frames", "films", "page"}
-    command : str
-        Of digiclay.
-    folder : str
-        What the command works on, from the series' folder; empty: that folder itself.
-    needs : tuple of str
-        Names of the tasks before it.
-    blender : bool
-        Whether it draws.
-    frames : Frames or None
-        A task for each range of them; None: one task.
-    """
-
+    #: Unique.
     name: str
+    #: One of "runs", "frames", "films", "page".
     stage: str
+    #: Of digiclay.
     command: str
+    #: What the command works on, from the series' folder; empty: that folder itself.
     folder: str
     options: tuple[str, ...] = ()
+    #: Names of the tasks before it.
     needs: tuple[str, ...] = ()
+    #: Whether it draws.
     blender: bool = False
+    #: A task for each range of them; None: one task.
     frames: Frames | None = None
 
     def list_arguments(self, series: str) -> list[str]:

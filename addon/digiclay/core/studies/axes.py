@@ -27,60 +27,39 @@ MOST = 10_000
 
 @dataclass(frozen=True)
 class Axis:
-    """One varied parameter.
+    """One varied parameter."""
 
-    Attributes
-    ----------
-    key : str
-        Section and key, ``control.force_gain``.
-    words : tuple of str
-        Its values as a scene file would say them.
-    logarithmic : bool
-        Whether they are evenly spaced on a logarithmic scale.
-    """
-
+    #: Section and key, ``control.force_gain``.
     key: str
+    #: Its values as a scene file would say them.
     words: tuple[str, ...]
+    #: Whether they are evenly spaced on a logarithmic scale.
     logarithmic: bool = False
 
 
 @dataclass(frozen=True)
 class Point:
-    """One session of a sweep.
+    """One session of a sweep."""
 
-    Attributes
-    ----------
-    index : int
-        The last axis varies fastest.
-    words : tuple of str
-        A value on each axis.
-    scene : Scene or None
-        None where the values do not go together; `error` says why.
-    measure : callable or None
-        By default the figures of the session, see `evaluation.evaluate`.
-    """
-
+    #: The last axis varies fastest.
     index: int
+    #: A value on each axis.
     words: tuple[str, ...]
+    #: None where the values do not go together; `error` says why.
     scene: Scene | None
     error: str = ""
+    #: By default the figures of the session, see `evaluation.evaluate`.
     measure: Measure | None = None
 
 
 @dataclass(frozen=True)
 class Column:
-    """Axis as numbers.
-
-    Attributes
-    ----------
-    unit : str
-        Of the parameter; empty where it has none.
-    values : tuple
-        In SI; texts where they are no numbers.
-    """
+    """Axis as numbers."""
 
     key: str
+    #: Of the parameter; empty where it has none.
     unit: str
+    #: In SI; texts where they are no numbers.
     values: tuple[Any, ...]
     logarithmic: bool
 

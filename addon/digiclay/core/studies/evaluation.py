@@ -59,20 +59,13 @@ def read_metrics(text: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Bundles:
-    """Points of a sweep in bundles that run together.
+    """Points of a sweep in bundles that run together."""
 
-    Attributes
-    ----------
-    batches : tuple of tuple of Point
-        Of `LEAST` points or more.
-    alone : tuple of tuple of Point
-        Of one point each.
-    why : tuple of str
-        Why some run alone, one line a reason.
-    """
-
+    #: Of `LEAST` points or more.
     batches: tuple[tuple[Point, ...], ...]
+    #: Of one point each.
     alone: tuple[tuple[Point, ...], ...]
+    #: Why some run alone, one line a reason.
     why: tuple[str, ...]
 
     @property

@@ -41,23 +41,15 @@ FORMER = {"colour": "color"}
 
 @dataclass(frozen=True)
 class Outputs:
-    """Outputs of a run.
+    """Outputs of a run."""
 
-    Attributes
-    ----------
-    export : tuple of str
-        Mesh formats.
-    mesh : Model
-        What is made of the final surface in these formats.
-    errors : bool
-        Whether the run's errors are estimated, which takes twice its time.
-    still, turntable, film
-        Pictures, where they are wanted.
-    """
-
+    #: Mesh formats.
     export: tuple[str, ...] = ()
+    #: Whether the run's errors are estimated, which takes twice its time.
     errors: bool = True
+    #: What is made of the final surface in these formats.
     mesh: Model = field(default_factory=Model)
+    #: Pictures, where they are wanted.
     still: Still | None = None
     turntable: Turntable | None = None
     film: Film | None = None
@@ -119,17 +111,11 @@ WHICH = ("scenes", "methods", "settings")
 
 @dataclass(frozen=True)
 class Job:
-    """One scene with one control method and one setting.
+    """One scene with one control method and one setting."""
 
-    Attributes
-    ----------
-    name : str
-        Of its folder.
-    scene : Scene or None
-        None where the values do not go together; `error` says why.
-    """
-
+    #: Of its folder.
     name: str
+    #: None where the values do not go together; `error` says why.
     scene: Scene | None
     error: str = ""
 

@@ -31,13 +31,9 @@ class ReliefError(NamedTuple):
     """Deviation of a formed relief from the nominal one, over the cells that the blister has covered.
 
     Where the fingertip pressed first or left is no relief: cells within a blister of it are left out.
-
-    Attributes
-    ----------
-    rms, largest : float or None
-        m; None where no cell was covered, or the method has no blister.
     """
 
+    #: m; None where no cell was covered, or the method has no blister.
     rms: float | None
     largest: float | None
 

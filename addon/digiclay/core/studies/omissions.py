@@ -41,61 +41,41 @@ BANDS = (0.5, 0.25)
 
 
 class Omission(NamedTuple):
-    """Part or refinement that a scene can omit.
+    """Part or refinement that a scene can omit."""
 
-    Attributes
-    ----------
-    kind : str
-        Of one kind only one can be left out.
-    text : str
-        What the scene then has.
-    leave_out : callable
-        Makes a scene without it.
-    """
-
+    #: Of one kind only one can be left out.
     kind: str
+    #: What the scene then has.
     text: str
+    #: Makes a scene without it.
     leave_out: Callable[[Scene], Scene]
 
 
 class Tried(NamedTuple):
-    """Effect of an omission.
-
-    Attributes
-    ----------
-    departure : float
-        Largest difference of a height from the full scene, m; infinite when the trial was
-        broken off because it left the budget.
-    work : float
-        Share of the full scene's work that is left; NaN when the trial was broken off.
-    kept : bool
-        Whether the scene does without it.
-    """
+    """Effect of an omission."""
 
     text: str
+    #: Largest difference of a height from the full scene, m; infinite when the trial was broken off
+    #: because it left the budget.
     departure: float
+    #: Share of the full scene's work that is left; NaN when the trial was broken off.
     work: float
+    #: Whether the scene does without it.
     kept: bool
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """Scene within a budget.
-
-    Attributes
-    ----------
-    budget, departure, own_error : float
-        What was allowed; the largest difference of a height from the full scene, the
-        controller acting on what it sees; and the estimated error of the integration. The
-        last two together are at most the first, m.
-    work : float
-        Share of the full scene's work that is left: cells times steps times the parts of a cell.
-    """
+    """Scene within a budget."""
 
     scene: Scene
+    #: What was allowed; the largest difference of a height from the full scene, the controller acting on
+    #: what it sees; and the estimated error of the integration. The last two together are at most the
+    #: first, m.
     budget: float
     departure: float
     own_error: float
+    #: Share of the full scene's work that is left: cells times steps times the parts of a cell.
     work: float
     tried: tuple[Tried, ...]
 

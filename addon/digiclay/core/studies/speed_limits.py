@@ -38,26 +38,17 @@ class Criterion(Parameters):
 
 @dataclass(frozen=True)
 class Follows:
-    """Quality of tracking in the evaluated part of a trial.
+    """Quality of tracking in the evaluated part of a trial."""
 
-    Attributes
-    ----------
-    speed : float
-        m/s.
-    losses : int
-        How often contact ended in it or in the 0.3 s after, or was absent from its start on.
-    loss_share : float
-        Share of the time without contact.
-    lag : float
-        Largest distance of the blister, m; infinite without contact.
-    rfd : float
-        N, over all rows that ask for a force, those without contact too.
-    """
-
+    #: m/s.
     speed: float
+    #: How often contact ended in it or in the 0.3 s after, or was absent from its start on.
     losses: int
+    #: Share of the time without contact.
     loss_share: float
+    #: Largest distance of the blister, m; infinite without contact.
     lag: float
+    #: N, over all rows that ask for a force, those without contact too.
     rfd: float
 
     def meets(self, criterion: Criterion) -> bool:
