@@ -38,15 +38,7 @@ PAUSE, REST = 2.0, 10.0
 
 
 class JobProcess(Process):
-    """A process that does one job of a batch.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        Of the command line.
-    log : Path
-        What the process says.
-    """
+    """A process that does one job of a batch, by the arguments of its command line; `log` gets its output."""
 
     def __init__(self, arguments: Sequence[str], log: Path) -> None:
         self._log = log

@@ -104,13 +104,7 @@ ENCRYPTED = ("tls", "wss", "inproc")
 
 
 class Cluster(Executor):
-    """Executor on the workers of a Dask scheduler.
-
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, for messages.
-    """
+    """Executor on the workers of a Dask scheduler; messages name its address."""
 
     def __init__(self, client: Any, address: str) -> None:
         self._client, self._address, self._versions = client, address, describe_versions()

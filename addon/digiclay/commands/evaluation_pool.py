@@ -102,21 +102,8 @@ def open_pool(
 class Evaluation(ExitStack):
     """Points of a series under evaluation, with a progress line; each is kept as soon as it is done.
 
-    Parameters
-    ----------
-    label : str
-        At the beginning of the line.
-    total : int
-        Points of the series; their indices are below it.
-    pieces : int
-        Bundles at a time, at most, where they are not known at once.
-
-    Attributes
-    ----------
-    records : dict of int to Record
-        Of the finished points, by index.
-    failed : dict of int to Record
-        Of points that no worker survived. They are not kept: the same command tries them again.
+    `records` has the finished points by index, below `total`; `failed` those that no worker survived, which
+    the same command tries again. `pieces`: bundles at a time, at most, where they are not known at once.
     """
 
     def __init__(

@@ -23,13 +23,7 @@ WIDTH, PAUSE = 28, 0.1
 
 
 class Line:
-    """Line of a terminal, removed at the end of its block.
-
-    Parameters
-    ----------
-    stream : TextIO
-        Written to only if it is a terminal.
-    """
+    """Line of a terminal, removed at the end of its block; a stream that is no terminal gets none."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream, self._shown = stream, False
@@ -71,13 +65,7 @@ class Line:
 
 
 class Bar(Line):
-    """Progress of a session; updated after each control period.
-
-    Parameters
-    ----------
-    period : float
-        Simulated time a control period stands for, s.
-    """
+    """Progress of a session, updated after each control period, of `period` s."""
 
     def __init__(self, stream: TextIO, label: str, period: float) -> None:
         super().__init__(stream)
@@ -92,14 +80,9 @@ class Bar(Line):
 
 
 class Counted(Line):
-    """Progress of a count, such as frames, with the remaining time.
+    """Progress of a count of `unit`, such as frames, with the remaining time.
 
-    Parameters
-    ----------
-    label, unit : str
-        What is going on, and what is counted.
-    before : int, optional
-        How many were done beforehand: they say nothing about the time the others take.
+    `before` were done beforehand: they say nothing about the time the others take.
     """
 
     def __init__(self, stream: TextIO, label: str, unit: str, before: int = 0) -> None:

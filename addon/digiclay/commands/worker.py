@@ -70,17 +70,7 @@ def count_cores() -> int:
 
 
 class Process:
-    """This program in a process of its own.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        Of the command line.
-    module : str, optional
-        See `find_program`.
-    streams
-        Where its output goes, as `subprocess.Popen` has it.
-    """
+    """This program, or a module of it, in a process of its own; `streams` as `subprocess.Popen` has them."""
 
     def __init__(self, arguments: Sequence[str], module: str = "", **streams: Any) -> None:
         command, environment = find_program(module)
@@ -116,14 +106,9 @@ class Process:
 
 
 class Processes:
-    """All processes of a series: stopped together, and ended at the end of the block.
+    """All processes of a series: stopped together when `stop` says so, and ended at the end of the block.
 
-    Parameters
-    ----------
-    stop : callable
-        Whether somebody asks to stop.
-    draw : callable
-        Called again and again while the series is worked at.
+    `draw` is called again and again meanwhile.
     """
 
     def __init__(self, stop: Callable[[], bool], draw: Callable[[], None]) -> None:
