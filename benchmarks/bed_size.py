@@ -1,101 +1,78 @@
-"""Benchmark ``scale``: the same fingertip path on beds from 625 pins to a million."""
+"""Benchmarks ``scale`` and ``export``: a control period and mesh files, from 625 pins to a million."""
 
 from __future__ import annotations
 
 import argparse
 import statistics
+import tempfile
 import time
+import tracemalloc
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.commands.progress import table
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.engine.state import State
-from digiclay.core.engine.system import System
+from digiclay.core.mesh_io.export_model import Model, make_bodies
+from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.plots.figure import empty
+from digiclay.core.surface.features import Finding
+from digiclay.core.surface.formed import Formed
 
-from .report import BLUE, RED, STYLE, Report, Steps, cells, list_records
+from .report import BLUE, RED, Report, Row, Steps, tabulate
 
 #: Pins along a side of the beds.
-SIDES = (25, 101, 317, 1001)
+SIDES, EXPORTED = (25, 101, 317, 1001), (25, 100, 316, 1000)
 #: The fingertip presses in the middle, rises and is dragged, over the same pins of every bed: s; x, z in mm.
 PATH = ((0.0, 0.0, 42.0), (0.3, 0.0, 36.5), (0.8, 6.0, 40.0), (1.3, 12.0, 44.0), (1.6, 12.0, 60.0))
-DURATION = 1.6
-
-
-@dataclass(frozen=True)
-class Size:
-    """Cost of a bed of one size.
-
-    Attributes
-    ----------
-    built : float
-        Time to put it together, s.
-    period : float
-        A control period, the median, s.
-    mean : float
-        CPU time of a control period, the mean, s: the fingertip's poses are computed for 128 at once.
-    gathered : float
-        Cells that take part, on average.
-    """
-
-    pins: int
-    built: float
-    period: float
-    mean: float
-    gathered: float
-    bytes_a_pin: float
+#: Kind and format of exports: every format of the solid, and the other kinds in one.
+EXPORTS = (*(("solid", name) for name in FORMATS), ("surface", "stl"), ("pins", "stl"), ("features", "stl"))
+SCALE = {
+    "pins": "pins d", "taking part": "gathered .1f", "period, µs": "period .0f 1e6",
+    "to smallest": "ratio .2f", "CPU mean, µs": "mean .0f 1e6", "built in, ms": "built .3g 1e3",
+    "bytes a pin": "bytes_a_pin .1f",
+}  # fmt: skip
+EXPORT = {
+    "mesh": "kind", "format": "file", "pins": "pins d", "triangles": "triangles d", "made in, s": "made .3g",
+    "written in, s": "written .3g", "file, MB": "size .3g", "memory, MB": "peak .3g",
+    "bytes a pin": "bytes_a_pin .0f",
+}  # fmt: skip
 
 
 def scene(side: int) -> Scene:
     """Return a bed of side x side pins; an odd side has a pin in the middle."""
     waypoints = [{"time": t, "position": [x * 1e-3, 0.0, z * 1e-3]} for t, x, z in PATH]
-    parts = {"simulation": {"duration": DURATION}, "trajectory": {"waypoints": waypoints}}
+    parts = {"simulation": {"duration": PATH[-1][0]}, "trajectory": {"waypoints": waypoints}}
     layout = {"rows": side, "columns": side}
     return resolve({"layout": layout, "recorder": "absent", **parts}, f"{side * side} pins")
 
 
-def bytes_of(*values: Any) -> int:
-    """Return the bytes of all different arrays in dataclasses and sequences, and within their members."""
-    arrays: dict[int, int] = {}
-    waiting, seen = list(values), set()
-    while waiting:
-        value = waiting.pop()
-        if isinstance(value, np.ndarray):
-            owner = value if value.base is None or not isinstance(value.base, np.ndarray) else value.base
-            arrays[id(owner)] = owner.nbytes
-        elif hasattr(value, "__dataclass_fields__") and id(value) not in seen:
-            seen.add(id(value))
-            waiting += [getattr(value, field.name) for field in fields(value)]
-            waiting += list(getattr(value, "__dict__", {}).values())  # cached properties
-        elif isinstance(value, (tuple, list)):
-            waiting += value
-    return sum(arrays.values())
-
-
-def gathered_cells(side: int) -> list[int]:
-    """Return how many cells take part in each control period."""
+def measure_bytes(side: int) -> int:
+    """Return the memory of the arrays of a bed's system and state, bytes."""
     bed = scene(side)
-    system = assemble(bed)
-    run = periods(system, bed.trajectories(), begin(system), bed.periods)
-    return [state.active.cells.size for state in run]
+    tracemalloc.start()
+    try:
+        system = assemble(bed)
+        state = begin(system)
+        arrays = tracemalloc.DomainFilter(True, np.lib.tracemalloc_domain)
+        traces = tracemalloc.take_snapshot().filter_traces([arrays]).traces
+        return sum(trace.size for trace in traces) if state else 0
+    finally:
+        tracemalloc.stop()
 
 
-def _time_bed(side: int, repeats: int) -> Size:
-    """Build a bed of `side` x `side` pins and run the session on it; the median of the repeats counts."""
+def _time_bed(side: int, repeats: int) -> dict[str, float]:
+    """Run the session on a bed; medians of the repeats, s; the mean is processor time."""
     built, spent, gathered, means = [], [], [], []
     bed = scene(side)
-    bytes_a_pin = 0.0
     for _ in range(repeats):
         started = time.perf_counter()
-        system: System = assemble(bed)
-        start: State = begin(system)
+        system = assemble(bed)
+        start = begin(system)
         built.append(time.perf_counter() - started)
         used, moments = time.process_time(), [time.perf_counter()]
         for state in periods(system, bed.trajectories(), start, bed.periods):
@@ -103,45 +80,82 @@ def _time_bed(side: int, repeats: int) -> Size:
             gathered.append(state.active.cells.size)
         means.append((time.process_time() - used) / bed.periods)
         spent += [b - a for a, b in pairwise(moments)]
-        bytes_a_pin = bytes_of(system, state) / (side * side)
     build, period, mean = (statistics.median(times) for times in (built, spent, means))
-    return Size(side * side, build, period, mean, statistics.fmean(gathered), bytes_a_pin)
+    return {
+        "pins": side * side, "built": build, "period": period, "mean": mean,
+        "gathered": statistics.fmean(gathered), "bytes_a_pin": measure_bytes(side) / side**2,
+    }  # fmt: skip
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
-    """Measure every size."""
+    """Measure a control period on every size of bed."""
     sides, repeats = (SIDES[:3], 1) if arguments.quick else (SIDES, 5)
     sizes = [_time_bed(side, repeats) for side in steps.through(sides, lambda side: f"{side * side} pins")]
-    return Report(_list_lines(sizes), *list_records(sizes), lambda: _draw(sizes))
 
-
-def _draw(sizes: Sequence[Size]) -> Any:
-    """Draw a control period's cost over the number of pins."""
-    with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
+    def draw(figure: Any) -> None:
         panel = figure.subplots()
-        pins = [size.pins for size in sizes]
-        for values, label, color, marker in (
-            ([size.period * 1e6 for size in sizes], "median", BLUE, "o"),
-            ([size.mean * 1e6 for size in sizes], "mean, with the fingertip's poses", RED, "s"),
+        for key, label, color, marker in (
+            ("period", "median", BLUE, "o"),
+            ("mean", "mean, with the fingertip's poses", RED, "s"),
         ):
+            pins, values = [size["pins"] for size in sizes], [size[key] * 1e6 for size in sizes]
             panel.semilogx(pins, values, "-", color=color, marker=marker, label=label)
-        panel.set(
-            ylim=(0.0, 1.2e6 * max(size.mean for size in sizes)), title="The same fingertip, larger beds"
-        )
+        panel.set(ylim=(0.0, 1.2e6 * max(size["mean"] for size in sizes)))
+        panel.set(title="The same fingertip, larger beds")
         panel.set(xlabel="pins of the bed", ylabel="a control period, µs")
         panel.legend(loc="lower right")
-        return figure
+
+    title = (
+        "\nThe same fingertip, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
+    )
+    rows = [{**size, "ratio": size["period"] / sizes[0]["period"]} for size in sizes]
+    return Report([title, *tabulate(rows, SCALE, left=0)], sizes, draw)
 
 
-def _list_lines(sizes: list[Size]) -> Iterator[str]:
+def formed(side: int) -> Formed:
+    """Return a bed of side x side pins with bosses and creases everywhere: waves 100 mm long, 10 mm high."""
+    place = make_grid(Layout(rows=side, columns=side)).positions
+    wave = np.sin(place[:, 0] * 63.0) * np.cos(place[:, 1] * 63.0)
+    return Formed.of(place, 0.04 + 0.01 * wave, 0.04, 0.0, 0)
+
+
+def export(side: int, kind: str, file: str) -> dict[str, Any]:
+    """Export a bed once for the times, s, and once for the memory, MB; `file`: one of `FORMATS`."""
+    bed = formed(side)
+    finding = Finding() if kind == "features" else None
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"bed{find_suffix(file)}"
+        started = time.perf_counter()
+        bodies = make_bodies(bed, Model(kind=kind), finding)
+        made = time.perf_counter()
+        write(bodies, path, kind=file)
+        done = time.perf_counter()
+        triangles = sum(len(body.faces) for body in bodies)
+        del bodies
+        tracemalloc.start()
+        try:
+            write(make_bodies(bed, Model(kind=kind), finding), path, kind=file)
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        return {
+            "pins": side * side, "kind": kind, "file": file, "triangles": triangles, "made": made - started,
+            "written": done - made, "size": path.stat().st_size / 1e6, "peak": peak / 1e6,
+        }  # fmt: skip
+
+
+def measure_export(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Export every size: the smallest and the largest bed in all kinds and formats."""
+    sides = EXPORTED[:2] if arguments.quick else EXPORTED
+    jobs = [
+        (side, *what) for side in sides for what in EXPORTS[: None if side in (sides[0], sides[-1]) else 1]
+    ]
+    exports = [export(*job) for job in steps.through(jobs)]
+    return Report(_list_exports(exports), exports)
+
+
+def _list_exports(exports: Sequence[Row]) -> Iterator[str]:
     """Give the lines of the report."""
-    yield "\nThe same fingertip, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
-    head = ("pins", "taking part", "period, µs", "to smallest", "CPU mean, µs", "built in, ms", "bytes a pin")
-    rows = [
-        cells(
-            "d .1f .0f .2f .0f .3g .1f", one.pins, one.gathered, one.period * 1e6,
-            one.period / sizes[0].period, one.mean * 1e6, one.built * 1e3, one.bytes_a_pin,
-        )
-        for one in sizes
-    ]  # fmt: skip
-    yield from table(head, rows, left=0)
+    yield "\nA bed of waves, written to a temporary folder; memory besides the bed itself\n"
+    rows = [{**one, "bytes_a_pin": one["peak"] * 1e6 / one["pins"]} for one in exports]
+    yield from tabulate(rows, EXPORT, left=2)

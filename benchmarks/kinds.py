@@ -17,7 +17,7 @@ from digiclay.commands.parser import Parser
 from digiclay.commands.stop import refuse_unwritable, refuse_without, refuse_without_blender
 from digiclay.core.base.errors import OutputError
 
-from .report import Report, Steps, write_report
+from .report import Report, Steps
 
 Options = Callable[[argparse.ArgumentParser], object]
 
@@ -39,8 +39,8 @@ class Benchmark:
 
     Attributes
     ----------
-    measures : tuple of str
-        Module and function ``(arguments, steps) -> Report | None``; imported when the benchmark runs.
+    measure : str
+        Module and function ``(arguments, steps) -> Report``, or list of reports; imported when it runs.
     examples : tuple of str
         Arguments.
     needs : str
@@ -49,7 +49,7 @@ class Benchmark:
         Whether it has these options.
     """
 
-    measures: tuple[str, ...]
+    measure: str
     help: str
     examples: tuple[str, ...] = ("", "--quick --out results")
     options: Options = lambda parser: None
@@ -92,56 +92,57 @@ def _add_commits(parser: argparse.ArgumentParser) -> None:
 
 BENCHMARKS = {
     "session": Benchmark(
-        ("session_parts.measure",), "time of one session and of its parts, on one core",
+        "session_parts.measure", "time of one session and of its parts, on one core",
         ("", "--scene tap --repeats 9", "--calls"), _add_session, quick=False, out=False,
     ),
     "stiff": Benchmark(
-        ("stiff.measure",), "errors of the steppers in stiff and extreme cases", ("", "--full --out results"),
+        "stiff.measure", "errors of the steppers in stiff and extreme cases", ("", "--full --out results"),
         _flag("--full", "also the adaptive stepper, which takes longer than all others"),
     ),
     "precision": Benchmark(
-        ("precision.measure", "precision.measure_whole_bed"),
+        "precision.measure",
         "error against run time, beside SciPy's solvers",
         ("--quick", "--out results", "--whole-bed --out results"),
         _flag("--whole-bed", "also peers that integrate all cells, on the paper's bed (11 minutes more)"),
     ),
     "terms": Benchmark(
-        ("terms.measure",), "cost and effect of each part of the model",
+        "session_parts.measure_terms", "cost and effect of each part of the model",
         ("tap", "ridge_mound_valley --out results"), add_scene,
     ),
-    "scale": Benchmark(("bed_size.measure",), "a control period from 625 pins to a million"),
-    "export": Benchmark(("mesh_export.measure",), "writing a bed as a mesh, from 625 pins to a million"),
+    "scale": Benchmark("bed_size.measure", "a control period from 625 pins to a million"),
+    "export": Benchmark("bed_size.measure_export", "writing a bed as a mesh, from 625 pins to a million"),
     "viewport": Benchmark(
-        ("viewport_cost.measure",), "a tick of a live session in Blender, part by part (needs bpy)",
+        "tick_times.measure_viewport", "a tick of a live session in Blender, part by part (needs bpy)",
         needs="bpy",
     ),
     "ticks": Benchmark(
-        ("tick_times.measure",), "how the time of a tick of a live session is distributed (needs bpy)",
+        "tick_times.measure", "how the time of a tick of a live session is distributed (needs bpy)",
         needs="bpy",
     ),
     "stack": Benchmark(
-        ("runs_together.measure",), "sessions a second, one at a time and many in one call",
+        "runs_together.measure", "sessions a second, one at a time and many in one call",
         options=partial(add_scene, default="ridge_mound_valley"),
     ),
     "made": Benchmark(
-        ("made.measure",), "things formed by recorded strokes, beside the intended relief (needs bpy)",
+        "made.measure", "things formed by recorded strokes, beside the intended relief (needs bpy)",
         ("", "letter_a --bed paper", "leaf face --pictures made"), _add_made, needs="bpy",
     ),
     "cluster": Benchmark(
-        ("cluster_cost.measure",), "overhead of a Dask cluster, one worker and two", needs="distributed"
+        "processes.measure_cluster", "overhead of a Dask cluster, one worker and two", needs="distributed"
     ),
     "serve": Benchmark(
-        ("serve_times.measure",), "deadlines of digiclay serve at 1 kHz, with a client", needs="websockets"
+        "processes.measure_serve", "deadlines of digiclay serve at 1 kHz, with a client", needs="websockets"
     ),
     "methods": Benchmark(
-        ("method_figures.measure",), "force deviation of Methods I and III over paths and drags"
+        "method_figures.measure", "force deviation of Methods I and III over paths and drags"
     ),
     "ablation": Benchmark(
-        ("ablation.measure",), "Method III with one part left out at a time", ("", "--part skirt"),
+        "method_figures.measure_ablation", "Method III with one part left out at a time",
+        ("", "--part skirt"),
         lambda parser: parser.add_argument("--part", metavar="P", help="a row of the table, such as skirt"),
     ),
     "commits": Benchmark(
-        ("commit_pair.measure",), "time of a control period at two commits",
+        "processes.measure_commits", "time of a control period at two commits",
         ("v0.1.0", "v0.1.0 main --turns 9"), _add_commits,
     ),
 }  # fmt: skip
@@ -191,13 +192,13 @@ def run(name: str, arguments: argparse.Namespace) -> int:
     elif benchmark.needs:
         extra = EXTRAS[benchmark.needs]
         refuse_without(benchmark.needs, f"python -m benchmarks {name}", f"pip install digiclay[{extra}]")
-    for place in benchmark.measures:
-        module, _, function = place.partition(".")
-        measure: Any = getattr(import_module(f"{__package__}.{module}"), function)
-        with Steps(io.StringIO() if arguments.quiet else sys.stderr, name) as steps:
-            report: Report | None = measure(arguments, steps)
-        if report is not None:
-            print(report.text())
-            if arguments.out is not None:
-                write_report(report, arguments.out, report.name or name)
+    module, _, function = benchmark.measure.partition(".")
+    measure: Any = getattr(import_module(f"{__package__}.{module}"), function)
+    with Steps(io.StringIO() if arguments.quiet else sys.stderr, name) as steps:
+        reports: Report | list[Report] = measure(arguments, steps)
+    for report in reports if isinstance(reports, list) else [reports]:
+        text = report.text()
+        print(text)
+        if arguments.out is not None:
+            report.write(arguments.out, report.name or name, text)
     return 0

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.commands.progress import table
 from digiclay.commands.stop import refuse_unwritable
 from digiclay.compat import scratch
 from digiclay.core.base.arrays import Floats
@@ -31,7 +30,7 @@ from digiclay.settings.devices import BEDS, make_scene
 from numpy.typing import NDArray
 
 from .kinds import STROKES
-from .report import Report, Steps, cells
+from .report import Report, Steps, tabulate
 
 Relief = Callable[[Floats, Floats], Floats]
 Corners = Sequence[tuple[float, float]]
@@ -285,7 +284,12 @@ def join(files: Sequence[Path], words: Sequence[str], out: Path) -> Path:
     return out
 
 
-HEAD = ("thing", "bed", "strokes", "simulated", "correlation", "slope", "rms", "rms of relief", "CPU")
+#: Columns of the table.
+COLUMNS = {
+    "thing": "title", "bed": "bed", "strokes": "strokes d", "simulated, s": "simulated .1f",
+    "correlation": "correlation .3f", "slope": "slope .2f", "rms, mm": "rms .2f 1e3",
+    "rms of relief, mm": "relief .2f 1e3", "CPU, s": "CPU .1f",
+}  # fmt: skip
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
@@ -296,25 +300,15 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
             raise ParameterError(option, "", f"must be one of {', '.join(choices)}", repr(name))
     if arguments.pictures is not None:
         refuse_unwritable(arguments.pictures)
-    names = arguments.things or list(RELIEFS)[: 1 if arguments.quick else None]
-    things = []
-    for name in steps.through(names):
+    rows = []
+    for name in steps.through(arguments.things or THINGS[: 1 if arguments.quick else None]):
         made = make(name, arguments.bed)
-        things.append(made)
+        rows.append({
+            "thing": made.name, "bed": made.bed, "strokes": made.strokes, "simulated": made.simulated,
+            "correlation": made.correlation, "slope": made.slope, "rms": made.error,
+            "relief": float(made.intended.std()), "CPU": made.spent, "title": made.title,
+        })  # fmt: skip
         if arguments.pictures is not None:
             other = "" if made.bed == made.own_bed else f"_{made.bed}"
             draw_made(made, arguments.pictures / f"made_{name}{other}.jpg")
-    figures = [
-        (
-            made.name, made.bed, made.strokes, made.simulated, made.correlation, made.slope, made.error,
-            float(made.intended.std()), made.spent,
-        )
-        for made in things
-    ]  # fmt: skip
-    rows = [
-        [made.title, *cells("s d", made.bed, made.strokes), f"{made.simulated:.1f} s",
-         *cells(".3f .2f", made.correlation, made.slope), f"{1e3 * made.error:.2f} mm",
-         f"{1e3 * made.intended.std():.2f} mm", f"{made.spent:.1f} s"]
-        for made in things
-    ]  # fmt: skip
-    return Report(["", *table(HEAD, rows)], HEAD, figures)
+    return Report(["", *tabulate(rows, COLUMNS)], rows)

@@ -1,8 +1,4 @@
-"""Counter of numpy calls: arrays that record their operations.
-
-A control period's cost is the number of numpy calls in it, and not seconds on a shared
-machine: the count is the same wherever it is taken.
-"""
+"""Counter of numpy calls, the cost of a control period that is the same on every machine."""
 
 from __future__ import annotations
 
@@ -31,8 +27,8 @@ REDUCTIONS = ("any", "all", "sum", "min", "max", "item", "tolist", "view")
 #: Files whose calls are numpy's own, or this counter's.
 INSIDE = (str(Path(np.__file__).parent), __file__)
 
-#: Number of calls by name and shapes.
-Ledger = Counter[tuple[Any, ...]]
+#: Number of calls by name.
+Ledger = Counter[str]
 
 
 class Counted(np.ndarray[Any, Any]):
@@ -65,10 +61,8 @@ for _name in METHODS:
 
 def _call(name: str, function: Callable[..., Any], arguments: Any, named: dict[str, Any]) -> Any:
     """Note a call, and make it with plain arrays; its result is counted."""
-    plain = _plain(arguments)
-    kinds = (one.shape if isinstance(one, np.ndarray) else type(one).__name__ for one in plain)
-    Counted.ledger[name, *kinds] += 1
-    return _counted(function(*plain, **named))
+    Counted.ledger[name] += 1
+    return _counted(function(*_plain(arguments), **named))
 
 
 def _plain(value: Any) -> Any:
@@ -96,11 +90,7 @@ def _counted(value: Any) -> Any:
 
 @contextmanager
 def note_methods() -> Iterator[None]:
-    """Note methods of plain arrays and numpy's built-in functions too, for as long as the block lasts.
-
-    `Counted` sees a call only if it is the object of the method: ``np.array(rows).dot(counted)`` is none,
-    nor is a method that was bound to a plain array beforehand. What numpy's own modules call is not noted.
-    """
+    """Note methods of plain arrays and numpy's built-in functions too, but not what numpy's modules call."""
 
     def note(frame: FrameType, event: str, called: Any) -> None:
         if event != "c_call" or frame.f_code.co_filename.startswith(INSIDE):
@@ -108,9 +98,9 @@ def note_methods() -> Iterator[None]:
         owner = getattr(called, "__self__", None)
         if type(owner) is np.ndarray:
             if called.__name__ not in REDUCTIONS:
-                Counted.ledger[called.__name__, owner.shape] += 1
+                Counted.ledger[called.__name__] += 1
         elif not isinstance(owner, (np.ndarray, np.ufunc)) and str(called.__module__).startswith("numpy"):
-            Counted.ledger[called.__name__,] += 1
+            Counted.ledger[called.__name__] += 1
 
     former = sys.getprofile()
     sys.setprofile(note)
@@ -146,9 +136,6 @@ def list_calls(scene: Scene) -> Iterator[str]:
     """Give the lines of a table of the calls a period by name."""
     count = min(scene.periods, 2000)
     calls, ledger = period_calls(assemble(scene), scene.trajectories(), count)
-    number: Counter[str] = Counter()
-    for key, times in ledger.items():
-        number[key[0]] += times
     yield f"numpy calls of the first {count} control periods: median {statistics.median(calls):g} a period"
-    rows = [[name, f"{n / count:.1f}"] for name, n in number.most_common() if n >= 0.05 * count]
-    yield from table(("call", "a period"), [*rows, ["all", f"{number.total() / count:.1f}"]])
+    rows = [[name, f"{n / count:.1f}"] for name, n in ledger.most_common() if n >= 0.05 * count]
+    yield from table(("call", "a period"), [*rows, ["all", f"{ledger.total() / count:.1f}"]])

@@ -1,15 +1,15 @@
-"""Problems of the precision benchmark: scene, recorded commands, and reference solution."""
+"""Problems of the benchmarks: scenes, recorded commands, and their solution by our steppers."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -92,21 +92,21 @@ class Problem:
 
     def solve(self, stepper: str, step: float) -> Solution:
         """Integrate by one of our steppers; `step`, s."""
-        return solved(self.with_stepper(stepper, step), self.commands)
+        return solve(self.with_stepper(stepper, step), self.commands)
 
     def with_stepper(self, stepper: str, step: float) -> Scene:
         """Return the scene with a stepper and its step, s."""
-        return replace(
-            self.scene, simulation=replace(self.scene.simulation, stepper=stepper, physics_step=step)
-        )
+        simulation = replace(self.scene.simulation, stepper=stepper, physics_step=step)
+        return replace(self.scene, simulation=simulation)
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Heights, (t, n), m, and total force, (t,), N, at the end of each control period."""
+    """Heights, (t, n), m, total force, (t,), N, and our commands, (t, n), at the end of each period."""
 
     heights: Floats
     forces: Floats
+    commands: Floats | None = None
 
     def compare(self, exact: Solution) -> tuple[float, float]:
         """Return the largest errors of a height, m, and of the total force, N."""
@@ -124,31 +124,29 @@ def live(
 ) -> Scene:
     """Return a problem's scene under Method I, on its bed or one of `side` rows and columns; times in s."""
     rows, waypoints, joined, command = PROBLEMS[name]
-    table: dict[str, Any] = {
-        "layout": {"rows": side or rows, "columns": side or rows},
-        "recorder": "absent",
-        "control": {} if command is None else "absent",
-        "simulation": {"control_period": period, "physics_step": step, "stepper": stepper},
-        "trajectory": {
-            "interpolation": joined,
-            "waypoints": [{"time": t, "position": [v * 1e-3 for v in place]} for t, *place in waypoints],
+    return resolve(
+        {
+            "layout": {"rows": side or rows, "columns": side or rows},
+            "recorder": "absent",
+            "control": {} if command is None else "absent",
+            "simulation": {"control_period": period, "physics_step": step, "stepper": stepper},
+            "trajectory": {
+                "interpolation": joined,
+                "waypoints": [{"time": t, "position": [v * 1e-3 for v in place]} for t, *place in waypoints],
+            },
         },
-    }
-    return resolve(table, name)
+        name,
+    )
 
 
 def problem(name: str, *, side: int | None = None) -> Problem:
     """Record a problem's commands and which cells take part, on its own bed or one of `side` rows."""
     scene, command = live(name, side=side), PROBLEMS[name][3]
-    system = assemble(scene)
-    if command is None:
-        run = periods(system, scene.trajectories(), begin(system), scene.periods)
-        commands = np.array([state.row(system.rows.command) for state in run])
-    else:
-        commands = np.full((scene.periods, scene.cells), command)
-    system = replaying(scene, commands)
-    run = periods(system, scene.trajectories(), begin(system), scene.periods)
-    return Problem(name, scene, commands, [(one.active.cells, one.active.near) for one in run])
+    commands = solve(scene).commands if command is None else np.full((scene.periods, scene.cells), command)
+    assert commands is not None  # our own solutions have them
+    return Problem(
+        name, scene, commands, [(one.active.cells, one.active.near) for one in run(scene, commands)[1]]
+    )
 
 
 def replaying(scene: Scene, commands: Floats) -> System:
@@ -157,20 +155,27 @@ def replaying(scene: Scene, commands: Floats) -> System:
     return replace(system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0))
 
 
-def solved(scene: Scene, commands: Floats) -> Solution:
-    """Integrate under recorded commands, (t, n)."""
-    system = replaying(scene, commands)
-    run = periods(system, scene.trajectories(), begin(system), scene.periods)
-    rows = [(state.row(0), state.row(system.rows.force).sum()) for state in run]
-    return Solution(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+def run(scene: Scene, commands: Floats | None = None) -> tuple[System, Iterator[State]]:
+    """Return a scene's system, with its controller or under commands, (t, n), and its states to come."""
+    system = assemble(scene) if commands is None else replaying(scene, commands)
+    return system, periods(system, scene.trajectories(), begin(system), scene.periods)
 
 
-def _time(scene: Scene, commands: Floats) -> float:
+def solve(scene: Scene, commands: Floats | None = None) -> Solution:
+    """Integrate with the scene's controller, or under commands, (t, n)."""
+    system, states = run(scene, commands)
+    rows = [
+        (state.row(0), state.row(system.rows.force).sum(), state.row(system.rows.command)) for state in states
+    ]
+    heights, forces, played = (np.array(column) for column in zip(*rows, strict=True))
+    return Solution(heights, forces, played)
+
+
+def time_run(scene: Scene, commands: Floats | None = None) -> float:
     """Return the CPU time of a run of which nothing is kept, s."""
-    system, trajectories = replaying(scene, commands), scene.trajectories()
-    start = begin(system)
+    _, states = run(scene, commands)
     started = time.process_time()
-    for _ in periods(system, trajectories, start, scene.periods):
+    for _ in states:
         pass
     return time.process_time() - started
 
@@ -182,7 +187,7 @@ def run_stepper(
     for step in steps:
         scene = task.with_stepper(stepper, step)
         with np.errstate(all="ignore"):
-            errors = solved(scene, task.commands).compare(exact)
-            took = float(np.median([_time(scene, task.commands) for _ in range(repeats)]))
+            errors = task.solve(stepper, step).compare(exact)
+            took = float(np.median([time_run(scene, task.commands) for _ in range(repeats)]))
         count = scene.periods * round(PERIOD / step) * STAGES[stepper]
         yield Work(task.name, stepper, step, *errors, took, count, False)

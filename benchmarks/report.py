@@ -1,29 +1,32 @@
-"""Common parts of the benchmarks: progress, report with files, cells of tables, style of the plots."""
+"""Common parts of the benchmarks: progress, report with files, tables, style of the plots."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
-from digiclay.commands.progress import Line, draw_share
+from digiclay.commands.progress import Line, draw_share, table
 from digiclay.core.base.errors import OutputError
-from digiclay.plots.figure import save
+from digiclay.plots.figure import INK, LINES, empty, save
 
 from digiclay_study.suite_page import describe_machine
 
 Item = TypeVar("Item")
+#: Row of a CSV by column.
+Row = Mapping[str, Any]
 
-#: Okabe and Ito's palette: of the first and second line, and of what is marked.
-BLUE, RED, INK = "#0072B2", "#D55E00", "#222222"
+#: Okabe and Ito's palette: of the first and second line.
+BLUE, RED = LINES[:2]
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans", "font.size": 10, "axes.titlelocation": "left", "axes.titlesize": 11,
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#E0DED8",
     "grid.linewidth": 0.7, "axes.axisbelow": True, "legend.frameon": False, "figure.dpi": 150,
 }  # fmt: skip
+__all__ = ["BLUE", "INK", "RED", "Report", "Row", "Steps", "tabulate"]
 
 
 class Steps(Line):
@@ -64,10 +67,12 @@ class Report:
     ----------
     lines : iterable of str
         The text below the line of versions and machine.
-    head, rows : sequences
-        Columns of the CSV, and their values.
+    rows : sequence of mappings
+        Of the CSV; all have the same keys.
     draw : callable, optional
-        Returns the matplotlib figure.
+        Draws on a matplotlib figure.
+    size : (float, float)
+        Of the figure, inches.
     name : str
         Of the files; by default that of the benchmark.
     packages : tuple of str
@@ -77,9 +82,9 @@ class Report:
     """
 
     lines: Iterable[str]
-    head: Sequence[str] = ()
-    rows: Sequence[Sequence[Any]] = ()
-    draw: Callable[[], Any] | None = None
+    rows: Sequence[Row] = ()
+    draw: Callable[[Any], None] | None = None
+    size: tuple[float, float] = (6.0, 3.6)
     name: str = ""
     packages: tuple[str, ...] = ()
     program: str = ""
@@ -89,30 +94,34 @@ class Report:
         machine = ", ".join(filter(None, [describe_machine(*self.packages), self.program]))
         return "\n".join([machine, *self.lines])
 
+    def write(self, out: Path, name: str, text: str) -> None:
+        """Write ``name.md``, ``name.csv`` and ``name.png``; OutputError if they cannot be."""
+        figures = io.StringIO(newline="")
+        writer = csv.DictWriter(figures, list(self.rows[0]) if self.rows else [], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(self.rows)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            (out / f"{name}.md").write_text(
+                f"# python -m benchmarks {name}\n\n```\n{text}\n```\n", encoding="utf-8"
+            )
+            (out / f"{name}.csv").write_text(figures.getvalue(), encoding="utf-8")
+        except OSError as error:
+            raise OutputError(f"Cannot write into {out}: {error.strerror or error}.") from None
+        if self.draw:
+            with empty(*self.size, STYLE, layout="constrained") as figure:
+                self.draw(figure)
+                save(figure, out / f"{name}.png")
 
-def list_records(records: Sequence[Any]) -> tuple[list[str], list[list[Any]]]:
-    """Return head and rows of a CSV of dataclass instances."""
-    head = [field.name for field in fields(records[0])]
-    return head, [[getattr(record, name) for name in head] for record in records]
+
+def tabulate(rows: Iterable[Row], columns: Mapping[str, str], left: int = 1) -> Iterator[str]:
+    """Give the lines of a table; `columns`: by heading the key of a row, its format and factor, if any."""
+    cells = [[_write_cell(row, *column.split()) for column in columns.values()] for row in rows]
+    yield from table(list(columns), cells, left=left)
 
 
-def cells(forms: str, *values: Any) -> list[str]:
-    """Return the cells of a row of a table; `forms`: format specifications separated by blanks."""
-    return [format(value, form) for form, value in zip(forms.split(), values, strict=True)]
-
-
-def write_report(report: Report, out: Path, name: str) -> None:
-    """Write a report's ``name.md``, ``name.csv`` and ``name.png``; OutputError if they cannot be."""
-    figures = io.StringIO(newline="")
-    writer = csv.writer(figures, lineterminator="\n")
-    writer.writerow(report.head)
-    writer.writerows(report.rows)
-    text = f"# python -m benchmarks {name}\n\n```\n{report.text()}\n```\n"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / f"{name}.md").write_text(text, encoding="utf-8")
-        (out / f"{name}.csv").write_text(figures.getvalue(), encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"Cannot write into {out}: {error.strerror or error}.") from None
-    if report.draw:
-        save(report.draw(), out / f"{name}.png")
+def _write_cell(row: Row, key: str, form: str = "", factor: str = "1") -> str:
+    value = row[key]
+    if value is None:
+        return ""
+    return format(value if factor == "1" else value * float(factor), form)

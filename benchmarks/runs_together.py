@@ -6,18 +6,16 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from digiclay.commands.arguments import scene_of
-from digiclay.commands.progress import table
 from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.evaluation import evaluate
-from digiclay.plots.figure import empty
 
-from .report import BLUE, RED, STYLE, Report, Steps, list_records
+from .report import BLUE, RED, Report, Row, Steps, tabulate
 
 #: Runs in one call; a sweep puts 32 to 63 together.
 COUNTS = (1, 4, 16, 32, 64, 128)
@@ -31,36 +29,11 @@ STUDIES: dict[str, tuple[str, str, float, float]] = {
     "control": ("control", "force_gain", 0.5, 1.2),
     "device": ("valve", "stroke", 0.9, 1.2),
 }
-
-
-@dataclass(frozen=True)
-class Size:
-    """CPU time of a run, alone and in a batch of one size, s.
-
-    Attributes
-    ----------
-    alone, stacked : float
-        Simulated only.
-    judged_alone, judged_stacked : float
-        Recorded and judged, as in a sweep.
-    errors_alone, errors_stacked : float
-        The same with the integration's errors estimated, as in a sweep that is asked for them.
-    """
-
-    study: str
-    runs: int
-    alone: float
-    stacked: float
-    judged_alone: float
-    judged_stacked: float
-    errors_alone: float
-    errors_stacked: float
-
-    @property
-    def pairs(self) -> tuple[tuple[float, float], ...]:
-        """Times alone and in the batch: simulated, judged, errors estimated."""
-        judged, errors = (self.judged_alone, self.judged_stacked), (self.errors_alone, self.errors_stacked)
-        return (self.alone, self.stacked), judged, errors
+#: Processor time of a run, s, alone and in one call: simulated only; recorded and judged, as in a sweep; with
+#: the integration's errors estimated too.
+TIMES = ("alone", "stacked", "judged_alone", "judged_stacked", "errors_alone", "errors_stacked")
+#: What the text says of each pair of them, and the picture.
+PAIRS = {"": "simulated", "judged": "recorded and judged", "errors": "errors estimated too"}
 
 
 def study(scene: Scene, name: str, count: int) -> list[Scene]:
@@ -79,7 +52,7 @@ def _time(work: Callable[[], Any]) -> float:
     return time.process_time() - started
 
 
-def _compare(scene: Scene, name: str, count: int, repeats: int) -> Size:
+def _compare(scene: Scene, name: str, count: int, repeats: int) -> dict[str, Any]:
     """Run a study; the medians of the repeats count.
 
     One run alone and all in one call take turns, so that what else the machine does befalls both alike.
@@ -96,7 +69,8 @@ def _compare(scene: Scene, name: str, count: int, repeats: int) -> Size:
         (lambda: list(measure_together(scenes, errors=True)), count),
     ]
     spent = [[_time(work) / runs for work, runs in works] for _ in range(repeats)]
-    return Size(name, count, *(statistics.median(column) for column in zip(*spent, strict=True)))
+    medians = map(statistics.median, zip(*spent, strict=True))
+    return {"study": name, "runs": count, **dict(zip(TIMES, medians, strict=True))}
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
@@ -107,50 +81,48 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     counts, repeats = (COUNTS[:3], 1) if arguments.quick else (COUNTS, 5)
     jobs = [(name, count) for name in STUDIES for count in counts]
     sizes = [_compare(scene, *job, repeats) for job in steps.through(jobs, lambda job: f"{job[1]} runs")]
-    return Report(_list_lines(scene, sizes), *list_records(sizes), lambda: _draw(sizes))
+    return Report(list(_list_lines(scene, sizes)), sizes, lambda figure: _draw(figure, sizes))
 
 
-def _draw(sizes: Sequence[Size]) -> Any:
+def _draw(figure: Any, sizes: Sequence[Row]) -> None:
     """Draw the runs a second in a batch over those of one at a time, by the runs of the batch."""
-    with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
-        panel = figure.subplots()
-        for study, color, marker in (("control", BLUE, "o"), ("device", RED, "s")):
-            chosen = [size for size in sizes if size.study == study]
-            runs = [size.runs for size in chosen]
-            gains = zip(*([alone / stacked for alone, stacked in size.pairs] for size in chosen), strict=True)
-            labels = ("simulated", "recorded and judged", "errors estimated too")
-            for values, line, label in zip(gains, ("-", "--", ":"), labels, strict=True):
-                panel.loglog(
-                    runs, values, line, color=color, marker=marker,
-                    markerfacecolor=color if line == "-" else "white", label=f"{study} varies, {label}",
-                )  # fmt: skip
-        panel.axhline(6.0, color="#777777", linewidth=1.0, label="the goal")
-        panel.set_xticks(runs, [str(count) for count in runs])
-        panel.set_yticks([1, 2, 4, 6, 10, 20], ["1", "2", "4", "6", "10", "20"])
-        panel.minorticks_off()
-        panel.set(xlabel="runs in one call", ylabel="runs a second, to one at a time")
-        panel.set_title("Many sessions in one call")
-        panel.legend(loc="lower right", fontsize=8.5)
-        return figure
+    panel = figure.subplots()
+    for name, color, marker in zip(STUDIES, (BLUE, RED), "os", strict=True):
+        chosen = [size for size in sizes if size["study"] == name]
+        runs = [size["runs"] for size in chosen]
+        for (alone, stacked), line, label in zip(
+            zip(TIMES[::2], TIMES[1::2], strict=True), ("-", "--", ":"), PAIRS.values(), strict=True
+        ):
+            panel.loglog(
+                runs, [size[alone] / size[stacked] for size in chosen], line, color=color, marker=marker,
+                markerfacecolor=color if line == "-" else "white", label=f"{name} varies, {label}",
+            )  # fmt: skip
+    panel.axhline(6.0, color="#777777", linewidth=1.0, label="the goal")
+    panel.set_xticks(runs, [str(count) for count in runs])
+    panel.set_yticks([1, 2, 4, 6, 10, 20], ["1", "2", "4", "6", "10", "20"])
+    panel.minorticks_off()
+    panel.set(xlabel="runs in one call", ylabel="runs a second, to one at a time")
+    panel.set_title("Many sessions in one call")
+    panel.legend(loc="lower right", fontsize=8.5)
 
 
-def _list_lines(scene: Scene, sizes: Sequence[Size]) -> Iterator[str]:
+def _list_lines(scene: Scene, sizes: Sequence[Row]) -> Iterator[str]:
     """Give the lines of the report."""
     yield f"\nThe first {scene.simulation.duration:g} s of {scene.name}: {scene.periods} control periods,"
     yield f"{scene.cells} cells; CPU time of one core, runs a second; medians, taken in turns."
     yield "judged: recorded and judged, as digiclay sweep does;"
     yield "errors: the integration's errors estimated as well."
-    three = ("alone", "in one call", "times")
-    head = ("runs", *three, "judged: alone", *three[1:], "errors: alone", *three[1:])
+    columns = {"runs": "runs d"}
+    for pair, alone, stacked in zip(PAIRS, TIMES[::2], TIMES[1::2], strict=True):
+        label = f"{pair}: " if pair else ""
+        columns |= {f"{label}alone": f"{alone} .3g", f"{label}in one call": f"{stacked} .3g"}
+        columns |= {f"{label}times": f"{alone}/{stacked} .1f"}
     for name, (section, key, _, _) in STUDIES.items():
         yield f"\n{section}.{key} varies"
-        yield from table(head, [_list_cells(size) for size in sizes if size.study == name], left=0)
+        yield from tabulate([_rates(size) for size in sizes if size["study"] == name], columns, left=0)
 
 
-def _list_cells(size: Size) -> list[str]:
-    """Return a row of the table."""
-    triples = (
-        (f"{1.0 / alone:.3g}", f"{1.0 / stacked:.3g}", f"{alone / stacked:.1f}")
-        for alone, stacked in size.pairs
-    )
-    return [str(size.runs), *(cell for triple in triples for cell in triple)]
+def _rates(size: Row) -> dict[str, float]:
+    """Return the runs a second of each kind, and the ratio of each pair."""
+    rates = {"runs": size["runs"], **{name: 1.0 / size[name] for name in TIMES}}
+    return rates | {f"{a}/{b}": size[a] / size[b] for a, b in zip(TIMES[::2], TIMES[1::2], strict=True)}

@@ -1,4 +1,4 @@
-"""Benchmark ``session``: time of a session and of its parts."""
+"""Benchmarks ``session`` and ``terms``: time of a session by part, and without parts of the model."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import cProfile
 import statistics
 from collections.abc import Iterator
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter, process_time
 from types import CodeType
-from typing import NamedTuple
+from typing import Any
 
 from digiclay import core
 from digiclay.commands.arguments import scene_of
@@ -20,8 +21,9 @@ from digiclay.core.scene.recorder import Recorder, RunRecording
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.memory_limit import check_memory
 
-from .numpy_calls import list_calls
-from .report import Report, Steps
+from .numpy_calls import list_calls, period_calls
+from .problems import Solution, solve, time_run
+from .report import Report, Steps, tabulate
 
 #: Parts of a control period and what is in them.
 PARTS = {
@@ -41,13 +43,18 @@ FILES = {
     "engine/": "the rest",
 }  # fmt: skip
 CORE = Path(core.__file__).parent
-
-
-class Took(NamedTuple):
-    """Elapsed time and processor time of a session, s; other processes hardly affect the latter."""
-
-    elapsed: float
-    processor: float
+#: What can be left out, and its section of the scene.
+TERMS = {
+    "conduit": "conduit", "valve lag": "valve_lag", "dead time": "delay", "relaxation": "relaxation",
+    "sensors": "sensors",
+}  # fmt: skip
+#: Physics steps that are longer: they cost less too.
+LONGER = "physics step = control period"
+EFFECTS = {
+    "scene": "scene", "calls": "calls g", "µs a period": "seconds .0f 1e6", "bytes a pin": "bytes d",
+    "replayed, µm": "replayed_m .3g 1e6", "mN": "replayed_N .3g 1e3", "live, µm": "live_m .3g 1e6",
+    "live, mN": "live_N .3g 1e3",
+}  # fmt: skip
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
@@ -58,12 +65,14 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     for _ in steps.through(range(arguments.repeats)):
         plain.append(time_session(scene))
         profile = cProfile.Profile(builtins=False)
-        split.append(divide_time(profile, time_session(scene, profile).elapsed))
+        split.append(divide_time(profile, time_session(scene, profile)[0]))
     lines = list(_list_lines(scene, plain, split))
     return Report([*lines, "", *list_calls(scene)] if arguments.calls else lines)
 
 
-def _list_lines(scene: Scene, plain: list[Took], split: list[dict[str, float]]) -> Iterator[str]:
+def _list_lines(
+    scene: Scene, plain: list[tuple[float, float]], split: list[dict[str, float]]
+) -> Iterator[str]:
     """Give the lines of the report."""
     simulated = scene.periods * scene.simulation.control_period
     whole, processor = (statistics.median(times) for times in zip(*plain, strict=True))
@@ -81,8 +90,8 @@ def _list_lines(scene: Scene, plain: list[Took], split: list[dict[str, float]]) 
     yield f"  {'all':<10} {whole / scene.periods * 1e6:11.1f}         without it"
 
 
-def time_session(scene: Scene, profile: cProfile.Profile | None = None) -> Took:
-    """Run a session as `core.session.run_scene.run` does; return its times."""
+def time_session(scene: Scene, profile: cProfile.Profile | None = None) -> tuple[float, float]:
+    """Run a session as `core.session.run_scene.run` does; return its elapsed and its processor time, s."""
     system, trajectories = assemble(scene), scene.trajectories()
     state = simulation.begin(system)
     observe = RunRecording(scene.recorder or Recorder(), system.rows, state, scene.periods).observe
@@ -90,7 +99,7 @@ def time_session(scene: Scene, profile: cProfile.Profile | None = None) -> Took:
         started = perf_counter(), process_time()
         for reached in simulation.periods(system, trajectories, state, scene.periods):
             observe(reached)
-        return Took(perf_counter() - started[0], process_time() - started[1])
+        return perf_counter() - started[0], process_time() - started[1]
 
 
 def divide_time(profile: cProfile.Profile, whole: float) -> dict[str, float]:
@@ -112,3 +121,50 @@ def _find_part(code: CodeType | str) -> str:
         return ""
     name = file.relative_to(CORE).as_posix()
     return next((part for beginning, part in FILES.items() if name.startswith(beginning)), "")
+
+
+def without(scene: Scene, term: str) -> Scene | None:
+    """Return a scene without a term; None where it has none. `term`: key of `TERMS`, or `LONGER`."""
+    if term == LONGER:
+        simulation = replace(scene.simulation, physics_step=scene.simulation.control_period)
+        return None if simulation == scene.simulation else replace(scene, simulation=simulation)
+    section = TERMS[term]
+    return None if scene.section(section) is None else scene.with_sections(**{section: None})
+
+
+def measure_terms(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Leave out every term by itself, then all of them."""
+    scene, _ = scene_of(arguments)
+    if arguments.quick:
+        simulation = replace(scene.simulation, duration=min(scene.simulation.duration, 2.0))
+        scene = replace(scene, simulation=simulation)
+    full = solve(scene)
+    scenes, rest = {"the full scene": scene}, scene
+    for term in (*TERMS, LONGER):
+        less = without(scene, term)
+        if less is not None:
+            scenes[f"without {term}" if term in TERMS else term] = less
+            rest = without(rest, term) or rest
+    if rest is not scene:
+        scenes["all of these"] = rest
+    repeats = 1 if arguments.quick else 3
+    rows = [{"scene": name, **_compare(scenes[name], full, repeats)} for name in steps.through(list(scenes))]
+    title = (
+        f"\n{scene.name}: {scene.cells} cells, {scene.periods} control periods of "
+        f"{scene.simulation.control_period * 1e3:g} ms.\n"
+        "Cost, and the largest difference of a height and of the total force from the full scene: under\n"
+        "the commands recorded there, and live. The cost of the recorder is in `benchmarks session`.\n"
+    )
+    return Report([title, *tabulate(rows, EFFECTS)], rows, name=f"terms_{scene.name}")
+
+
+def _compare(scene: Scene, full: Solution, repeats: int) -> dict[str, Any]:
+    """Return a scene's cost, and its differences from the full one, m and N."""
+    system = assemble(scene)
+    calls = period_calls(system, scene.trajectories(), min(scene.periods, 400))[0]
+    spent = statistics.median(time_run(scene) for _ in range(repeats)) / scene.periods
+    replayed, live = solve(scene, full.commands).compare(full), solve(scene).compare(full)
+    return {
+        "calls": statistics.median(calls), "seconds": spent, "bytes": 8 * system.rows.count,
+        "replayed_m": replayed[0], "replayed_N": replayed[1], "live_m": live[0], "live_N": live[1],
+    }  # fmt: skip

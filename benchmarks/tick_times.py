@@ -1,11 +1,14 @@
-"""Benchmark ``ticks``: distribution of the time of a live session's tick while a hand draws, part by part."""
+"""Benchmarks ``ticks`` and ``viewport``: a live session's tick in Blender, part by part, and its skin."""
 
 from __future__ import annotations
 
 import argparse
 import gc
 import os
+import statistics
 import time
+import tracemalloc
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,21 +16,161 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from digiclay.commands.progress import table
+from digiclay import bridge
 from digiclay.compat import bpy, scratch
+from digiclay.core.base.arrays import Floats
+from digiclay.core.model.layout import Layout
+from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, live_session, snapshot
-from digiclay.device import view
+from digiclay.device import form, view
+from digiclay.device.instant import Instant, find_ellipsoid
 from digiclay.live import bed_state, tick
 from digiclay.operators.add_bed import add, select_only
-from digiclay.plots.figure import empty
+from digiclay.panels import display
 from digiclay.sessions import running, sculpting
 from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.settings import properties
+from digiclay.settings.devices import make_scene
 from digiclay.strokes.stroke import draw
-from numpy.typing import NDArray
 
-from .report import BLUE, INK, RED, STYLE, Report, Steps
-from .viewport_cost import settings
+from .report import BLUE, INK, RED, Report, Row, Steps, tabulate
+
+#: What a tick does. The rest of it is in none of these; garbage is collected within any of them.
+PARTS = ("read", "simulate", "monitor", "pack", "finger", "store", "show", "evaluate", "garbage")
+#: Ticks that are not counted: the fingertip comes down, and everything is used for the first time.
+WARM_UP = 90
+#: Share of the time between ticks that their control periods may take: no limit.
+EVERY_PERIOD = 1e9
+
+
+@dataclass(frozen=True, eq=False)
+class Ticks:
+    """Times of some ticks, s, (t,).
+
+    Attributes
+    ----------
+    elapsed, spent : ndarray (t,)
+        Of each tick, its evaluation included, by the wall and by the processor.
+    parts : dict of ndarray (t,)
+        Of each of `PARTS`.
+    """
+
+    elapsed: Floats
+    spent: Floats
+    parts: dict[str, Floats]
+
+
+@contextmanager
+def open_session(scene: Scene) -> Iterator[Any]:
+    """Give a bed with a session in the open file, and take both away again."""
+    with settings(), scratch():
+        bed = add(bpy.context, scene)
+        select_only(bpy.context, bed)
+        tick.start(bpy.context, bed)
+        try:
+            yield bed
+        finally:
+            tick.stop(bed.session_uid)
+
+
+@contextmanager
+def settings() -> Iterator[None]:
+    """Register the settings of beds within the block, unless the extension is enabled."""
+    if hasattr(bpy.types.Object, "digiclay"):
+        yield
+        return
+    properties.register()
+    display.register()
+    try:
+        yield
+    finally:
+        display.unregister()
+        properties.unregister()
+
+
+def _find_session(bed: Any) -> running.Running:
+    session = running.find(bed)
+    assert session is not None
+    return session
+
+
+def time_ticks(
+    move: Callable[[int], None], span: float, ticks: int, clock: Callable[[], float] = time.process_time
+) -> Ticks:
+    """Time ticks of the open sessions, `span` s apart; `move`: moves the fingertip; `clock`: of the parts."""
+    whole, rows = [], []
+    with _time_parts(clock) as spent:
+        for count in range(WARM_UP + ticks):
+            move(count)
+            spent.clear()
+            began = time.perf_counter(), time.process_time()
+            tick.tick(bpy.context, count * span)
+            evaluating = clock()
+            bpy.context.evaluated_depsgraph_get()
+            spent["evaluate"] += clock() - evaluating
+            whole.append((time.perf_counter() - began[0], time.process_time() - began[1]))
+            spent["simulate"] -= spent["monitor"] + spent["pack"]
+            rows.append([spent[name] for name in PARTS])
+    elapsed, processor = np.array(whole[WARM_UP:]).T
+    return Ticks(elapsed, processor, dict(zip(PARTS, np.array(rows[WARM_UP:]).T, strict=True)))
+
+
+@contextmanager
+def _time_parts(clock: Callable[[], float]) -> Iterator[defaultdict[str, float]]:
+    """Time the parts of ticks, on the session's own functions, until the context is left."""
+    spent: defaultdict[str, float] = defaultdict(float)
+    places = [
+        (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"), (accuracy, "note", "monitor"),
+        (accuracy, "catch_up", "monitor"), (accuracy, "begin_stretch", "monitor"),
+        (snapshot, "dump", "pack"), (tick, "_move_finger", "finger"),
+        (tick, "_evaluate", "evaluate"), (bed_state, "write", "store"), (view, "show_state", "show"),
+    ]  # fmt: skip
+    former: list[tuple[Any, str, Any]] = [(module, name, getattr(module, name)) for module, name, _ in places]
+    running_parts: set[str] = set()
+    for module, name, part in places:
+        setattr(module, name, _timed(spent, running_parts, clock, part, getattr(module, name)))
+    # Every control period that is due is simulated, however little of the machine others leave: a tick that
+    # leaves some out takes less time than it is to be measured with.
+    former.append((live_session, "SHARE", live_session.SHARE))
+    live_session.SHARE = EVERY_PERIOD
+
+    def watch(phase: str, _: dict[str, int]) -> None:
+        spent["garbage"] += clock() * (-1.0 if phase == "start" else 1.0)
+
+    gc.callbacks.append(watch)
+    try:
+        yield spent
+    finally:
+        gc.callbacks.remove(watch)
+        for module, name, function in former:
+            setattr(module, name, function)
+
+
+def _timed(
+    spent: defaultdict[str, float],
+    active: set[str],
+    clock: Callable[[], float],
+    part: str,
+    function: Callable[..., Any],
+) -> Callable[..., Any]:
+    """Return a function that adds its time to a part; the outermost call of the part counts."""
+
+    def timed(*arguments: Any, **named: Any) -> Any:
+        if part in active:
+            return function(*arguments, **named)
+        active.add(part)
+        began = clock()
+        try:
+            return function(*arguments, **named)
+        finally:
+            active.discard(part)
+            spent[part] += clock() - began
+
+    return timed
+
+
+# Ticks while a hand draws
 
 #: Rows and columns of the beds, their pitch and the bore of their pins, m, and the time that 99 of 100 ticks
 #: are to keep to, s.
@@ -39,195 +182,49 @@ SHARES = (0.5, 0.9, 0.99, 0.999, 1.0)
 NAMES = ("median", "90 %", "99 %", "99.9 %", "largest")
 #: Ticks a second.
 RATE = 60
-#: What a tick does. The rest of it is in none of these; garbage is collected within any of them.
-PARTS = ("read", "simulate", "monitor", "pack", "finger", "store", "show", "evaluate", "garbage")
-#: Ticks that are not counted: the fingertip comes down, and everything is used for the first time.
-WARM_UP = 90
 #: The hand draws circles of this radius, m, each in so many ticks, and presses so deep, m.
 RADIUS, ROUND, DEPTH = 12e-3, 120, 4e-3
-#: Share of the time between ticks that their control periods may take: no limit.
-EVERY_PERIOD = 1e9
 
 
-@dataclass(frozen=True, eq=False)
-class Ticks:
-    """Times of some ticks of one bed.
+def draw_circles(rows: int, columns: int, pitch: float, bore: float, ticks: int) -> Ticks:
+    """Add a bed, draw circles on it as a hand does, and time `ticks` ticks; `pitch`, `bore`, m."""
 
-    Attributes
-    ----------
-    rows, columns : int
-        Of the bed.
-    pitch : float
-        m.
-    elapsed : ndarray (t,)
-        Of each tick, its evaluation included, by the wall, s.
-    spent : ndarray (t,)
-        The same by the processor's time of this process, s: what others use of the machine is not in it.
-    parts : dict of ndarray (t,)
-        Processor's time of each of `PARTS`, s.
-    """
+    def place(count: int) -> tuple[float, float]:
+        turn = 2.0 * np.pi * count / ROUND
+        return float(RADIUS * np.cos(turn)), float(RADIUS * np.sin(turn))
 
-    rows: int
-    columns: int
-    pitch: float
-    elapsed: NDArray[np.float64]
-    spent: NDArray[np.float64]
-    parts: dict[str, NDArray[np.float64]]
+    def move(count: int) -> None:
+        x, y = place(count)
+        drawn = partial(draw, time=(count + 1) / RATE, x=x, y=y, depth=DEPTH)
+        running.put(change_stroke(_find_session(bed), number, drawn))
 
-    @property
-    def name(self) -> str:
-        """The bed, in words."""
-        return f"{self.rows} x {self.columns} at {1e3 * self.pitch:g} mm"
-
-
-def time_ticks(rows: int, columns: int, pitch: float, bore: float, ticks: int) -> Ticks:
-    """Add a bed, draw on it as a hand does, and time `ticks` ticks; `pitch`, `bore`, m."""
-    spent_in: dict[str, list[float]] = {name: [] for name in PARTS}
-    elapsed, spent = [], []
-    with settings(), scratch():
-        scene = resolve(
-            {"layout": {"rows": rows, "columns": columns, "pitch": pitch}, "actuator": {"bore": bore}}
-        )
-        bed = add(bpy.context, scene)
-        select_only(bpy.context, bed)
-        tick.start(bpy.context, bed)
-        try:
-            with _time_parts() as clock:
-                number = _begin_stroke(bed)
-                for count in range(WARM_UP + ticks):
-                    _draw_on(bed, number, count)
-                    clock.clear()
-                    began = time.perf_counter(), time.process_time()
-                    tick.tick(bpy.context, count / RATE)
-                    evaluating = time.process_time()
-                    bpy.context.evaluated_depsgraph_get()
-                    ended = time.perf_counter(), time.process_time()
-                    if count >= WARM_UP:
-                        clock["evaluate"] += ended[1] - evaluating
-                        clock["simulate"] -= clock["monitor"] + clock["pack"]
-                        elapsed.append(ended[0] - began[0])
-                        spent.append(ended[1] - began[1])
-                        for name in PARTS:
-                            spent_in[name].append(clock[name])
-        finally:
-            tick.stop(bed.session_uid)
-    parts = {name: np.array(values) for name, values in spent_in.items()}
-    return Ticks(rows, columns, pitch, np.array(elapsed), np.array(spent), parts)
-
-
-def _place(count: int) -> tuple[float, float]:
-    """Return where the hand is at a tick, m."""
-    turn = 2.0 * np.pi * count / ROUND
-    return float(RADIUS * np.cos(turn)), float(RADIUS * np.sin(turn))
-
-
-def _begin_stroke(bed: Any) -> int:
-    """Put the mouse down; return the number of the stroke."""
-    session = running.find(bed)
-    assert session is not None
-    session, number = queue_stroke(session, *_place(0), DEPTH)
-    running.put(session)
-    return number
-
-
-def _draw_on(bed: Any, number: int, count: int) -> None:
-    """Move the mouse on to where it is at a tick."""
-    session, (x, y) = running.find(bed), _place(count)
-    assert session is not None
-    drawn = partial(draw, time=(count + 1) / RATE, x=x, y=y, depth=DEPTH)
-    running.put(change_stroke(session, number, drawn))
-
-
-class _Clock(dict[str, float]):
-    """Processor's time by part, s; nothing counts as 0.
-
-    Attributes
-    ----------
-    running : set of str
-        Parts that are in progress.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.running: set[str] = set()
-
-    def __missing__(self, name: str) -> float:
-        return 0.0
-
-
-@contextmanager
-def _time_parts() -> Iterator[_Clock]:
-    """Time the parts of ticks, on the session's own functions, until the context is left."""
-    clock = _Clock()
-    places = [
-        (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"), (accuracy, "note", "monitor"),
-        (accuracy, "catch_up", "monitor"), (accuracy, "begin_stretch", "monitor"),
-        (snapshot, "dump", "pack"), (tick, "_move_finger", "finger"),
-        (tick, "_evaluate", "evaluate"), (bed_state, "write", "store"), (view, "show_state", "show"),
-    ]  # fmt: skip
-    former: list[tuple[Any, str, Any]] = [(module, name, getattr(module, name)) for module, name, _ in places]
-    for module, name, part in places:
-        setattr(module, name, _timed(clock, part, getattr(module, name)))
-    # Every control period that is due is simulated, however little of the machine others leave: a tick that
-    # leaves some out takes less time than it is to be measured with.
-    former.append((live_session, "SHARE", live_session.SHARE))
-    live_session.SHARE = EVERY_PERIOD
-    watch = _watch_garbage(clock)
-    gc.callbacks.append(watch)
-    try:
-        yield clock
-    finally:
-        gc.callbacks.remove(watch)
-        for module, name, function in former:
-            setattr(module, name, function)
-
-
-def _timed(clock: _Clock, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that adds its time to a part; the outermost call of the part counts."""
-
-    def timed(*arguments: Any, **named: Any) -> Any:
-        if part in clock.running:
-            return function(*arguments, **named)
-        clock.running.add(part)
-        began = time.process_time()
-        try:
-            return function(*arguments, **named)
-        finally:
-            clock.running.discard(part)
-            clock[part] += time.process_time() - began
-
-    return timed
-
-
-def _watch_garbage(clock: _Clock) -> Callable[[str, dict[str, int]], None]:
-    """Return what adds the time of each collection of garbage."""
-    began = 0.0
-
-    def watch(phase: str, _told: dict[str, int]) -> None:
-        nonlocal began
-        if phase == "start":
-            began = time.process_time()
-        else:
-            clock["garbage"] += time.process_time() - began
-
-    return watch
+    layout = {"rows": rows, "columns": columns, "pitch": pitch}
+    with open_session(resolve({"layout": layout, "actuator": {"bore": bore}})) as bed:
+        session, number = queue_stroke(_find_session(bed), *place(0), DEPTH)
+        running.put(session)
+        return time_ticks(move, 1.0 / RATE, ticks)
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
-    """Measure every bed on one core."""
+    """Measure ticks while a hand draws, on every bed, on one core."""
     keep_to_one_core()
-    count, beds = QUICK if arguments.quick else FULL, []
-    for rows, columns, pitch, bore, _ in steps.through(BEDS, lambda bed: f"{bed[0]} x {bed[1]}"):
-        beds.append(time_ticks(rows, columns, pitch, bore, count))
-    head = ("rows", "columns", "pitch_m", "ticks", "part", *(f"share_{share:g}_s" for share in SHARES))
-    figures = [
-        [bed.rows, bed.columns, bed.pitch, count, name, *np.quantile(times, SHARES)]
-        for bed in beds
-        for name, times in list_parts(bed).items()
+    count = QUICK if arguments.quick else FULL
+    beds = [
+        list_parts(draw_circles(*bed[:4], count))
+        for bed in steps.through(BEDS, lambda bed: f"{bed[0]} x {bed[1]}")
     ]
+    rows = [
+        {
+            "rows": bed[0], "columns": bed[1], "pitch_m": bed[2], "ticks": count, "part": name,
+            **{f"share_{s:g}_s": time for s, time in zip(SHARES, np.quantile(times, SHARES), strict=True)},
+        }
+        for bed, parts in zip(BEDS, beds, strict=True)
+        for name, times in parts.items()
+    ]  # fmt: skip
     return Report(
-        _list_lines(beds), head, figures, lambda: _draw(beds), program=f"Blender {bpy.app.version_string}"
-    )
+        list(_list_lines(beds, rows)), rows, partial(_draw, beds=beds), (7.2, 2.1 * len(beds)),
+        program=f"Blender {bpy.app.version_string}",
+    )  # fmt: skip
 
 
 def keep_to_one_core() -> None:
@@ -238,40 +235,155 @@ def keep_to_one_core() -> None:
             os.sched_setaffinity(int(thread), core)
 
 
-def _list_lines(beds: Sequence[Ticks]) -> Iterator[str]:
-    """Give the lines of the report."""
-    yield f"\nTicks of a live session at {RATE} a second while a hand draws with the Press tool; one core,"
-    yield "without drawing. Processor time, ms. evaluate: Blender's geometry nodes; pack and store: the state"
-    yield "for undo and files; monitor: estimate of the error; other: what is in no part."
-    for bed, (_, _, _, _, goal) in zip(beds, BEDS, strict=True):
-        kept_to = 100.0 * np.mean(bed.spent < goal)
-        yield f"\n{bed.name}, {len(bed.spent)} ticks; {kept_to:.2f} % under {1e3 * goal:g} ms\n"
-        rows = [
-            [name, *(f"{1e3 * time:.2f}" for time in np.quantile(times, SHARES))]
-            for name, times in list_parts(bed).items()
-        ]
-        yield from table(("", *NAMES), rows)
-
-
-def list_parts(bed: Ticks) -> dict[str, Any]:
+def list_parts(bed: Ticks) -> dict[str, Floats]:
     """Return the times of a bed's ticks, s, by the lines of the report."""
     rest = bed.spent - sum(times for name, times in bed.parts.items() if name != "garbage")
     return {"whole tick": bed.spent, **bed.parts, "other": rest, "whole, elapsed time": bed.elapsed}
 
 
-def _draw(beds: Sequence[Ticks]) -> Any:
+def _name_bed(bed: tuple[int, int, float, float, float], ticks: int) -> str:
+    return f"{bed[0]} x {bed[1]} at {1e3 * bed[2]:g} mm, {ticks} ticks"
+
+
+def _list_lines(beds: Sequence[dict[str, Floats]], rows: Sequence[Row]) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield f"\nTicks of a live session at {RATE} a second while a hand draws with the Press tool; one core,"
+    yield "without drawing. Processor time, ms. evaluate: Blender's geometry nodes; pack and store: the state"
+    yield "for undo and files; monitor: estimate of the error; other: what is in no part."
+    columns = {name: f"share_{s:g}_s .2f 1e3" for name, s in zip(NAMES, SHARES, strict=True)}
+    for number, (bed, parts) in enumerate(zip(BEDS, beds, strict=True)):
+        spent, goal = parts["whole tick"], bed[-1]
+        kept_to = 100.0 * np.mean(spent < goal)
+        yield f"\n{_name_bed(bed, len(spent))}; {kept_to:.2f} % under {1e3 * goal:g} ms\n"
+        own = rows[number * len(parts) : (number + 1) * len(parts)]
+        yield from tabulate(own, {"": "part", **columns})
+
+
+def _draw(figure: Any, beds: Sequence[dict[str, Floats]]) -> None:
     """Draw how the times of the ticks are distributed, one panel a bed."""
-    goals = [bed[-1] for bed in BEDS]
-    with empty(7.2, 2.1 * len(beds), STYLE, layout="constrained") as figure:
-        panels = figure.subplots(len(beds), 1, sharex=True, squeeze=False).ravel()
-        highest = 1e3 * max(*(float(bed.spent.max()) for bed in beds), *goals)
-        bins = np.arange(0.0, highest + 0.5, 0.25)
-        for panel, bed, goal in zip(panels, beds, goals, strict=True):
-            panel.hist(1e3 * bed.spent, bins, color=BLUE, log=True)
-            panel.axvline(1e3 * goal, color=RED, linestyle="--", label=f"goal: {1e3 * goal:g} ms")
-            share = 1e3 * float(np.quantile(bed.spent, 0.99))
-            panel.axvline(share, color=INK, linestyle=":", label=f"99 %: {share:.1f} ms")
-            panel.set(title=f"{bed.name}, {len(bed.spent)} ticks", ylabel="ticks in 0.25 ms")
-            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
-        panels[-1].set_xlabel("processor time of a tick, ms")
-        return figure
+    panels = figure.subplots(len(beds), 1, sharex=True, squeeze=False).ravel()
+    spents = [parts["whole tick"] for parts in beds]
+    highest = 1e3 * max(*(float(spent.max()) for spent in spents), *(bed[-1] for bed in BEDS))
+    for panel, bed, spent in zip(panels, BEDS, spents, strict=True):
+        panel.hist(1e3 * spent, np.arange(0.0, highest + 0.5, 0.25), color=BLUE, log=True)
+        panel.axvline(1e3 * bed[-1], color=RED, linestyle="--", label=f"goal: {1e3 * bed[-1]:g} ms")
+        share = 1e3 * float(np.quantile(spent, 0.99))
+        panel.axvline(share, color=INK, linestyle=":", label=f"99 %: {share:.1f} ms")
+        panel.set(title=_name_bed(bed, len(spent)), ylabel="ticks in 0.25 ms")
+        panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    panels[-1].set_xlabel("processor time of a tick, ms")
+
+
+# Ticks while a fingertip is dragged, the memory they leave, and the skin
+
+#: Rows and columns of the beds, and the time a tick of them may take, s.
+VIEWPORT = ((25, 25, 5e-3), (100, 100, 10e-3), (250, 400, 40e-3))
+#: Ticks that are timed, with --quick and without, and the time between two, s.
+FEW, MANY, SPAN = 40, 200, 33e-3
+#: Parts of the report, each of some of `PARTS`.
+STAGES = {
+    "read": ("read",), "simulate": ("simulate", "monitor"), "keep": ("pack", "finger", "store"),
+    "write": ("show",), "evaluate": ("evaluate",),
+}  # fmt: skip
+#: Size of the circle the pressed fingertip draws, m, and how deep below the pins at rest, m.
+CIRCLE, PRESSED = 8e-3, 5e-3
+#: How often memory is read in as many ticks as are timed; each time garbage is collected.
+READINGS = 6
+#: What is drawn, by turns: form, and kind of skin.
+SHOWN = (("pins", "smooth"), ("skin", "smooth"), ("skin", "membrane"), ("both", "smooth"))
+#: Evaluations in a row before another form has its turn; the first of them is not counted.
+IN_A_ROW = 6
+
+
+def measure_viewport(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Measure every bed."""
+    ticks = FEW if arguments.quick else MANY
+    rows = [
+        {**measure_bed(*bed[:2], ticks), "goal": bed[2], **measure_skin(*bed[:2], ticks)}
+        for bed in steps.through(VIEWPORT, lambda bed: f"{bed[0] * bed[1]} pins")
+    ]
+    first = {
+        "pins": "pins d", **{name: f"{name}_s .2f 1e3" for name in STAGES}, "tick": "tick_s .2f 1e3",
+        "goal": "goal g 1e3", "95 % within": "tick_95_s .2f 1e3",
+        "memory grown, kB": "growth_bytes .1f 1e-3",
+    }  # fmt: skip
+    skins = {
+        "pins alone" if shown == "pins" else f"{shown}, {kind}": f"{shown}_{kind}_s .2f 1e3"
+        for shown, kind in SHOWN
+    }
+    lines = [
+        "\nA tick of a live session: 33 ms of simulated time while a fingertip presses and drags; medians.",
+        "read: the fingertip's place; keep: the state into the bed, for undo and files; write: pins;",
+        "evaluate: Blender's geometry nodes, without drawing. Times in ms.\n",
+        *tabulate(rows, first, left=0),
+        "\nAll pins moved, forms by turns: processor time of the geometry nodes, medians, ms.\n",
+        *tabulate(rows, {"pins": "pins d", **skins}, left=0),
+    ]
+    written = [{key: value for key, value in row.items() if key != "goal"} for row in rows]
+    return Report(lines, written, program=f"Blender {bpy.app.version_string}")
+
+
+def measure_bed(rows: int, columns: int, ticks: int) -> dict[str, float]:
+    """Add a bed, press and drag its fingertip, and time `ticks` ticks of its session, s."""
+
+    def move(count: int) -> None:
+        scene, turn = _find_session(bed).scene, 2.0 * np.pi * count / ROUND
+        down = min(count / (0.8 * WARM_UP), 1.0) * (PRESSED + 2e-3)
+        height = scene.actuator.rest_height + 2e-3 - down
+        pose = np.array([CIRCLE * np.cos(turn), CIRCLE * np.sin(turn), height, 1.0, 0.0, 0.0, 0.0])
+        bridge.place_fingertip(view.fingertip_of(bed), pose, find_ellipsoid(scene))
+        bpy.context.view_layer.update()
+
+    with open_session(make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master")) as bed:
+        timed = time_ticks(move, SPAN, ticks, time.perf_counter)
+        growth = _measure_growth(move, WARM_UP + ticks, ticks)
+    parts = {
+        f"{stage}_s": float(np.median(sum(timed.parts[name] for name in names)))
+        for stage, names in STAGES.items()
+    }
+    whole = {"tick_s": float(np.median(timed.elapsed)), "tick_95_s": float(np.quantile(timed.elapsed, 0.95))}
+    return {"pins": rows * columns, **parts, **whole, "growth_bytes": growth}
+
+
+def _measure_growth(move: Callable[[int], None], first: int, ticks: int) -> int:
+    """Return by how much Python's least memory has risen from some ticks to as many later, bytes.
+
+    The least, because a session's arrays and its monitor of the error come and go; a leak never goes.
+    The first of three rounds replaces what was allocated before the counting began.
+    """
+    tracemalloc.start()
+    try:
+        floors = []
+        for part in range(3):
+            sizes = []
+            for count in range(ticks):
+                move(first + part * ticks + count)
+                tick.tick(bpy.context, SPAN * (first + part * ticks + count))
+                bpy.context.evaluated_depsgraph_get()
+                if count % max(ticks // READINGS, 1) == 0:
+                    gc.collect()
+                    sizes.append(tracemalloc.get_traced_memory()[0])
+            floors.append(min(sizes))
+    finally:
+        tracemalloc.stop()
+    return floors[2] - floors[1]
+
+
+def measure_skin(rows: int, columns: int, updates: int) -> dict[str, float]:
+    """Move all pins of a bed, and time Blender's evaluation of each form, at least `updates` times, s."""
+    instant = Instant.at_rest(Layout(rows=rows, columns=columns))
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((2, len(instant.height)))
+    spent: list[list[float]] = [[] for _ in SHOWN]
+    with scratch():
+        bed = view.build(instant, bpy.context.scene.collection)
+        while len(spent[0]) < updates:
+            for times, (shown, kind) in zip(spent, SHOWN, strict=True):
+                form.set_form(bed, shown)
+                form.set_kind(bed, kind)
+                for count in range(IN_A_ROW):
+                    bridge.write_cells(bed.data, instant.position, instant.height + noise[count % 2])
+                    started = time.process_time()
+                    bpy.context.evaluated_depsgraph_get()
+                    if count:
+                        times.append(time.process_time() - started)
+    return {f"{s}_{kind}_s": statistics.median(t) for (s, kind), t in zip(SHOWN, spent, strict=True)}

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.peers import LOOP, SOLVERS, loop, peer
-from benchmarks.precision import LEVELS, Beside, list_beside, run_beside, spread_everywhere
+from benchmarks.precision import LEVELS, Beside, Plan, list_beside, run_beside, spread_everywhere
 from benchmarks.problems import Problem, Solution, Work, problem
 
 PERIODS = 16
@@ -71,25 +71,22 @@ def test_both_forms_of_a_peer_run_at_the_same_settings_to_the_same_errors(
     task: Problem, exact: Solution
 ) -> None:
     # The cells that take no part add no error; their share in a solver's sums is rounding.
-    ran = run_beside(task, exact, {"bernoulli": (1e-3,)}, {"LSODA": (1e-3, 1e-5)}, {}, rounds=1)
-    told, whole = ([(one.method, one.setting) for one in runs] for runs in (ran.told, ran.whole))
-    assert told == whole == [("LSODA", 1e-3), ("LSODA", 1e-5), (LOOP, 1e-3)]
-    errors = ([one.height_error for one in runs] for runs in (ran.told, ran.whole))
-    assert next(errors) == pytest.approx(next(errors), rel=0.02)
+    plan = Plan((), {"bernoulli": (1e-3,)}, {"LSODA": (1e-3, 1e-5)}, {"DOP853": (1e-3,)}, side=13)
+    ran = run_beside(task, exact, plan)
+    told, whole = ([(run.method, run.setting) for run in runs] for runs in (ran.told, ran.whole))
+    assert told == [("LSODA", 1e-3), ("LSODA", 1e-5), (LOOP, 1e-3)]
+    # A solver that is run once goes over the whole bed alone.
+    assert whole == [*told[:2], ("DOP853", 1e-3), told[2]]
+    assert ran.told[0].height_error == pytest.approx(ran.whole[0].height_error, rel=0.02)
+    assert run_beside(task, exact, Plan((), {}, {})).whole == []
 
 
 def test_over_the_whole_bed_nothing_is_known_of_which_cells_take_part(task: Problem, exact: Solution) -> None:
     # Told a lie, that one cell takes part, the told are wrong; the others are as exact as their setting.
     lied = replace(task, sets=[(cells[:1], 1) for cells, _ in task.sets])
-    ran = run_beside(lied, exact, {}, {"LSODA": (1e-3,)}, {"DOP853": (1e-3,)}, rounds=1)
-    assert min(one.height_error for one in ran.told) > 1e-4
-    assert [one.height_error < 1e-5 for one in ran.whole] == [True, True, True]
-
-
-def test_a_solver_run_once_goes_over_the_whole_bed_alone(task: Problem, exact: Solution) -> None:
-    ran = run_beside(task, exact, {}, {}, {"DOP853": (1e-3,)}, rounds=1)
-    assert [one.method for one in ran.told] == [LOOP]
-    assert [one.method for one in ran.whole] == ["DOP853", LOOP]
+    ran = run_beside(lied, exact, Plan((), {}, {"LSODA": (1e-3,)}, {"DOP853": (1e-3,)}, side=13))
+    assert min(run.height_error for run in ran.told) > 1e-4
+    assert [run.height_error < 1e-5 for run in ran.whole] == [True, True, True]
 
 
 def test_the_report_sets_the_ratios_of_both_forms_side_by_side(task: Problem) -> None:
@@ -99,7 +96,7 @@ def test_the_report_sets_the_ratios_of_both_forms_side_by_side(task: Problem) ->
     mine = [run("bernoulli", 1e-3, 2.0, peer=False), run("richardson", 5e-3, 1.0, peer=False)]
     told = [run("LSODA", 1e-3, 5.0, peer=True), run(LOOP, 1e-3, 30.0, peer=True)]
     whole = [run("LSODA", 1e-3, 20.0, peer=True), run(LOOP, 1e-3, 150.0, peer=True)]
-    lines = list(list_beside([Beside(task, mine, told, whole)], [1e-12], 2))
+    lines = list(list_beside([Beside(task, mine, told, whole)], Plan((), {}, {}, side=13)))
     rows = [line.split() for line in lines if line.endswith((" 15.0", " 75.0"))]
     every = len(LEVELS)
     assert rows == [

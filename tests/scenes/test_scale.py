@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 
-from benchmarks.bed_size import bytes_of, gathered_cells, scene
+from benchmarks.bed_size import measure_bytes, scene
 from benchmarks.numpy_calls import period_calls
 
 #: Sides of the beds: 625 and 40,401 pins; both have a pin in the middle.
@@ -13,9 +13,15 @@ SMALL, LARGE = 25, 201
 
 
 def test_as_many_cells_take_part_on_40000_pins_as_on_625() -> None:
-    small = gathered_cells(SMALL)
+    def count(side: int) -> list[int]:
+        bed = scene(side)
+        system = assemble(bed)
+        run = periods(system, bed.trajectories(), begin(system), bed.periods)
+        return [state.active.cells.size for state in run]
+
+    small = count(SMALL)
     assert max(small) > 100
-    assert gathered_cells(LARGE) == small
+    assert count(LARGE) == small
 
 
 def test_a_period_on_40000_pins_takes_the_numpy_calls_of_one_on_625() -> None:
@@ -30,6 +36,5 @@ def test_a_period_on_40000_pins_takes_the_numpy_calls_of_one_on_625() -> None:
 
 def test_the_bytes_of_a_pin_are_those_of_its_rows_place_mode_and_age() -> None:
     # Nine rows and the age as float64, x and y, and one byte of mode; what is left over is a few kilobytes.
-    system = assemble(scene(LARGE))
     least = ((9 + 1 + 2) * 8 + 1) * LARGE * LARGE
-    assert 0 <= bytes_of(system, begin(system)) - least < 20_000
+    assert 0 <= measure_bytes(LARGE) - least < 20_000

@@ -25,16 +25,15 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import LEAST, make_bundles
 
-from benchmarks import ablation, commit_pair, peers, runs_together
+from benchmarks import method_figures, peers, processes, runs_together
 from benchmarks.__main__ import main
 from benchmarks.kinds import BENCHMARKS
 from benchmarks.numpy_calls import Counted, Ledger, note_methods, period_calls
 from benchmarks.precision import best_ratio
-from benchmarks.problems import PROBLEMS, Work, problem, solved
-from benchmarks.report import Report, write_report
+from benchmarks.problems import PROBLEMS, Work, problem, solve
+from benchmarks.report import Report
 from benchmarks.runs_together import STUDIES, study
-from benchmarks.session_parts import CORE, FILES, PARTS
-from benchmarks.terms import LONGER, TERMS, without
+from benchmarks.session_parts import CORE, FILES, LONGER, PARTS, TERMS, without
 from tests.assemble import sample
 
 ONE = "one cell, load step"
@@ -64,16 +63,19 @@ def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger: Ledger
     with note_methods():  # of plain arrays
         product = bound(a)
         np.zeros(2).copy()
-    assert {key[0]: times for key, times in ledger.items()} == {"dot": 1, "zeros": 1, "copy": 1}
+    assert ledger == {"dot": 1, "zeros": 1, "copy": 1}
     assert type(product) is Counted
 
 
-def test_the_products_of_plain_arrays_in_a_period_are_all_counted() -> None:
-    # Python's own profiler counts those of the master's view of the cells.
+def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted() -> None:
+    # A count, not seconds: the same wherever it is taken, and a call more for the cells is one more.
     scene, asked = sample("ridge_mound_valley"), 0
     system, trajectories = assemble(scene), scene.trajectories()
+    calls, _ = period_calls(system, trajectories, 1000)
+    assert statistics.median(calls) <= 114
 
     def note(frame: FrameType, event: str, called: object) -> None:
+        # Python's own profiler counts the products of the master's view of the cells.
         nonlocal asked
         owner = getattr(called, "__self__", None)
         asked += event == "c_call" and type(owner) is np.ndarray and owner.shape == (2, 6)
@@ -85,15 +87,8 @@ def test_the_products_of_plain_arrays_in_a_period_are_all_counted() -> None:
             pass
     finally:
         sys.setprofile(None)
-    assert counted["dot", (2, 6)] == asked > 100
+    assert counted["dot"] >= asked > 100
     assert len(calls) == 300
-
-
-def test_a_period_of_method_i_makes_at_most_114_numpy_calls() -> None:
-    # A count, not seconds: the same wherever it is taken, and a call more for the cells is one more.
-    scene = sample("ridge_mound_valley")
-    calls, _ = period_calls(assemble(scene), scene.trajectories(), 2000)
-    assert statistics.median(calls) <= 114
 
 
 def test_a_period_of_method_iii_makes_fewer_than_twice_the_numpy_calls_of_method_i() -> None:
@@ -104,15 +99,15 @@ def test_a_period_of_method_iii_makes_fewer_than_twice_the_numpy_calls_of_method
 
 
 def test_results_name_versions_and_no_path(tmp_path: Path) -> None:
-    report = Report(["a line"], ("a", "b"), [(1, 2.5)])
-    write_report(report, tmp_path / "new", "what")
+    report = Report(iter(["a line"]), [{"a": 1, "b": 2.5}])
+    report.write(tmp_path / "new", "what", report.text())
     assert (tmp_path / "new" / "what.csv").read_text(encoding="utf-8") == "a,b\n1,2.5\n"
     text = (tmp_path / "new" / "what.md").read_text(encoding="utf-8")
     assert f"numpy {np.__version__}" in text
     assert not re.search(r"(^|\s)/\w", text)
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OutputError, match="Cannot write into"):
-        write_report(report, tmp_path / "file", "what")
+        report.write(tmp_path / "file", "what", text)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +179,7 @@ def test_scipys_physics_are_ours(name: str) -> None:
 def test_the_python_loop_is_the_closed_form_step_and_every_problem_has_contact_and_moving_pins() -> None:
     for name in PROBLEMS:
         task = problem(name)
-        solution = solved(task.scene, task.commands)
+        solution = solve(task.scene, task.commands)
         assert solution.forces.max() > 0.1, name
         assert np.ptp(solution.heights) > 0.1e-3, name
         if name == ONE:  # same formulas, same steps: rounding only
@@ -210,15 +205,15 @@ def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys: pytest.Captu
 
 
 def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
-    tree = commit_pair.extract("HEAD", tmp_path)
-    times = commit_pair.run(tree, "HEAD", 2)
-    assert len(times) == len(commit_pair.CASES)
+    tree = processes.extract("HEAD", tmp_path)
+    times = processes.run_commit(tree, "HEAD", 2)
+    assert len(times) == len(processes.CASES)
     assert all(0.0 < time < 1.0 for time in times)
     (tree / "digiclay" / "core" / "engine" / "simulation.py").write_text("1 / 0\n", encoding="utf-8")
     with pytest.raises(
         DigiclayError, match=r"^commits: HEAD cannot be timed: ZeroDivisionError: division by"
     ):
-        commit_pair.run(tree, "HEAD", 2)
+        processes.run_commit(tree, "HEAD", 2)
 
 
 @pytest.mark.parametrize("name", list(STUDIES))
@@ -244,6 +239,7 @@ def test_a_benchmark_prints_and_writes_a_table_and_a_picture(
     assert "control.force_gain varies" in printed
     assert "valve.stroke varies" in printed
     assert sorted(path.name for path in tmp_path.iterdir()) == ["stack.csv", "stack.md", "stack.png"]
+    assert printed in (tmp_path / "stack.md").read_text(encoding="utf-8")
     lines = (tmp_path / "stack.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == ("study,runs,alone,stacked,judged_alone,judged_stacked,errors_alone,errors_stacked")
     assert [line.split(",")[:2] for line in lines[1:]] == [[s, n] for s in STUDIES for n in ("1", "4")]
@@ -265,12 +261,12 @@ def test_a_controller_without_a_part_differs_from_the_whole_and_parameters_leave
     scene = press()
     controller = assemble(scene).controller
     assert isinstance(controller, HybridControl)
-    whole = ablation.run_controller(scene, controller)["rfd"]
-    for part, leave in ablation.PUT_TOGETHER.items():
-        rfd = ablation.run_controller(scene, leave(controller))["rfd"]
+    whole = method_figures.run_controller(scene, controller)["rfd"]
+    for part, leave in method_figures.PUT_TOGETHER.items():
+        rfd = method_figures.run_controller(scene, leave(controller))["rfd"]
         assert rfd is not None, part
         assert np.isfinite(rfd), part
         # More than rounding: a part that is still there gives the same to some ten digits.
         assert rfd != pytest.approx(whole, rel=1e-6), part
-    for values in ablation.PARAMETERS.values():
+    for values in method_figures.PARAMETERS.values():
         assert press(**{name: float(value) for name, value in values.items()}).method == "hybrid"

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.serve_times import ENDS, sum_bins
+from benchmarks.processes import ENDS, sum_bins
 from tests.scene_files import left
 
 SMALL = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "control=absent"]

@@ -1,0 +1,327 @@
+"""Benchmarks ``commits``, ``cluster`` and ``serve``: work of other processes than this one."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import os
+import pickle
+import re
+import secrets
+import struct
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from digiclay.commands.cluster import Cluster, evaluate_on_worker, open_cluster
+from digiclay.commands.evaluator import submit
+from digiclay.commands.progress import table
+from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.model.trajectory import sample_poses
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.studies.axes import Point, make_points, read_axis
+from digiclay.core.studies.evaluation import evaluate_bundle, make_bundles
+from digiclay.core.studies.series import finish
+from digiclay.core.studies.sweep_plan import hash_points
+
+from .report import BLUE, RED, Report, Row, Steps, tabulate
+
+ROOT = Path(__file__).parents[1]
+#: The paper's session.
+SCENE = "ridge_mound_valley"
+
+# Two commits, by turns
+
+#: Cases and their settings of the session.
+CASES: dict[str, tuple[str, ...]] = {
+    "Method I": (),
+    "no control": ("control=absent",),
+    "force noise 2 mN": ("sensors.force_noise=2 mN",),
+    "Method II": ("control.method=cell_states",),
+    "Method III": ("control.method=hybrid",),
+}
+#: Run at both commits: prints the least processor time of a control period in each case, s.
+PROGRAM = """
+import json, sys, time
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, find, load
+
+def measure(settings):
+    scene = load(find("ridge_mound_valley"), [Setting(*text.split("=", 1)) for text in settings])
+    system, count, times = assemble(scene), int(sys.argv[2]), []
+    for _ in range(3):
+        start = time.process_time()
+        for _ in periods(system, scene.trajectories(), begin(system), count):
+            pass
+        times.append((time.process_time() - start) / count)
+    return min(times)
+
+print(json.dumps([measure(settings) for settings in json.loads(sys.argv[1])]))
+"""
+#: Longest run of one commit, s.
+LONGEST = 600.0
+
+
+def measure_commits(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Time both commits by turns."""
+    turns, count = (2, 200) if arguments.quick else (max(arguments.turns, 1), 1000)
+    names = (arguments.old, arguments.new)
+    with tempfile.TemporaryDirectory() as scratch:
+        trees = [extract(name, Path(scratch) / str(number)) for number, name in enumerate(names)]
+        jobs = steps.through([*zip(trees, names, strict=True)] * turns, lambda job: str(job[1]))
+        times = np.array([run_commit(tree, name, count) for tree, name in jobs])
+    before, after = 1e6 * times[::2], 1e6 * times[1::2]
+    figures = [np.median(before, 0), np.median(after, 0)]
+    figures += [reduce(after / before, axis=0) for reduce in (np.median, np.min, np.max)]
+    columns = ("case", f"old, {names[0]} (µs)", f"new, {names[1]} (µs)", "ratio", "least", "largest")
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(CASES, *figures, strict=True)]
+    cells = [[case, *(f"{v:.1f}" for v in row[:2]), *(f"{v:.2f}" for v in row[2:])]
+             for case, *row in (list(row.values()) for row in rows)]  # fmt: skip
+    title = f"processor time of a control period, medians of {turns} turns"
+    return Report(["", title, "", *table(columns, cells)], rows)
+
+
+def extract(commit: str, folder: Path) -> Path:
+    """Unpack the extension's package at a commit into a folder, and return the folder of its imports."""
+    git = ["git", "-c", "safe.directory=*", "archive", commit, "addon"]
+    done = subprocess.run(git, cwd=ROOT, capture_output=True, timeout=LONGEST, check=False)
+    if done.returncode:
+        raise DigiclayError(f"commits: {commit} must be a commit, branch or tag of this checkout.")
+    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
+        archive.extractall(folder, filter="data")
+    return folder / "addon"
+
+
+def run_commit(tree: Path, commit: str, count: int) -> list[float]:
+    """Return the time of a control period in each of `CASES`, s, by the package in a folder."""
+    environment = {**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
+    words = [sys.executable, "-c", PROGRAM, json.dumps(list(CASES.values())), str(count)]
+    done = subprocess.run(
+        words, cwd=tree, env=environment, capture_output=True, text=True, timeout=LONGEST, check=False
+    )
+    if done.returncode:
+        why = done.stderr.strip().rpartition("\n")[2]
+        raise DigiclayError(f"commits: {commit} cannot be timed: {why}.")
+    times: list[float] = json.loads(done.stdout)
+    return times
+
+
+# Workers of a Dask cluster
+
+#: Empty tasks, and bundles of 32 points; each of these in full, and with --quick.
+TASKS, BUNDLES = (2000, 200), (12, 2)
+#: Points of a sweep that is only set up: those of two axes.
+SETUP = (100, 100), (20, 20)
+COSTS = {
+    "work": "work", "workers": "workers d", "pieces": "pieces d", "wall time": "wall .2f 1e3",
+    "scheduler and session": "central .2f 1e3", "workers' processor time": "spent .2f 1e3",
+}  # fmt: skip
+
+
+def measure_cluster(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Measure the set-up of a sweep, and points in this process, on one worker and on two."""
+    tasks, count = (pair[arguments.quick] for pair in (TASKS, BUNDLES))
+    points = _make_points(["simulation.duration=1"], f"control.force_gain=1:4:{32 * count}")
+    bundles = make_bundles(points).batches
+    gains, bands = SETUP[arguments.quick]
+    axes = f"control.force_gain=1:8:{gains}", f"control.dead_band=1e-5:1e-4:{bands}"
+
+    def set_up() -> None:
+        points = _make_points([], *axes)
+        make_bundles(points)
+        hash_points(points)
+
+    steps.total = 4
+    costs = [_make_cost("set-up", 0, gains * bands, *_time(set_up))]
+    steps("set-up")
+    evaluate_bundle(bundles[0])  # imports
+    wall, spent = _time(lambda: [evaluate_bundle(bundle) for bundle in bundles])
+    costs.append(_make_cost("points here", 0, len(points), wall, 0.0, spent))
+    steps("here")
+    for workers in (1, 2):
+        costs += _measure_workers(workers, tasks, bundles)
+        steps(f"{workers} workers")
+    return Report(list(_list_costs(costs, bundles[0])), costs, packages=("distributed",))
+
+
+def _make_points(settings: Sequence[str], *axes: str) -> list[Point]:
+    changes = [Setting(*setting.split("=")) for setting in settings]
+    return make_points(find("slow_press"), changes, [read_axis(axis) for axis in axes])
+
+
+def _make_cost(
+    work: str, workers: int, pieces: int, wall: float, central: float, spent: float = 0.0
+) -> dict[str, Any]:
+    """Return a row: elapsed time, processor time of session and scheduler, and of the workers, s."""
+    times = {"wall": wall / pieces, "central": central / pieces, "spent": spent / pieces}
+    return {"work": work, "workers": workers, "pieces": pieces, **times}
+
+
+def _time(work: Callable[[], Any]) -> tuple[float, float]:
+    """Return elapsed and processor time of some work, s."""
+    started, spent = time.perf_counter(), time.process_time()
+    work()
+    return time.perf_counter() - started, time.process_time() - spent
+
+
+def _measure_workers(workers: int, tasks: int, bundles: Sequence[Sequence[Point]]) -> list[dict[str, Any]]:
+    """Have empty tasks and bundles done by workers of one thread, each a process."""
+    from distributed import LocalCluster
+
+    with (
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, protocol="tcp://", host="127.0.0.1",
+            dashboard_address=":0",
+        ) as local,
+        open_cluster(local.scheduler_address, lambda: False, lambda note: None) as cluster,
+    ):  # fmt: skip
+        run = partial(_run_pieces, cluster, local.scheduler_address, workers)
+        evaluate = partial(evaluate_on_worker, errors=False)
+        run("", abs, range(8 * workers), 1)
+        run("", evaluate, [bundles[0][:4]] * workers, 1)  # imports
+        return [
+            run("empty tasks", abs, range(tasks), tasks),
+            run("points", evaluate, bundles, sum(map(len, bundles))),
+        ]
+
+
+def _run_pieces(
+    cluster: Cluster, address: str, workers: int, work: str, task: Any, pieces: Sequence[Any], count: int
+) -> dict[str, Any]:
+    """Return the cost of pieces of work."""
+    from distributed import Client
+
+    def fail(piece: Any, why: str) -> None:
+        raise RuntimeError(why)
+
+    with Client(address, set_as_default=False) as client:
+        before = sum(client.run(time.process_time).values())
+        times = _time(
+            lambda: finish(submit(cluster, task, pieces, stopped=lambda: False), lambda *_: None, fail)
+        )
+        spent = sum(client.run(time.process_time).values()) - before
+    return _make_cost(work, workers, count, *times, spent)
+
+
+def _list_costs(costs: Sequence[Row], bundle: Sequence[Point]) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield "\nA point: 1 s of slow_press, in bundles of 32; ms a task or point."
+    yield from tabulate(costs, COSTS)
+    one, two = (cost for cost in costs if cost["work"] == "points")
+    yield f"\nefficiency of two workers: {one['wall'] / (2 * two['wall']):.0%} of twice the points a second"
+    yield f"by processor time of the workers: {one['spent'] / two['spent']:.0%}"
+    size, back = len(pickle.dumps(tuple(bundle))), len(pickle.dumps(evaluate_bundle(bundle)))
+    yield f"to a worker {size / len(bundle):.0f} bytes a point, back {back / len(bundle):.0f}"
+
+
+# A server, with a client that moves the fingertip
+
+#: Control periods a second, and when the session's fingertip comes down, s.
+RATE, DOWN = 1000, 5.0
+#: Seconds that are served, with --quick and without.
+QUICK, FULL = 3.0, 20.0
+SHARES = ("p50", "p99", "p99.9", "longest")
+#: Lines of the report: what is measured, by the names of the server's.
+LINES = {
+    "elapsed": "beginning of a period to its frame",
+    "lateness": "of which before it is simulated",
+    "processor": "processor time of a period",
+}
+#: Upper ends of the histogram's bins, ms.
+ENDS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0, 10.0, 50.0, np.inf)
+#: Mark, version, kind, number, pose; and mark, version, kind, pins, period, number of a frame.
+POSE, HEAD = struct.Struct("<2sBBI7d"), struct.Struct("<2sBBIQI")
+
+
+def measure_serve(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Serve for a while."""
+    figures, frames = _serve(QUICK if arguments.quick else FULL)
+    rows = [{"what": name, **{f"{s}_s": figures[name][s] for s in SHARES}} for name in LINES]
+    lines = list(_list_deadlines(figures, rows, frames))
+    return Report(lines, rows, lambda figure: _draw(figure, figures), (7.2, 4.2), packages=("websockets",))
+
+
+def _serve(seconds: float) -> tuple[dict[str, Any], int]:
+    """Run a server and a client; return the server's report, and how many frames the client received."""
+    token = secrets.token_urlsafe(18)
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.json"
+        command = [sys.executable, "-m", "digiclay", "serve", SCENE, "--rate", str(RATE), "--port", "0"]
+        command += ["--osc-port", "0", "--token", token, "--report", str(report), "--seconds", str(seconds)]
+        command += ["--out", str(Path(folder) / "recorded")]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            head = "".join(process.stdout.readline() for _ in range(3))
+            address = re.search(r"ws://127\.0\.0\.1:(\d+)", head)
+            frames = _move(int(address[1]), token) if address else 0
+            process.stdout.read()
+        if process.returncode or not frames:
+            raise OutputError("digiclay serve has ended early: see above.")
+        figures: dict[str, Any] = json.loads(report.read_text(encoding="utf-8"))
+        return figures, frames
+
+
+def _move(port: int, token: str) -> int:
+    """Answer every frame by the next pose of the session, until the server ends; return how many came."""
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    scene = load(find(SCENE))
+    times = np.arange(0.0, scene.simulation.duration or scene.periods * 5e-3, 1.0 / RATE)
+    poses = sample_poses(scene.trajectories(), times)[:, 0]
+    header, frames = {"Authorization": f"Bearer {token}"}, 0
+    address = f"ws://127.0.0.1:{port}/?format=binary&rate={RATE}"
+    with connect(address, additional_headers=header, compression=None) as client:
+        try:
+            while True:
+                message = client.recv()
+                if not isinstance(message, bytes):
+                    continue
+                frames += 1
+                period = HEAD.unpack_from(message)[4]
+                row = (period + round(DOWN * RATE)) % len(poses)
+                client.send(POSE.pack(b"DC", 1, 2, period % 2**32, *poses[row]))
+        except ConnectionClosed:
+            return frames
+
+
+def sum_bins(bins: Sequence[tuple[float, int]], ends: Sequence[float]) -> list[int]:
+    """Return how many times lie between one end and the next, ms; `bins`: lower end, s, and count."""
+    starts, counts = np.array([start for start, _ in bins]) * 1e3, np.array([count for _, count in bins])
+    # A narrow bin belongs where its lower end is; rounding must not move it.
+    place = np.searchsorted(np.asarray(ends), starts + 1e-6, side="right")
+    return [int(counts[place == index].sum()) for index in range(len(ends))]
+
+
+def _list_deadlines(figures: Row, rows: Sequence[Row], frames: int) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield f"\ndigiclay serve {SCENE} --rate {RATE}: 625 pins, a pose from a client after every frame; ms\n"
+    named = [{**row, "what": LINES[row["what"]]} for row in rows]
+    yield from tabulate(named, {"": "what", **{share: f"{share}_s .2f 1e3" for share in SHARES}})
+    periods, missed = figures["periods"], figures["missed"]
+    yield f"\n{periods} periods; past their deadline of 1 ms: {missed} ({100.0 * missed / periods:.2f} %),"
+    yield f"of them left out: {figures['left_out']}; the client received {frames} frames\n"
+    counts = (map(str, sum_bins(figures[name]["bins"], ENDS)) for name in ("elapsed", "processor"))
+    names = [f"below {end:g} ms" if np.isfinite(end) else "longer" for end in ENDS]
+    yield from table(("", "elapsed", "processor"), list(zip(names, *counts, strict=True)))
+
+
+def _draw(figure: Any, figures: Row) -> None:
+    """Draw the histograms of elapsed and processor time."""
+    panels = figure.subplots(2, 1, sharex=True)
+    for panel, name in zip(panels, ("elapsed", "processor"), strict=True):
+        bins = np.array(figures[name]["bins"])
+        panel.hist(1e3 * bins[:, 0], np.geomspace(0.1, 100.0, 91), weights=bins[:, 1], color=BLUE, log=True)
+        panel.axvline(1e3 * figures["period"], color=RED, linestyle="--", label="deadline")
+        panel.set(title=LINES[name], ylabel="periods")
+        panel.legend(loc="upper right")
+    panels[-1].set(xscale="log", xlabel="ms")
