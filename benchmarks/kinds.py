@@ -35,27 +35,19 @@ examples:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """Benchmark of the table.
-
-    Attributes
-    ----------
-    measure : str
-        Module and function ``(arguments, steps) -> Report``, or list of reports; imported when it runs.
-    examples : tuple of str
-        Arguments.
-    needs : str
-        Package without which it cannot run.
-    quick, out : bool
-        Whether it has these options.
-    """
+    """Benchmark of the table."""
 
     measure: str
+    """Module and function ``(arguments, steps) -> Report``, or list of reports; imported when it runs."""
     help: str
     examples: tuple[str, ...] = ("", "--quick --out results")
+    """Arguments."""
     options: Options = lambda parser: None
     needs: str = ""
+    """Package without which it cannot run."""
     quick: bool = True
     out: bool = True
+    """Whether it has these options."""
 
 
 def _add_session(parser: argparse.ArgumentParser) -> None:

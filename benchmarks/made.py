@@ -135,32 +135,23 @@ THINGS = tuple(RELIEFS)
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """Thing made on a bed.
-
-    Attributes
-    ----------
-    name : str
-        One of `THINGS`.
-    title : str
-        For people.
-    bed, own_bed : str
-        One of `BEDS`: where it was made, and where its strokes were drawn.
-    formed, intended : ndarray (n,)
-        Heights of the pins above rest, m.
-    simulated, spent : float
-        Duration of the session, and processor time for it, s.
-    """
+    """Thing made on a bed."""
 
     name: str
+    """One of `THINGS`."""
     title: str
+    """For people."""
     bed: str
     own_bed: str
+    """One of `BEDS`: where it was made, and where its strokes were drawn."""
     scene: Scene
     formed: Floats
     intended: Floats
+    """(n,): Heights of the pins above rest, m."""
     strokes: int
     simulated: float
     spent: float
+    """Duration of the session, and processor time for it, s."""
 
     @property
     def correlation(self) -> float:

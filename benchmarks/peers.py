@@ -1,9 +1,4 @@
-"""Peers of the steppers: the same problems, solved by SciPy and by a Python loop over the cells.
-
-The peers get every advantage: rates with few numpy calls, only the cells that take part by the
-problem's sets, the banded Jacobian where a solver takes one, and a solver's own Fortran loop where
-there is one.
-"""
+"""Peers of the steppers: SciPy's solvers and a Python loop over the cells, with every advantage."""
 
 from __future__ import annotations
 
@@ -188,10 +183,7 @@ def peer(task: Problem, solver: Solver, tolerance: float) -> tuple[Solution, flo
 
 
 def find_reference(task: Problem) -> tuple[Solution, float]:
-    """Return the solution at a tolerance of 1e-12 and how far Richardson's form is from it, m.
-
-    Richardson's form stands in for it without SciPy.
-    """
+    """Return the solution at a tolerance of 1e-12, or without SciPy Richardson's, m apart from it."""
     other = task.solve("richardson", CHECK)
     exact = other if missing() else peer(task, _march("DOP853", max_step=1e-3, first_step=1e-5), 1e-12)[0]
     return exact, other.compare(exact)[0]
@@ -205,10 +197,7 @@ def run_solver(task: Problem, exact: Solution, name: str, tolerances: tuple[floa
 
 
 def loop(task: Problem, step: float) -> tuple[Solution, float]:
-    """Integrate cell by cell in plain Python at a step, s; return the CPU time, s, too.
-
-    Only the cells that take part by the problem's sets are gone through, as for the solvers.
-    """
+    """Integrate the cells that take part, one by one, in plain Python at a step, s; also the CPU time, s."""
     line = Line(task)
     system, grid = line.system, line.system.grid
     count, dead, tau = round(system.period / step), task.dead_time, line.cell.lag.time_constant
@@ -284,7 +273,7 @@ class Scalar:
         return float(self.share * max(self.unit * self.tension(y[0], under) - relaxed, 0.0))
 
     def step(self, y: list[float], openings: list[float], unders: list[float]) -> None:
-        """Move a cell on by a step, in place; `openings`: of its valve at the Gauss points of the step.
+        """Move a cell on by a step, in place, with its openings at the Gauss points of the step.
 
         `unders`: the underside at start, middle and end of the step, m; empty where it cannot be touched.
         """

@@ -38,28 +38,20 @@ SHORT = 200
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan of the runs.
-
-    Attributes
-    ----------
-    steppers, solvers : mapping
-        Steps of our steppers, s, and relative tolerances of SciPy's solvers.
-    once : mapping
-        Solvers that are run once, over the whole bed alone.
-    rounds, repeats : int
-        Runs of everything but the loops and `once`, by turns, of which the fastest counts; and runs of a
-        stepper in each of them, of which the median counts.
-    side : int, optional
-        Rows and columns of the bed on which peers go through all cells too.
-    """
+    """Plan of the runs."""
 
     problems: tuple[str, ...]
     steppers: Settings
     solvers: Settings
+    """Steps of our steppers, s, and relative tolerances of SciPy's solvers."""
     once: Settings = field(default_factory=dict)
+    """Solvers that are run once, over the whole bed alone."""
     rounds: int = 1
     repeats: int = 1
+    """Runs of everything but the loops and `once`, by turns, of which the fastest counts; and runs of a
+    stepper in each of them, of which the median counts."""
     side: int | None = None
+    """Rows and columns of the bed on which peers go through all cells too."""
 
 
 #: Plans of the problems on beds of their own, and on the paper's bed, in full and with --quick.
@@ -119,19 +111,14 @@ RUNS = {
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """The runs of one problem: our steppers, peers that are told which cells take part, and others.
-
-    Attributes
-    ----------
-    apart : float
-        Distance of two references, m.
-    """
+    """The runs of one problem: our steppers, peers that are told which cells take part, and others."""
 
     task: Problem
     mine: list[Work]
     told: list[Work]
     whole: list[Work]
     apart: float = 0.0
+    """Distance of two references, m."""
 
     @property
     def work(self) -> list[Work]:

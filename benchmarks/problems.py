@@ -65,20 +65,14 @@ class Work:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A problem.
-
-    Attributes
-    ----------
-    commands : ndarray (t, n)
-        Constant within a control period.
-    sets : list of (ndarray of int (m,), int)
-        Which cells take part in each period; how many of them, the first, the fingertip may touch.
-    """
+    """A problem."""
 
     name: str
     scene: Scene
     commands: Floats
+    """(t, n): Constant within a control period."""
     sets: list[tuple[NDArray[np.intp], int]]
+    """(m,): Which cells take part in each period; how many of them, the first, the fingertip may touch."""
 
     @property
     def taking_part(self) -> float:

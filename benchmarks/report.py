@@ -61,33 +61,22 @@ class Steps(Line):
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Result of a benchmark.
-
-    Attributes
-    ----------
-    lines : iterable of str
-        The text below the line of versions and machine.
-    rows : sequence of mappings
-        Of the CSV; all have the same keys.
-    draw : callable, optional
-        Draws on a matplotlib figure.
-    size : (float, float)
-        Of the figure, inches.
-    name : str
-        Of the files; by default that of the benchmark.
-    packages : tuple of str
-        Packages whose versions are given.
-    program : str
-        Version of another program.
-    """
+    """Result of a benchmark."""
 
     lines: Iterable[str]
+    """The text below the line of versions and machine."""
     rows: Sequence[Row] = ()
+    """Of the CSV; all have the same keys."""
     draw: Callable[[Any], None] | None = None
+    """Draws on a matplotlib figure."""
     size: tuple[float, float] = (6.0, 3.6)
+    """Of the figure, inches."""
     name: str = ""
+    """Of the files; by default that of the benchmark."""
     packages: tuple[str, ...] = ()
+    """Packages whose versions are given."""
     program: str = ""
+    """Version of another program."""
 
     def text(self) -> str:
         """Return versions, machine and lines."""

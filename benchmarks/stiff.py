@@ -43,33 +43,24 @@ DURATION = 0.5
 
 @dataclass(frozen=True)
 class Case:
-    """A case.
-
-    Attributes
-    ----------
-    changes : mapping
-        Sections of a scene file.
-    path : tuple of (float, float, float)
-        Waypoints: time, s; x, m; height over the bed at rest, m.
-    why : str
-        What makes it ill-conditioned: a rounding error of its data already moves its solution, or the
-        path is no function of time that a step could resolve. Empty where the error must fall with the step.
-    straight : bool
-        The waypoints are joined by straight lines.
-    borrowed, factor : bool, float
-        The recorded commands are those of the easy case, because this case's own controller sees no need
-        to act; and what they are multiplied with.
-    """
+    """A case."""
 
     changes: Table = field(default_factory=dict)
+    """Sections of a scene file."""
     path: tuple[tuple[float, float, float], ...] = (
         (0.0, 0.0, 0.5e-3), (0.15, 0.0, -2.5e-3), (0.25, 1e-3, -2.5e-3), (0.4, 3e-3, 1.5e-3),
         (0.5, 3e-3, 3e-3),
     )  # fmt: skip
+    """(float, float, float): Waypoints: time, s; x, m; height over the bed at rest, m."""
     why: str = ""
+    """What makes it ill-conditioned: a rounding error of its data already moves its solution, or the path is
+    no function of time that a step could resolve. Empty where the error must fall with the step."""
     straight: bool = False
+    """The waypoints are joined by straight lines."""
     borrowed: bool = False
     factor: float = 1.0
+    """The recorded commands are those of the easy case, because this case's own controller sees no need to
+    act; and what they are multiplied with."""
 
 
 #: A press with a fingertip that then rises, dragged a little; everything at its default.
@@ -189,21 +180,15 @@ WRONG = 1e-4
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a run.
-
-    Attributes
-    ----------
-    error : float
-        Largest height error, m; NaN when it stopped.
-    estimate : float
-        The run's own estimate of its error (see `core.session.accuracy`), m; NaN where it was not asked for.
-    stopped : str
-        Reason; empty if it did not stop.
-    """
+    """Result of a run."""
 
     error: float
+    """Largest height error, m; NaN when it stopped."""
     estimate: float = float("nan")
+    """The run's own estimate of its error (see `core.session.accuracy`), m; NaN where it was not asked
+    for."""
     stopped: str = ""
+    """Reason; empty if it did not stop."""
 
     @property
     def silent(self) -> bool:
@@ -244,13 +229,9 @@ def _run(system: System, trajectories: Sequence[Trajectory], count: int) -> tupl
     for state in periods(system, trajectories, start, count):
         height, force = state.row(0), state.row(rows.force)
         wrong = allowed_range(height, force, system.cell.actuator.stroke)
-        if (
-            not wrong
-            and bounded
-            and not _within_reach(system, trajectories, state.period - 1, before, height)
-        ):
-            wrong = "a pin where none can be"
         assert not wrong, wrong
+        within = not bounded or _within_reach(system, trajectories, state.period - 1, before, height)
+        assert within, "a pin where none can be"
         before = height
         heights.append(height)
         commands.append(state.row(rows.command))
@@ -278,38 +259,39 @@ def period_of(step: float) -> float:
 
 def commands_of(case: Case) -> Floats:
     """Record the commands of a case, (t, n), each of which lasts for `HOLD`."""
-    recorded = scene(CASES[EASY] if case.borrowed else case, "bernoulli", 1e-3, HOLD)
-    return case.factor * _run(assemble(recorded), recorded.trajectories(), recorded.periods)[1]
+    return case.factor * _run(*_prepare(CASES[EASY] if case.borrowed else case, "bernoulli", 1e-3, HOLD))[1]
 
 
 def live(case: Case, stepper: str, step: float) -> Floats:
     """Run a case with its controller at a physics step, s, and return the heights, (t, n)."""
-    shown = scene(case, stepper, step, period_of(step))
-    return _run(assemble(shown), shown.trajectories(), shown.periods)[0]
+    return _run(*_prepare(case, stepper, step, period_of(step)))[0]
 
 
-def _replay(
-    case: Case, commands: Floats, stepper: str, step: float, period: float
+def _prepare(
+    case: Case, stepper: str, step: float, period: float, commands: Floats | None = None
 ) -> tuple[System, Sequence[Trajectory], int]:
-    """Return a case's system that plays commands, its path, and its number of periods."""
+    """Return a case's system, with its controller or under commands, its path, and its number of periods."""
     shown = scene(case, stepper, step, period)
-    system = replaying(shown, np.repeat(commands, round(HOLD / period), axis=0))
+    if commands is None:
+        system = assemble(shown)
+    else:
+        system = replaying(shown, np.repeat(commands, round(HOLD / period), axis=0))
     return system, shown.trajectories(), shown.periods
 
 
 def replayed(case: Case, commands: Floats, stepper: str, step: float, period: float) -> Floats:
     """Integrate a case under commands of `HOLD` each and return the heights, (t, n); step and period, s."""
-    return _run(*_replay(case, commands, stepper, step, period))[0]
+    return _run(*_prepare(case, stepper, step, period, commands))[0]
 
 
 def largest_force(case: Case, commands: Floats) -> float:
     """Return the largest force on a cell at the end of a control period, N."""
-    return _run(*_replay(case, commands, "bernoulli", 1e-3, PERIOD))[2]
+    return _run(*_prepare(case, "bernoulli", 1e-3, PERIOD, commands))[2]
 
 
 def calls_of(case: Case, commands: Floats, step: float = 1e-3) -> float:
     """Return the numpy calls of a control period of the default stepper, the median over the run."""
-    system, trajectories, count = _replay(case, commands, "bernoulli", step, period_of(step))
+    system, trajectories, count = _prepare(case, "bernoulli", step, period_of(step), commands)
     return statistics.median(period_calls(system, trajectories, count // 2)[0])
 
 
@@ -383,7 +365,6 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
             ]  # fmt: skip
             if stepper == "bernoulli":
                 broken += _list_broken(name, case, outcomes, off)
-        broken += _list_broken_live(name, case)
         calls, spent = calls_of(case, commands), min(_time(case, commands) for _ in range(2))
         easy = costs[0] if costs else {"calls": calls, "spent": spent}
         costs.append({
@@ -402,17 +383,13 @@ def _time(case: Case, commands: Floats) -> float:
 
 
 def _list_broken(name: str, case: Case, outcomes: list[Outcome], off: float) -> Iterator[str]:
-    """Give which of its promises the default stepper breaks under recorded commands."""
-    for step, one in zip(STEPS, outcomes, strict=True):
-        if one.stopped:
-            yield f"{name}, {step * 1e3:g} ms: {one.stopped}"
-    errors = [one.error for one in outcomes]
+    """Give which of its promises the default stepper breaks under recorded commands, and under control."""
+    for step, run in zip(STEPS, outcomes, strict=True):
+        if run.stopped:
+            yield f"{name}, {step * 1e3:g} ms: {run.stopped}"
+    errors = [run.error for run in outcomes]
     if not case.why and any(a > max(b, 10.0 * off, 1e-12) for a, b in pairwise(errors)):
         yield f"{name}: the error does not fall with the step"
-
-
-def _list_broken_live(name: str, case: Case) -> Iterator[str]:
-    """Give where the default stepper blows up under the case's controller."""
     for step in STEPS:
         try:
             with strict():

@@ -46,19 +46,13 @@ EVERY_PERIOD = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Ticks:
-    """Times of some ticks, s, (t,).
-
-    Attributes
-    ----------
-    elapsed, spent : ndarray (t,)
-        Of each tick, its evaluation included, by the wall and by the processor.
-    parts : dict of ndarray (t,)
-        Of each of `PARTS`.
-    """
+    """Times of some ticks, s, (t,)."""
 
     elapsed: Floats
     spent: Floats
+    """(t,): Of each tick, its evaluation included, by the wall and by the processor."""
     parts: dict[str, Floats]
+    """(t,): Of each of `PARTS`."""
 
 
 @contextmanager

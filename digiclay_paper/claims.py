@@ -33,7 +33,7 @@ from .results import (
     Results,
     onset_among,
 )
-from .scenes import PRESSED
+from .scenes import METHODS, PRESSED
 from .simulations import GAUSSIAN, NO_RISE, STAGGERED
 
 
@@ -79,7 +79,7 @@ def ahead(results: Results) -> Evidence:
     told, holds = [], []
     for variant, method, name in results.dragged:
         one = results.dragged[variant, method, name]
-        if variant != AS_IT_IS or name not in DEPTH or one.ahead is None:
+        if variant != AS_IT_IS or method not in METHODS or name not in DEPTH or one.ahead is None:
             continue
         told.append(f"{SHORT[method]}, {name}, {DEPTH[name] * MM:g} mm deep: {one.ahead * MM:+.2f} mm")
         if method == ONE:
@@ -98,16 +98,15 @@ DEPTH = {name: -way.height for name, way in DRAGS.items() if way.height < 0.0}
 
 def escape(results: Results) -> Evidence:
     """Whether Method II stays clear of the oscillation of Method I."""
-    row = sorted(results.cell_swings, key=lambda one: one.gain)
+    row, used = sorted(results.cell_swings), results.printed[ONE]
     calm, first = onset_among(row)
-    own = getattr(results.printed[TWO].scene.control, "force_gain", 0.0)
+    own = results.printed[TWO].gain("force_gain")
     told = [
         f"K_FF = {one.gain:g} 1/N: {one.amplitude:.3f} N"
         + (f" at {one.frequency:.0f} Hz" if one.sustained and one.frequency else "")
         for one in row
     ]
-    used = results.printed[ONE].scene.control
-    wild = results.onset(getattr(used, "position_gain", 0.0))[1]
+    wild = results.onset(used.gain("position_gain"))[1]
     why = f"Its own gain is {own:g} 1/N. "
     if first is not None:
         why += (
@@ -115,8 +114,7 @@ def escape(results: Results) -> Evidence:
             f"{first / own:.1f} times that; each cell has a valve and a dead time of its own. "
         )
     if wild is not None:
-        gain = getattr(used, "force_gain", 1.0)
-        why += f"Method I's sets in at {wild / gain:.1f} times its own K_f."
+        why += f"Method I's sets in at {wild / used.gain('force_gain'):.1f} times its own K_f."
     return Evidence(told, [not one.sustained for one in row], why.strip())
 
 

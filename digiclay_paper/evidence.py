@@ -94,7 +94,7 @@ def tracking(results: Results) -> Evidence:
         for method in METHODS
         for name in WAYS
     ]
-    holds = {key: one.meets(results.criterion) for key, one in results.simple.items()}
+    holds = {key: one.meets(results.criterion) for key, one in results.simple.items() if key[0] in METHODS}
     missed = "; ".join(f"{SHORT[method]}, {name}" for (method, name), follows in holds.items() if not follows)
     return Evidence(told, list(holds.values()), f"Not followed: {missed}." if missed else "")
 
@@ -111,8 +111,7 @@ def largest_speed(results: Results) -> Evidence:
     found = {key: limit for key, limit in (results.fastest | lifts).items() if key[0] in METHODS}
     told = [f"{SHORT[method]}, {name}: {speed(limit)}" for (method, name), limit in found.items()]
     free = find_free_speed(results.printed[ONE].scene)
-    control = results.printed[TWO].scene.control
-    gain = getattr(control, "force_gain", 0.0) * getattr(control, "force_setpoint", 0.0)
+    gain = results.printed[TWO].gain("force_gain") * results.printed[TWO].gain("force_setpoint")
     why = (
         f"A pin without load rises at {free * MM:.1f} mm/s. A cell of {SHORT[TWO]} that feels nothing opens "
         f"its valve to K_FF F_ref = {gain:.2g}, and rises at {free * min(gain, 1.0) ** 2 * MM:.1f} mm/s "
@@ -161,8 +160,7 @@ def deviations(results: Results) -> Evidence:
             told.append(f"{when}{meaning}: {both}")
             ratios.append(ratio)
     known = results.session[TWO]
-    control = known.scene.control
-    each = getattr(control, "force_setpoint", 0.0)
+    each = known.gain("force_setpoint")
     level = [f"{one.rfd:.3f} N {name}" for (method, name), one in results.simple.items() if method == TWO]
     why = (
         f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {known.followers:.1f} cells follow it on "
@@ -207,20 +205,11 @@ def _gain(gain: float) -> str:
     return "none seen" if gain == math.inf else f"K_f = {gain:g} 1/N"
 
 
-def _row(results: Results, position_gain: float) -> list[Swing]:
-    return sorted(one for one in results.swings if one.position_gain == position_gain)
-
-
-def _gains(results: Results) -> list[float]:
-    return sorted({one.position_gain for one in results.swings})
-
-
 def onset(results: Results) -> Evidence:
     """Where the oscillation sets in, at each K_p, and with a quicker device."""
-    rows = {f"K_p = {gain:g} 1/m": _row(results, gain) for gain in _gains(results)}
-    told = [f"{label}: {_sets_in(row)}" for label, row in rows.items()]
-    used = results.printed[ONE].scene.control
-    position_gain, gain = getattr(used, "position_gain", 0.0), getattr(used, "force_gain", 0.0)
+    sweeps, used = results.sweeps, results.printed[ONE]
+    told = [f"K_p = {gain:g} 1/m: {_sets_in(row)}" for gain, row in sweeps.items()]
+    position_gain, gain = used.gain("position_gain"), used.gain("force_gain")
     first = results.onset(position_gain)[1]
     beyond = first is not None and gain >= first
     far = "" if first is None else f", {first / gain:.3g} times this K_f in another experiment"
@@ -230,13 +219,13 @@ def onset(results: Results) -> Evidence:
         "square of the opening, so a small error hardly moves a pin: only a transient starts the cycle."
     )
     if results.quicker:
-        free = find_free_speed(results.printed[ONE].scene)
+        free = find_free_speed(used.scene)
         why += (
             f" The device decides where: with pins of {results.quicker_speed * MM:.1f} instead of "
             f"{free * MM:.1f} mm/s without load, slower valves and a longer dead time, at K_p = "
             f"{results.quicker[0].position_gain:g} 1/m: {_sets_in(results.quicker)}."
         )
-    return Evidence(told, [*(onset_among(row)[1] is not None for row in rows.values()), beyond], why)
+    return Evidence(told, [*(onset_among(row)[1] is not None for row in sweeps.values()), beyond], why)
 
 
 def _sets_in(swings: list[Swing]) -> str:
@@ -253,8 +242,7 @@ def _sets_in(swings: list[Swing]) -> str:
 
 def trade(results: Results) -> Evidence:
     told, holds = [], []
-    for position_gain in _gains(results):
-        row = _row(results, position_gain)
+    for position_gain, row in results.sweeps.items():
         calm = [one for one in row if one.settling is not None]
         if not calm:
             told.append(f"K_p = {position_gain:g} 1/m: never settles")
@@ -269,13 +257,13 @@ def trade(results: Results) -> Evidence:
         )
         quicker = (best.settling or 0.0) < QUICKER * (calm[0].settling or 0.0)
         holds += [len(calm) < len(row), quicker]
-    slowest = [row[0].settling for row in (_row(results, known) for known in _gains(results))]
-    onsets = [results.onset(position_gain)[1] or math.inf for position_gain in _gains(results)]
+    slowest = [_seconds(row[0].settling) for row in results.sweeps.values()]
+    onsets = [onset_among(row)[1] or math.inf for row in results.sweeps.values()]
     return Evidence(
         told,
         [*holds, sorted(onsets, reverse=True) == onsets],
         f"From the lowest to the highest K_p, the time to settle at the lowest K_f goes from "
-        f"{_seconds(slowest[0])} to {_seconds(slowest[-1])}, and the onset from "
+        f"{slowest[0]} to {slowest[-1]}, and the onset from "
         f"{_gain(onsets[0])} to {_gain(onsets[-1])}.",
     )
 
@@ -283,6 +271,8 @@ def trade(results: Results) -> Evidence:
 def blister(results: Results) -> Evidence:
     told, holds = [], []
     for (method, shape, profile), done in results.blisters.items():
+        if method not in METHODS:
+            continue
         one = blister_section(done)
         high = "high" if shape == "convex" else "deep"
         rim = f", rim {one.pins * MM:.1f} mm beyond it" if one.pins > LIMITS.rim * one.relief else ""

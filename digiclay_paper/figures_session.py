@@ -101,13 +101,13 @@ def details(results: Results, title: str) -> Any:
 def _detailed(results: Results) -> list[tuple[str, Session]]:
     """Return the sessions of which details are shown, by name."""
     one, two = (results.printed[method] for method in METHODS)
-    gain = getattr(one.scene.control, "force_gain", 0.0)
-    shown = [(f"Method I, $K_f$ = {gain:g} 1/N", one)]
-    if results.wild is not None:
-        gain = getattr(results.wild.scene.control, "force_gain", 0.0)
-        shown.append((f"Method I, $K_f$ = {gain:g} 1/N", results.wild))
+    first = [one] if results.wild is None else [one, results.wild]
     third = [("Method III", results.printed[THIRD])] if THIRD in results.printed else []
-    return [*shown, ("Method II", two), *third]
+    return [
+        *((f"Method I, $K_f$ = {session.gain('force_gain'):g} 1/N", session) for session in first),
+        ("Method II", two),
+        *third,
+    ]
 
 
 def _under(session: Session) -> list[int]:

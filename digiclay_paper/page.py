@@ -20,7 +20,7 @@ from .claims import Claim, claims
 from .paper_figures import curves, letter, table
 from .relief_sections import LIMITS, sections
 from .results import PAPER_SPEED, WAYS, Extent, Results, Session
-from .scenes import COMPARED, NAMES
+from .scenes import COMPARED, NAMES, THIRD
 from .simulations import Told, simulate
 
 #: Metrics of the session: key, name, factor and unit.
@@ -39,10 +39,7 @@ METRICS = (
 
 
 def compare_methods(results: Results) -> Iterator[str]:
-    """Give the lines of the table, a method a column, in Markdown.
-
-    `results`: with all methods, see `Results.compared`.
-    """
+    """Give the lines of the table, a method a column, in Markdown."""
     methods = [method for method in COMPARED if method in results.session]
     yield f"| | {' | '.join(NAMES[method] for method in methods)} |"
     yield f"| --- |{' ---: |' * len(methods)}"
@@ -120,7 +117,7 @@ def _lines(
         yield f"![{caption}]({name}.svg)\n"
         yield f"*{caption}.* [Data]({name}.csv)\n"
     yield "Fig. 7, pins, forces and modes in motion, is the view in Blender.\n"
-    if results.third is not None:
+    if THIRD in results.session:
         yield "## Method III\n"
         yield (
             "The paper's conclusion asks for regional height *and* force commands; docs/hybrid.md derives "
@@ -128,7 +125,7 @@ def _lines(
             "two. At rest its blister is as wide as its skirt, for drags to come; what stays behind is the "
             "nominal blister (Fig. 6). JND: just noticeable differences, docs/perception.md.\n"
         )
-        yield from compare_methods(results.compared())
+        yield from compare_methods(results)
         yield ""
     yield "## Fig. 3: Method I, the virtual master\n"
     yield "| Stage | What it does |"
@@ -170,12 +167,11 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
     results = simulate(extent, told)
     took = time.perf_counter() - started
     drawn = {}
-    shown = results.compared()
-    for name, (caption, draw) in _pictures(shown).items():
+    for name, (caption, draw) in _pictures(results).items():
         told(f"drawing {name}")
         picture = draw()
         if name == SURFACES:
-            rows = table(figures_session.surface_rows(shown.session), ("method", *"xy", "height (mm)"))
+            rows = table(figures_session.surface_rows(results.session), ("method", *"xy", "height (mm)"))
         else:
             letter(picture)
             rows = table(curves(picture))
@@ -184,7 +180,7 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
         drawn[name] = caption
     found = claims(results)
     (folder / "paper.md").write_text(page(results, found, drawn, took, __version__), encoding="utf-8")
-    numbers = json.dumps(_numbers(shown), indent=2, ensure_ascii=False, allow_nan=False)
+    numbers = json.dumps(_numbers(results), indent=2, ensure_ascii=False, allow_nan=False)
     (folder / "metrics.json").write_text(numbers + "\n", encoding="utf-8")
     return [f"{claim.verdict:14} {claim.printed}" for claim in found]
 

@@ -77,10 +77,7 @@ def _plain(text: str) -> str:
 
 
 def table(rows: Iterable[Iterable[Any]], columns: Iterable[str] = COLUMNS) -> str:
-    """Return rows as CSV, numbers with six digits.
-
-    `rows`: values of each row; `columns`: names of the columns.
-    """
+    """Return rows as CSV, numbers with six digits."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)
@@ -94,6 +91,9 @@ def table(rows: Iterable[Iterable[Any]], columns: Iterable[str] = COLUMNS) -> st
 PROFILES = {"cone": (LINES[0], "o", 8.0), "gaussian": (LINES[1], "s", 5.0)}
 #: Instants of a drag that are drawn.
 INSTANTS = 5
+#: Line of what was asked for, of a limit, or of the bed at rest.
+DASHED: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": (0, (5, 3))}
+DOTTED = {**DASHED, "linestyle": (0, (1, 2))}
 
 
 def blisters(results: Results) -> Any:
@@ -109,13 +109,13 @@ def blisters(results: Results) -> Any:
                     _section(axes, done, look, profile)
                 _finger(axes, done, -1)
                 rest = done.scene.actuator.rest_height * MM
-                axes.axhline(rest, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
+                axes.axhline(rest, **DASHED)
                 axes.set(xlim=(-25, 25), title=f"{NAMES[method]}, {shape}", ylabel="height (mm)")
                 axes.set_ylim((36, 64) if shape == "convex" else (28, 43))
                 if row == len(methods) - 1:
                     axes.set_xlabel("distance from the middle (mm)")
         first = figure.axes[0]
-        first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="bed at rest")
+        first.plot([], [], **DASHED, label="bed at rest")
         first.plot([], [], color=INK, linewidth=1.2, label="fingertip")
         first.plot([], [], "o", color=INK, label="cell that feels it")
         handles, labels = first.get_legend_handles_labels()
@@ -184,48 +184,45 @@ MARKERS = "os^D"
 
 def oscillation(results: Results) -> Any:
     """Draw the force after a quick press at three gains, and what the sweep of the gains came to."""
-    position_gains = sorted({one.position_gain for one in results.swings})
-    middle = position_gains[len(position_gains) // 2]
+    gains = list(results.sweeps)
+    middle = gains[len(gains) // 2]
     with canvas(13.0, 7.6, f"Method I holding still after a quick press of {PRESSED * MM:g} mm") as (
         figure,
         place,
     ):
         detail = place("detail", 0.85, 4.4, 11.7, 2.25)
         set_point = _details(detail, results, middle)
-        detail.axhline(set_point, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
+        detail.axhline(set_point, **DASHED)
         detail.set(xlabel="time after the press (s)", ylabel="total force (N)", xlim=(-0.2, 2.4))
         detail.set_ylim(0.0, 2.5 * set_point)
         detail.set_title(f"$K_p$ = {middle:g} 1/m (beyond the frame: the press itself)")
         legend_above(detail)
         swing = place("amplitude", 0.85, 0.75, 5.4, 2.6)
         settle = place("settling", 7.15, 0.75, 5.4, 2.6)
-        rows = {f"$K_p$ = {gain:g} 1/m": gain for gain in position_gains}
-        sweeps = {
-            label: [one for one in results.swings if one.position_gain == gain]
-            for label, gain in rows.items()
-        }
-        sweeps[f"{position_gains[0]:g} 1/m, quicker device"] = results.quicker
-        for number, (label, found) in enumerate(sweeps.items()):
-            row = sorted(found, key=lambda one: one.gain)
+        sweeps = {f"$K_p$ = {gain:g} 1/m": row for gain, row in results.sweeps.items()}
+        sweeps[f"{gains[0]:g} 1/m, quicker device"] = sorted(results.quicker)
+        for number, (label, row) in enumerate(sweeps.items()):
             style: dict[str, Any] = {"color": LINES[number], "marker": MARKERS[number]}
             swing.plot([one.gain for one in row], [one.amplitude for one in row], label=label, **style)
             calm = [one for one in row if one.settling is not None]
             settle.plot([one.gain for one in calm], [one.settling for one in calm], label=label, **style)
-        swing.axhline(SUSTAINED, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
-        swing.set(
-            ylabel="amplitude in the last second (N)", ylim=(0.0, None), title="Oscillation that goes on"
-        )
-        settle.set(
-            ylabel="time to settle within 10 % (s)", ylim=(0.0, None), title="Response (no point: it goes on)"
-        )
-        ticks = [2, 5, 10, 20, 50, 100]
+        swing.axhline(SUSTAINED, **DASHED)
+        swing.set(ylabel="amplitude in the last second (N)", title="Oscillation that goes on")
+        settle.set(ylabel="time to settle within 10 % (s)", title="Response (no point: it goes on)")
         for axes in (swing, settle):
-            axes.set_xscale("log")
-            axes.set_xticks(ticks, [str(tick) for tick in ticks])
-            axes.minorticks_off()
-            axes.set(xlabel="force gain $K_f$ (1/N)", xlim=(1.7, 190))
+            _scale_gains(axes, 100, "force gain $K_f$ (1/N)")
+            axes.set_xlim(1.7, 190)
         settle.legend(loc="upper right", borderaxespad=0.0)
     return figure
+
+
+def _scale_gains(axes: Any, highest: float, label: str) -> None:
+    """Give an axis of gains, and one of values from 0 on."""
+    ticks = [tick for tick in (2, 5, 10, 20, 50, 100, 200, 400) if tick <= highest]
+    axes.set_xscale("log")
+    axes.set_xticks(ticks, [str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.set(xlabel=label, ylim=(0.0, None))
 
 
 def _details(axes: Any, results: Results, position_gain: float) -> float:
@@ -260,21 +257,18 @@ def tracking(results: Results) -> Any:
                 for one, x, y in zip(row, speed, value, strict=True):
                     fill = color if one.losses == 0 and one.loss_share == 0.0 else "white"
                     axes.plot(x, y, marker, color=color, markerfacecolor=fill, markersize=7)
-            axes.axhline(limit * factor, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
-            axes.axvline(PAPER_SPEED * MM, color=INK, linewidth=1.0, linestyle=(0, (1, 2)))
+            axes.axhline(limit * factor, **DASHED)
+            axes.axvline(PAPER_SPEED * MM, **DOTTED)
             axes.set(xlabel="finger's speed (mm/s)", ylabel=label, xlim=(0, None), ylim=(0, None))
             axes.set_title(label.split(" (")[0])
         first = panels[0][-1]
         first.plot([], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost")
-        first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="criterion")
-        first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (1, 2)), label="the paper's 15 mm/s")
+        first.plot([], [], **DASHED, label="criterion")
+        first.plot([], [], **DOTTED, label="the paper's 15 mm/s")
         handles, labels = first.get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper left", ncols=6, bbox_to_anchor=(0.005, 0.93),
                       fontsize=10, handlelength=1.2, columnspacing=0.8)  # fmt: skip
     return figure
-
-
-DASHED = (0, (5, 3))
 
 
 def variants(results: Results) -> Any:
@@ -307,7 +301,7 @@ def _ahead(axes: Any, results: Results) -> None:
     for number, (method, called) in enumerate(zip(METHODS, ("Method I", "Method II"), strict=True)):
         _across(axes, names, [found.get((method, name), np.nan) for name in names], number, called)
     near, far = (f"{one * MM:g}" for one in AHEAD)
-    axes.axvline(0.0, color=INK, linewidth=1.0, linestyle=DASHED)
+    axes.axvline(0.0, **DASHED)
     axes.set(xlabel="height over the bed at rest (mm)", title=f"Cells {near} to {far} mm ahead")
     lowest, highest = min(found.values()), max(found.values())
     axes.set_xlim(1.15 * lowest, max(-0.1 * lowest, 1.5 * highest))
@@ -325,19 +319,13 @@ def _across(axes: Any, names: list[str], values: list[float], number: int, calle
 
 
 def _gains(axes: Any, results: Results) -> None:
-    used = getattr(results.printed[METHODS[0]].scene.control, "position_gain", 0.0)
-    one = [swing for swing in results.swings if swing.position_gain == used]
-    shown = (("Method I", one, LINES[0], "o-"), ("Method II", results.cell_swings, LINES[1], "s-"))
-    for called, swings, color, look in shown:
-        row = sorted(swings, key=lambda swing: swing.gain)
+    used = results.sweeps.get(results.printed[METHODS[0]].gain("position_gain"), [])
+    rows = ("Method I", used, "o-"), ("Method II", sorted(results.cell_swings), "s-")
+    for color, (called, row, look) in zip(LINES, rows, strict=False):
         values = [swing.gain for swing in row], [swing.amplitude for swing in row]
         axes.plot(*values, look, color=color, label=called)
-    axes.axhline(SUSTAINED, color=INK, linewidth=1.0, linestyle=DASHED)
-    axes.set_xscale("log")
-    ticks = [2, 5, 10, 20, 50, 100, 200, 400]
-    axes.set_xticks(ticks, [str(tick) for tick in ticks])
-    axes.minorticks_off()
-    axes.set(xlabel="$K_f$ of the master, $K_{FF}$ of a cell (1/N)", ylim=(0.0, None))
+    axes.axhline(SUSTAINED, **DASHED)
+    _scale_gains(axes, 400, "$K_f$ of the master, $K_{FF}$ of a cell (1/N)")
     axes.set(ylabel="amplitude of the force (N)", title="Held still after a quick press")
     axes.legend(loc="upper left", borderaxespad=0.0)
 

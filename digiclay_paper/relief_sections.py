@@ -28,22 +28,15 @@ ON = 1e-6
 
 
 class Limits(NamedTuple):
-    """Largest deviations of a section of the intended shape.
-
-    Attributes
-    ----------
-    rms, largest : float
-        Of the deviation, as shares of the height of the relief asked for in the section.
-    rim : float
-        How much higher (in a crease: lower) than in the middle any of its pins may be, as such a share.
-    level : float
-        How far its middle may be from the height asked for there, as a share of that.
-    """
+    """Largest deviations of a section of the intended shape."""
 
     rms: float = 0.10
     largest: float = 0.25
+    """Of the deviation, as shares of the height of the relief asked for in the section."""
     rim: float = 0.05
+    """How much higher (in a crease: lower) than in the middle any of its pins may be, as such a share."""
     level: float = 0.25
+    """How far its middle may be from the height asked for there, as a share of that."""
 
     def __str__(self) -> str:
         return (
@@ -57,36 +50,25 @@ LIMITS = Limits()
 
 
 class Section(NamedTuple):
-    """A section through the final surface.
-
-    Attributes
-    ----------
-    part : str
-        Boss or crease it belongs to: ridge, mound or valley.
-    along : ndarray (k,)
-        Where its cells are on its line, m.
-    found, asked : ndarray (k,)
-        Heights over the bed at rest, m: formed, and asked for. `asked` is scaled so that in the middle
-        it is as high as `found`: how deep the pins press into the fingertip is no matter of shape.
-    level : float
-        By how much it was higher there than it had been asked for, m; in a crease: lower.
-    middle : float
-        The height asked for in the middle, m; in a crease: the depth.
-    rim : float
-        How much higher (in a crease: lower) than in the middle the section is anywhere, m.
-    pins : float
-        The same of all pins of the boss or crease, on the section or beside it, m.
-    """
+    """A section through the final surface."""
 
     name: str
     part: str
+    """Boss or crease it belongs to: ridge, mound or valley."""
     along: Floats
+    """(k,): Where its cells are on its line, m."""
     found: Floats
     asked: Floats
+    """(k,): Heights over the bed at rest, m: formed, and asked for. `asked` is scaled so that in the middle
+    it is as high as `found`: how deep the pins press into the fingertip is no matter of shape."""
     level: float
+    """By how much it was higher there than it had been asked for, m; in a crease: lower."""
     middle: float
+    """The height asked for in the middle, m; in a crease: the depth."""
     rim: float
+    """How much higher (in a crease: lower) than in the middle the section is anywhere, m."""
     pins: float
+    """The same of all pins of the boss or crease, on the section or beside it, m."""
 
     @property
     def relief(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from digiclay.core.scene.schema import Scene
@@ -28,38 +28,26 @@ SUSTAINED = 0.01
 
 @dataclass(frozen=True)
 class Extent:
-    """Extent of the simulations.
-
-    Attributes
-    ----------
-    resolution : float
-        Of the largest speeds, m/s.
-    drags, lifts : tuple of float
-        Between which speeds the largest of a drag and of a lift are looked for, m/s.
-    speeds : tuple of float
-        Of the drags that are drawn, m/s.
-    gains, position_gains : tuple of float
-        Of the sweep, 1/N and 1/m.
-    cell_gains : tuple of float
-        K_FF of Method II's sweep, 1/N.
-    ways : tuple of str
-        Which of the simple trajectories the variants of the scene are tried on.
-    noises : tuple of float
-        Standard deviations of the force sensors with which the fingertip is located, N.
-    third : tuple of str
-        What Method III is run on besides the session: blisters, tracks.
-    """
+    """Extent of the simulations."""
 
     resolution: float
+    """Of the largest speeds, m/s."""
     drags: tuple[float, float]
     lifts: tuple[float, float]
+    """Between which speeds the largest of a drag and of a lift are looked for, m/s."""
     speeds: tuple[float, ...]
+    """Of the drags that are drawn, m/s."""
     gains: tuple[float, ...]
     position_gains: tuple[float, ...]
+    """Of the sweep, 1/N and 1/m."""
     cell_gains: tuple[float, ...]
+    """K_FF of Method II's sweep, 1/N."""
     ways: tuple[str, ...]
+    """Which of the simple trajectories the variants of the scene are tried on."""
     noises: tuple[float, ...]
+    """Standard deviations of the force sensors with which the fingertip is located, N."""
     third: tuple[str, ...] = ()
+    """What Method III is run on besides the session: blisters, tracks."""
 
 
 FULL = Extent(
@@ -79,25 +67,17 @@ BEYOND = 80e-3, (40e-3, 60e-3)
 
 
 class Swing(NamedTuple):
-    """Result of a hold after a quick press, at one pair of gains.
-
-    Attributes
-    ----------
-    gain, position_gain : float
-        K_f, 1/N, and K_p, 1/m.
-    amplitude : float
-        Of the force in the last second, N.
-    frequency : float or None
-        Hz.
-    settling : float or None
-        From the press until the force stays within 10 % of its set point, s; None: it goes on swinging.
-    """
+    """Result of a hold after a quick press, at one pair of gains."""
 
     gain: float
     position_gain: float
+    """K_f, 1/N, and K_p, 1/m."""
     amplitude: float
+    """Of the force in the last second, N."""
     frequency: float | None
+    """Hz."""
     settling: float | None
+    """From the press until the force stays within 10 % of its set point, s; None: it goes on swinging."""
 
     @property
     def sustained(self) -> bool:
@@ -106,93 +86,67 @@ class Swing(NamedTuple):
 
 
 class Dragged(NamedTuple):
-    """Result of a straight level drag.
-
-    Attributes
-    ----------
-    force, deviation : float
-        Mean and standard deviation over time of the total force, N.
-    followers : float
-        Mean number of cells that follow the force.
-    unevenness : float or None
-        See the metric ``ridge_unevenness``, m.
-    ahead : float or None
-        Mean height over the bed at rest of cells that do not feel the fingertip and lie `AHEAD` of it, m.
-    """
+    """Result of a straight level drag."""
 
     follows: Follows
     force: float
     deviation: float
+    """Mean and standard deviation over time of the total force, N."""
     followers: float
+    """Mean number of cells that follow the force."""
     unevenness: float | None
+    """See the metric ``ridge_unevenness``, m."""
     ahead: float | None
+    """Mean height over the bed at rest of cells that do not feel the fingertip and lie `AHEAD` of it, m."""
 
 
 class Located(NamedTuple):
-    """Error of Method I's position of a fingertip at rest, with noisy force sensors.
-
-    Attributes
-    ----------
-    noise : float
-        Standard deviation of a cell's force sensor, N.
-    radius : float
-        r_VM, m.
-    thresholds : bool
-        Whether the controller takes readings below the threshold of the noise for none.
-    scatter : float or None
-        Root mean square distance of the virtual master from its mean place, m; None: it never shapes.
-    losses : int
-        How often the fingertip was lost.
-    """
+    """Error of Method I's position of a fingertip at rest, with noisy force sensors."""
 
     noise: float
+    """Standard deviation of a cell's force sensor, N."""
     radius: float
+    """r_VM, m."""
     thresholds: bool
+    """Whether the controller takes readings below the threshold of the noise for none."""
     scatter: float | None
+    """Root mean square distance of the virtual master from its mean place, m; None: it never shapes."""
     losses: int
+    """How often the fingertip was lost."""
 
 
 class Session(NamedTuple):
-    """Quantities of a session for figures and claims.
-
-    Attributes
-    ----------
-    history : dict of ndarray
-        Every fourth row of time, height, total force, total force asked for (``set_point``), number of
-        cells that follow and fingertip; and the positions.
-    detail : dict of ndarray
-        Every row of time and height in the first seconds.
-    metrics : dict
-        As `Result.figures`.
-    lost : list of float
-        When the fingertip was lost though it rose no faster than a pin can, s.
-    followers : float
-        Mean number of cells that follow the force while there are any.
-    windows : dict
-        RFD, N, and standard deviations over time of total force, N, and of the height under the fingertip, m,
-        by the names of `windows.WINDOWS` and of the metrics.
-    """
+    """Quantities of a session for figures and claims."""
 
     scene: Scene
     history: dict[str, NDArray[Any]]
+    """Every fourth row of time, height, total force, total force asked for (``set_point``), number of cells
+    that follow and fingertip; and the positions."""
     detail: dict[str, NDArray[Any]]
+    """Every row of time and height in the first seconds."""
     metrics: dict[str, float | None]
+    """As `Result.figures`."""
     lost: list[float]
+    """When the fingertip was lost though it rose no faster than a pin can, s."""
     followers: float
+    """Mean number of cells that follow the force while there are any."""
     windows: dict[str, dict[str, float | None]]
+    """RFD, N, and standard deviations over time of total force, N, and of the height under the fingertip, m,
+    by the names of `windows.WINDOWS` and of the metrics."""
+
+    def gain(self, name: str) -> float:
+        """Return a parameter of the controller; 0 where it has none."""
+        value: float = getattr(self.scene.control, name, 0.0)
+        return value
 
 
 @dataclass
 class Results:
-    """All results, by method where methods are compared.
-
-    Attributes
-    ----------
-    blisters : by method, shape ("convex", "concave"), profile
-    """
+    """All results, by method where methods are compared; Method III's come last."""
 
     criterion: Criterion = field(default_factory=Criterion)
     blisters: dict[tuple[str, str, str], Result] = field(default_factory=dict)
+    """"""
     drags: dict[str, tuple[Result, float, float]] = field(default_factory=dict)
     printed: dict[str, Session] = field(default_factory=dict)
     session: dict[str, Session] = field(default_factory=dict)
@@ -209,21 +163,16 @@ class Results:
     cell_swings: list[Swing] = field(default_factory=list)
     dragged: dict[tuple[str, str, str], Dragged] = field(default_factory=dict)
     located: list[Located] = field(default_factory=list)
-    third: Results | None = None
 
-    def compared(self) -> Results:
-        """Return the results with Method III beside the methods of the paper, for figures and tables."""
-        return self if self.third is None else replace(self, **_join(self, self.third))
+    @property
+    def sweeps(self) -> dict[float, list[Swing]]:
+        """The swings by K_p, 1/m, in ascending order, each sweep by K_f."""
+        gains = sorted({swing.position_gain for swing in self.swings})
+        return {gain: sorted(swing for swing in self.swings if swing.position_gain == gain) for gain in gains}
 
     def onset(self, position_gain: float) -> tuple[float | None, float | None]:
         """Return the `onset_among` those at one K_p, 1/m."""
-        return onset_among([one for one in self.swings if one.position_gain == position_gain])
-
-
-def _join(one: Results, other: Results) -> dict[str, Any]:
-    """Return the dictionaries of two results by name of the field, as one each."""
-    known = {item.name: (getattr(one, item.name), getattr(other, item.name)) for item in fields(one)}
-    return {name: {**first, **last} for name, (first, last) in known.items() if isinstance(first, dict)}
+        return onset_among(self.sweeps.get(position_gain, []))
 
 
 def onset_among(swings: list[Swing]) -> tuple[float | None, float | None]:

@@ -189,7 +189,7 @@ def simulate(extent: Extent, told: Told) -> Results:
         results.cell_swings.append(_swing(gain, extent.position_gains[0], None, METHODS[1])[0])
     _go_wild(results, told)
     vary(results, extent, told)
-    results.third = _run_third(results.slow, extent, told)
+    _run_third(results, extent, told)
     return results
 
 
@@ -201,27 +201,24 @@ def _form_blisters(results: Results, method: str, told: Told) -> None:
             results.blisters[method, shape, profile] = _run(scenes.blister(method, height, profile))
 
 
-def _run_third(slow: float, extent: Extent, told: Told) -> Results:
+def _run_third(results: Results, extent: Extent, told: Told) -> None:
     """Run blisters, drags, lifts and the session with Method III, which the paper does not have."""
-    found = Results()
     if "blisters" in extent.third:
-        _form_blisters(found, THIRD, told)
+        _form_blisters(results, THIRD, told)
     if "tracks" in extent.third:
         highest, more = BEYOND
         wider = replace(extent, drags=(extent.drags[0], highest), speeds=(*extent.speeds, *more))
-        _track(found, THIRD, wider, told)
+        _track(results, THIRD, wider, told)
     told(f"the paper's session, {THIRD}")
     scene = load(find(SESSION), [Setting("control.method", THIRD)])
-    found.printed[THIRD] = _boiled_down(_run(scene))
-    slowly = scenes.slowed(scene, slow)
-    found.session[THIRD] = _boiled_down(_run(slowly)) if slow > 1.0 else found.printed[THIRD]
-    return found
+    results.printed[THIRD] = results.session[THIRD] = _boiled_down(_run(scene))
+    if results.slow > 1.0:
+        results.session[THIRD] = _boiled_down(_run(scenes.slowed(scene, results.slow)))
 
 
 def _go_wild(results: Results, told: Told) -> None:
     """Run the first seconds of the paper's session with Method I at the first gain that oscillates."""
-    gentle = results.printed[METHODS[0]].scene.control
-    first = results.onset(getattr(gentle, "position_gain", 0.0))[1]
+    first = results.onset(results.printed[METHODS[0]].gain("position_gain"))[1]
     if first is not None:
         told(f"the paper's session, K_f {first:g} 1/N")
         settings = [Setting("control.method", METHODS[0]), Setting("control.force_gain", f"{first!r}")]
