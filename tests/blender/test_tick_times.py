@@ -72,8 +72,8 @@ def test_the_commands_print_tables_write_figures_and_draw_the_histogram(
     pytest.importorskip("matplotlib", reason="the histogram needs it; `make test` has it")
     monkeypatch.setattr(tick_times, "BEDS", ((*BED, 8e-3), (20, 21, 1.5e-3, 1e-3, 16e-3)))
     monkeypatch.setattr(tick_times, "VIEWPORT", ((12, 12, 5e-3), (12, 14, 5e-3)))
-    monkeypatch.setattr(tick_times, "QUICK", 5)
-    monkeypatch.setattr(tick_times, "FEW", 2)
+    for name, count in (("WARM_UP", 5), ("QUICK", 5), ("FEW", 2)):
+        monkeypatch.setattr(tick_times, name, count)
     monkeypatch.setattr(tick_times, "keep_to_one_core", lambda: None)  # other tests go on in this process
     for kind in ("ticks", "viewport"):
         assert main([kind, "--quick", "--quiet", "--out", str(tmp_path)]) == 0
