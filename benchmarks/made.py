@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from digiclay.commands.stop import refuse_unwritable
@@ -171,11 +170,7 @@ class Made:
 
 
 def make(name: str, bed: str | None = None) -> Made:
-    """Play the recorded strokes of one of `THINGS` on a bed of `BEDS` at rest; by default that of the file.
-
-    Places and sizes are scaled with the bed's width. Raises DigiclayError when the file cannot be read, or a
-    stroke not be formed.
-    """
+    """Play the strokes of one of `THINGS`, scaled, on a bed of `BEDS`; by default that of the file."""
     recorded = read_strokes(STROKES / f"{name}.toml")
     drawn, other = BEDS[recorded.bed], BEDS[bed or recorded.bed]
     share = other.columns * other.pitch / (drawn.columns * drawn.pitch)
@@ -212,29 +207,32 @@ CLEAR = 1e-3
 LETTERS, INSET, INK = 20, (16, 12), (26, 31, 38)
 
 
-def draw_made(made: Made, out: Path) -> Path:
-    """Draw a thing as it was formed and as it was intended, as a JPEG; return its path.
-
-    Raises OutputError when it cannot be written, or Pillow is missing.
-    """
-    words = (
-        f"{made.title}: formed on the bed {made.bed}, correlation {made.correlation:.3f}",
-        f"{made.title}: intended",
-    )
+def draw_made(made: Made, out: Path) -> None:
+    """Draw a thing as it was formed and as it was intended, side by side, as a JPEG."""
+    try:
+        from PIL import Image, ImageDraw, ImageFont
+    except ImportError:
+        raise OutputError("Pictures of made things need Pillow: pip install digiclay[images].") from None
     lowest = min(float(made.formed.min()), float(made.intended.min()))
+    whole = Image.new("RGB", (2 * WIDTH, HEIGHT))
+    pen = ImageDraw.Draw(whole)
+    formed = f"formed on the bed {made.bed}, correlation {made.correlation:.3f}"
     with tempfile.TemporaryDirectory() as folder:
-        files = [
-            draw_relief(made.scene, height, lowest, Path(folder) / f"{number}.png")
-            for number, height in enumerate((made.formed, made.intended))
-        ]
-        return join(files, words, out)
+        for number, (relief, words) in enumerate(((made.formed, formed), (made.intended, "intended"))):
+            file = Path(folder) / f"{number}.png"
+            draw_relief(made.scene, relief, lowest, file)
+            whole.paste(Image.open(file).convert("RGB"), (number * WIDTH, 0))
+            place = number * WIDTH + INSET[0], INSET[1]
+            pen.text(place, f"{made.title}: {words}", INK, ImageFont.load_default(LETTERS))
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        whole.save(out, quality=90)
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
 
 
-def draw_relief(scene: Scene, relief: NDArray[Any], lowest: float, out: Path) -> Path:
-    """Draw the skin over a bed's pins as a PNG, without fingertip.
-
-    `relief` (n,), `lowest`: heights of the pins, and the lowest of the compared pictures, above rest, m.
-    """
+def draw_relief(scene: Scene, relief: Floats, lowest: float, out: Path) -> None:
+    """Draw the skin over pins at heights above rest, (n,), m, as a PNG, without fingertip; lowest of both."""
     looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
     rest = Instant.at_rest(scene.layout, scene.actuator)
     instant = replace(rest, height=rest.height + relief)
@@ -245,34 +243,12 @@ def draw_relief(scene: Scene, relief: NDArray[Any], lowest: float, out: Path) ->
         form.set_form(bed, "skin")
         bed.rotation_euler.z = TURN
         tip = view.fingertip_of(bed)
-        if tip is not None:
-            for part in (tip, *tip.children_recursive):
-                part.hide_render = True
+        for part in (tip, *tip.children_recursive) if tip is not None else ():
+            part.hide_render = True
         points = stage.outline(bed)
         below = points[points[:, 2] <= points[: len(relief), 2].max()]  # without the fingertip
         stage.set_up(drawn, bed, instant, points=below, modes=(), margins=MARGINS)
         render_picture(drawn, out, out)
-    return out
-
-
-def join(files: Sequence[Path], words: Sequence[str], out: Path) -> Path:
-    """Put pictures side by side, with words in the corner of each. `out`: the JPEG."""
-    try:
-        from PIL import Image, ImageDraw, ImageFont
-    except ImportError:
-        raise OutputError("Pictures of made things need Pillow: pip install digiclay[images].") from None
-    whole = Image.new("RGB", (WIDTH * len(files), HEIGHT))
-    pen = ImageDraw.Draw(whole)
-    for number, (file, caption) in enumerate(zip(files, words, strict=True)):
-        whole.paste(Image.open(file).convert("RGB"), (number * WIDTH, 0))
-        place = number * WIDTH + INSET[0], INSET[1]
-        pen.text(place, caption, INK, ImageFont.load_default(LETTERS))
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        whole.save(out, quality=90)
-    except OSError as error:
-        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
-    return out
 
 
 #: Columns of the table.

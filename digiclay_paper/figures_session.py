@@ -11,26 +11,24 @@ from digiclay.plots.bed import draw_map, draw_path, draw_relief
 from digiclay.plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
 from digiclay.plots.run import LETTERS, session_cells
 
+from .paper_figures import list_methods
 from .relief_sections import sections
 from .results import Results, Session
-from .scenes import COMPARED, METHODS, NAMES, THIRD
+from .scenes import METHODS, NAMES, THIRD
 
 #: What is looked at closely: the first press and its end, and a part of the even lift, s.
 PRESSING, LIFTING = (0.5, 1.5), (2.4, 3.4)
 
 
 def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw the heights of the same cells, and the total force, side by side for all methods.
-
-    `sessions`: by method.
-    """
+    """Draw the heights of the same cells, and the total force, side by side for all methods."""
     cells = session_cells(sessions[METHODS[0]].history)
     spots = sessions[METHODS[0]].history["position"][cells] * MM
     names = [f"{name} ({x:.0f}, {y:.0f})" for name, (x, y) in zip(LETTERS, spots, strict=False)]
     lowest = min(float(one.history["height"][:, cells].min()) for one in sessions.values()) * MM - 2.0
     highest = max(float(one.history["height"][:, cells].max()) for one in sessions.values()) * MM + 2.0
     strongest = 1.1 * max(float(one.history["total_force"].max()) for one in sessions.values())
-    methods = _list(sessions)
+    methods = list_methods(sessions)
     across = 0.5 + 6.5 * len(methods)
     with canvas(across, 7.4, title) as (figure, place):
         for column, method in enumerate(methods):
@@ -64,11 +62,6 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
             handles, names, loc="upper left", ncols=6, bbox_to_anchor=(2.77 / across, 1.0 - 0.5 / 7.4)
         )
     return figure
-
-
-def _list(sessions: Mapping[str, Session]) -> list[str]:
-    """Return the methods of sessions in their order."""
-    return [method for method in COMPARED if method in sessions]
 
 
 def details(results: Results, title: str) -> Any:
@@ -128,11 +121,8 @@ def _swinging(time: Any, height: Any) -> Any:
 
 
 def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw the final surfaces in relief and from above, side by side for all methods.
-
-    `sessions`: by method.
-    """
-    methods = _list(sessions)
+    """Draw the final surfaces in relief and from above, side by side for all methods."""
+    methods = list_methods(sessions)
     across = 0.3 + 6.6 * len(methods)
     with canvas(across, 9.6, title) as (figure, place):
         for column, method in enumerate(methods):
@@ -155,7 +145,7 @@ def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
 
 def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, float, float]]:
     """Give the final surfaces as rows of method, x, y and height in mm."""
-    for method in _list(sessions):
+    for method in list_methods(sessions):
         history = sessions[method].history
         for (x, y), height in zip(history["position"], history["height"][-1], strict=True):
             yield method, float(x) * MM, float(y) * MM, float(height) * MM
@@ -163,7 +153,7 @@ def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, 
 
 def profiles(sessions: Mapping[str, Session], title: str) -> Any:
     """Draw sections through the final surfaces, formed and asked for. `sessions`: by method."""
-    found = {method: list(sections(sessions[method])) for method in _list(sessions)}
+    found = {method: list(sections(sessions[method])) for method in list_methods(sessions)}
     count = len(found[METHODS[0]])
     with canvas(13.5, 8.6, title) as (figure, place):
         for number in range(count):

@@ -17,10 +17,10 @@ from digiclay.plots.figure import save
 
 from . import figures_session, paper_figures
 from .claims import Claim, claims
-from .paper_figures import curves, letter, table
+from .paper_figures import curves, letter, list_methods, table
 from .relief_sections import LIMITS, sections
 from .results import PAPER_SPEED, WAYS, Extent, Results, Session
-from .scenes import COMPARED, NAMES, THIRD
+from .scenes import NAMES, THIRD
 from .simulations import Told, simulate
 
 #: Metrics of the session: key, name, factor and unit.
@@ -40,7 +40,7 @@ METRICS = (
 
 def compare_methods(results: Results) -> Iterator[str]:
     """Give the lines of the table, a method a column, in Markdown."""
-    methods = [method for method in COMPARED if method in results.session]
+    methods = list_methods(results.session)
     yield f"| | {' | '.join(NAMES[method] for method in methods)} |"
     yield f"| --- |{' ---: |' * len(methods)}"
     for key, name, factor, unit in METRICS:
@@ -83,17 +83,10 @@ CHAIN = (
 )
 
 
-def page(results: Results, found: list[Claim], pictures: Mapping[str, str], took: float, version: str) -> str:
-    """Return the page.
-
-    `pictures`: name of the files, without an ending, to caption; `took`: time of all simulations, s.
-    """
-    return "\n".join(_lines(results, found, pictures, took, version)) + "\n"
-
-
-def _lines(
+def list_lines(
     results: Results, found: list[Claim], pictures: Mapping[str, str], took: float, version: str
 ) -> Iterator[str]:
+    """Give the lines of the page; `pictures`: files' names to captions; `took`: time of simulations, s."""
     yield "# The paper's results, and ours\n"
     yield (
         "After Askins and Book, *Digital Clay: User Interaction Model for Control of a Fluidically Actuated "
@@ -179,7 +172,8 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
         write_whole(folder / f"{name}.csv", rows.encode())
         drawn[name] = caption
     found = claims(results)
-    (folder / "paper.md").write_text(page(results, found, drawn, took, __version__), encoding="utf-8")
+    lines = list_lines(results, found, drawn, took, __version__)
+    (folder / "paper.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     numbers = json.dumps(_numbers(results), indent=2, ensure_ascii=False, allow_nan=False)
     (folder / "metrics.json").write_text(numbers + "\n", encoding="utf-8")
     return [f"{claim.verdict:14} {claim.printed}" for claim in found]
@@ -221,7 +215,7 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
 
 def _numbers(results: Results) -> dict[str, Any]:
     """Return what was measured, as it is written to ``metrics.json``; SI units."""
-    methods = [method for method in COMPARED if method in results.session]
+    methods = list_methods(results.session)
     return {
         "criterion": {"lag": results.criterion.lag, "rfd": results.criterion.deviation},
         "slow": results.slow,
@@ -248,19 +242,14 @@ def _numbers(results: Results) -> dict[str, Any]:
         "sections": {
             method: {
                 one.name: {
-                    "rms": one.rms,
-                    "largest": one.largest,
-                    "rim": one.rim,
-                    "rim_by_pins": one.pins,
-                    "relief": one.relief,
-                    "level": one.level,
-                    "meets": one.meets(LIMITS),
+                    "rms": one.rms, "largest": one.largest, "rim": one.rim, "rim_by_pins": one.pins,
+                    "relief": one.relief, "level": one.level, "meets": one.meets(LIMITS),
                 }
                 for one in sections(results.session[method])
             }
             for method in methods
         },
-    }
+    }  # fmt: skip
 
 
 def _finite(values: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -87,6 +87,12 @@ def table(rows: Iterable[Iterable[Any]], columns: Iterable[str] = COLUMNS) -> st
     return out.getvalue()
 
 
+def list_methods(results: Mapping[Any, Any]) -> list[str]:
+    """Return the methods that results have, by method or by method and more, in their order."""
+    there = {key if isinstance(key, str) else key[0] for key in results}
+    return [method for method in COMPARED if method in there]
+
+
 #: Color, marker and its size of each profile.
 PROFILES = {"cone": (LINES[0], "o", 8.0), "gaussian": (LINES[1], "s", 5.0)}
 #: Instants of a drag that are drawn.
@@ -98,7 +104,7 @@ DOTTED = {**DASHED, "linestyle": (0, (1, 2))}
 
 def blisters(results: Results) -> Any:
     """Draw sections through raised and sunken blisters, both profiles, all methods."""
-    methods = [method for method in COMPARED if (method, "convex", "cone") in results.blisters]
+    methods = list_methods(results.blisters)
     height = 0.8 + 3.4 * len(methods)
     with canvas(12.5, height, "Blisters in section, the finger in place") as (figure, place):
         for row, method in enumerate(methods):
@@ -146,7 +152,7 @@ def _finger(axes: Any, done: Result, row: int) -> None:
 
 def freezing(results: Results) -> Any:
     """Draw sections along a drag at several times; frozen cells are marked."""
-    methods = [method for method in COMPARED if method in results.drags]
+    methods = list_methods(results.drags)
     height = 0.8 + 3.7 * len(methods)
     with canvas(12.5, height, "Freezing: what the finger has left keeps its height") as (figure, place):
         from matplotlib import colormaps

@@ -94,10 +94,7 @@ Told = Callable[[str], None]
 
 
 def vary(results: Results, extent: Extent, told: Told) -> None:
-    """Run the drags of every variant, and locate a fingertip under noise.
-
-    `results`: takes them in; `told`: hears what comes next.
-    """
+    """Run the drags of every variant, and locate a fingertip under noise."""
     for variant, (setting, methods) in VARIANTS.items():
         for method in methods:
             for name in extent.ways:
@@ -112,10 +109,7 @@ def vary(results: Results, extent: Extent, told: Told) -> None:
 
 
 def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Result]:
-    """Run a drag, and return what it came to, and the whole of it.
-
-    `scene`: its device and method; `speed`, m/s.
-    """
+    """Run a drag with a scene's device and method, and return what it came to, and the whole of it."""
     follows, done = track(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
     part = select_rows(done.history, start, end)

@@ -30,7 +30,7 @@ from digiclay_paper.evidence import (
     trade,
 )
 from digiclay_paper.figures_session import details, heights_and_force
-from digiclay_paper.page import page
+from digiclay_paper.page import list_lines
 from digiclay_paper.paper_figures import COLUMNS, NAMED, curves, letter, table
 from digiclay_paper.results import AS_IT_IS, SESSION, WAYS, Dragged, Located, Results, Session, Swing
 from digiclay_paper.simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS, located, sessions
@@ -117,7 +117,8 @@ def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float
 
 
 def test_every_arrow_of_the_controller_and_every_claim_is_a_row_of_the_page() -> None:
-    text = page(results(), [Claim("said", "one; two", "differs", "because")], {"a": "caption"}, 1.0, "0")
+    claim = Claim("said", "one; two", "differs", "because")
+    text = "\n".join(list_lines(results(), [claim], {"a": "caption"}, 1.0, "0"))
     rows = ("| said | one;<br>two | **differs** | because |", "![caption](a.svg)", "[Data](a.csv)")
     assert [row for row in rows if row not in text] == []
     assert [mode for mode in MEANINGS if mode.name in ("REST", "HOLD") and MEANINGS[mode] not in text] == []
