@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..compat import bpy
 from ..core.base.modes import Mode
 from . import heat
-from .nodes import attribute, node, number, socket, switch
+from .nodes import attribute, combine, new_tree, node, number, read_height, socket, switch
 from .parts import Sources
 from .skin_lattice import KINDS
 from .skin_nodes import skin_nodes
@@ -33,54 +32,41 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
     """Make the node group that puts a pin on every vertex, an arrow where arrows are on, and the housing."""
     # Stretching one mesh costs half of drawing rod and cap apart. A cap is stretched with its
     # rod, from a flat one on a low pin to a round one on a high pin.
-    tree = bpy.data.node_groups.new("Digital Clay Pins", "GeometryNodeTree")
-    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    _add_settings(tree)
+    tree = new_tree("Digital Clay Pins")
+    for name, kind, default, words in SETTINGS:
+        socket(tree, name, f"NodeSocket{kind}", default, words)
     settings = node(tree, "NodeGroupInput", -1, 0)
-    result = node(tree, "NodeGroupOutput", 9, 0)
-    force_on, top = settings.outputs[COLOR_BY_FORCE], settings.outputs[TOP_FORCE]
-    level = _level_of_force(tree, top, len(Mode), 3)
-    choice = node(tree, "GeometryNodeCollectionInfo", 4, 0)
-    choice.name, choice.inputs["Collection"].default_value = SOURCES, sources.collection
-    choice.inputs["Separate Children"].default_value = True
+    cells = settings.outputs["Geometry"]
+    parts = {"Collection": sources.collection, "Separate Children": True}
+    choice = node(tree, "GeometryNodeCollectionInfo", 4, 0, parts, name=SOURCES)
+    level = _level_of_force(tree, settings.outputs[TOP_FORCE], len(Mode), 3)
     mode = attribute(tree, "mode", "INT", 2, 1)
-    instances = node(tree, "GeometryNodeInstanceOnPoints", 5, 0)
-    instances.inputs["Pick Instance"].default_value = True
-    index = switch(tree, "INT", 4, 1, force_on, mode, level)
-    tree.links.new(settings.outputs["Geometry"], instances.inputs["Points"])
-    tree.links.new(choice.outputs["Instances"], instances.inputs["Instance"])
-    tree.links.new(index, instances.inputs["Instance Index"])
-    tree.links.new(_stretch(tree, deck, length), instances.inputs["Scale"])
+    instances = node(tree, "GeometryNodeInstanceOnPoints", 5, 0, {
+        "Points": cells, "Instance": choice.outputs["Instances"], "Pick Instance": True,
+        "Instance Index": switch(tree, "INT", 4, 1, settings.outputs[COLOR_BY_FORCE], mode, level),
+        "Scale": _stretch(tree, deck, length),
+    })  # fmt: skip
     pins_on, skin_on, both_on = _form_switches(tree, settings, 16)
     pins = switch(tree, "GEOMETRY", 6, 1, pins_on, None, instances.outputs["Instances"])
     drawn = _arrows_on_points(tree, sources.arrow, settings, pins, unit, 7)
-    skin = _skin(tree, sources, settings, both_on, 20)
-    case = node(tree, "GeometryNodeObjectInfo", 7, 1)
-    case.name, case.inputs["Object"].default_value = CASE, sources.housing
-    both = node(tree, "GeometryNodeJoinGeometry", 8, 0)
-    tree.links.new(case.outputs["Geometry"], both.inputs["Geometry"])
-    tree.links.new(drawn, both.inputs["Geometry"])
-    tree.links.new(switch(tree, "GEOMETRY", 7.5, 2, skin_on, None, skin), both.inputs["Geometry"])
-    tree.links.new(both.outputs["Geometry"], result.inputs["Geometry"])
+    skin = switch(tree, "GEOMETRY", 7.5, 2, skin_on, None, _skin(tree, sources, settings, both_on, 20))
+    case = node(tree, "GeometryNodeObjectInfo", 7, 1, {"Object": sources.housing}, name=CASE)
+    every = {"Geometry": [case.outputs["Geometry"], drawn, skin]}
+    joined = node(tree, "GeometryNodeJoinGeometry", 8, 0, every)
+    node(tree, "NodeGroupOutput", 9, 0, {"Geometry": joined.outputs["Geometry"]})
     return tree
 
 
-def _add_settings(tree: Any) -> None:
-    """Add what each bed may choose for itself."""
-    socket(tree, COLOR_BY_FORCE, "NodeSocketBool", False, "Color the pins by force, not by mode")
-    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "Force of the last color, in N")
-    socket(tree, ARROWS, "NodeSocketBool", False, "Draw the force on each pin as an arrow onto its top")
-    socket(tree, ARROW_LENGTH, "NodeSocketFloat", LENGTH, "Length of the arrow of 1 N, in mm of the device")
-    socket(
-        tree,
-        FORM,
-        "NodeSocketInt",
-        0,
-        "0: pins, a skin where they are too small; 1: pins; 2: skin; 3: both",
-    )
-    socket(tree, MEMBRANE, "NodeSocketBool", False, "Stretch the skin over the flat ends of the pins")
-    socket(tree, FAR, "NodeSocketBool", False, "Pins are too small in the views; set by the extension")
+#: What each bed may choose for itself: name, type, default, description.
+SETTINGS = (
+    (COLOR_BY_FORCE, "Bool", False, "Color the pins by force, not by mode"),
+    (TOP_FORCE, "Float", heat.TOP, "Force of the last color, in N"),
+    (ARROWS, "Bool", False, "Draw the force on each pin as an arrow onto its top"),
+    (ARROW_LENGTH, "Float", LENGTH, "Length of the arrow of 1 N, in mm of the device"),
+    (FORM, "Int", 0, "0: pins, a skin where they are too small; 1: pins; 2: skin; 3: both"),
+    (MEMBRANE, "Bool", False, "Stretch the skin over the flat ends of the pins"),
+    (FAR, "Bool", False, "Pins are too small in the views; set by the extension"),
+)
 
 
 def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]:
@@ -101,33 +87,23 @@ def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]
 
 def _skin(tree: Any, sources: Sources, settings: Any, both: Any, row: float) -> Any:
     """Add the nodes of the skin, clear where pins are drawn under it; return its geometry."""
-    names = []
-    for step, name in enumerate(KINDS):
-        names.append(node(tree, "FunctionNodeInputString", -3, row + step))
-        names[-1].string = name
-    smooth, membrane = (name.outputs["String"] for name in names)
+    smooth, membrane = (
+        node(tree, "FunctionNodeInputString", -3, row + step, string=name).outputs["String"]
+        for step, name in enumerate(KINDS)
+    )
     kind = switch(tree, "STRING", -2, row, settings.outputs[MEMBRANE], smooth, membrane)
     skin = skin_nodes(tree, sources.skin, settings.outputs["Geometry"], kind, row)
-    clear = node(tree, "GeometryNodeSetMaterial", 19, row)
-    clear.inputs["Material"].default_value = sources.clear
-    tree.links.new(skin, clear.inputs["Geometry"])
-    chosen = switch(tree, "GEOMETRY", 20, row, both, skin, clear.outputs["Geometry"])
+    look = {"Geometry": skin, "Material": sources.clear}
+    clear = node(tree, "GeometryNodeSetMaterial", 19, row, look).outputs["Geometry"]
+    chosen = switch(tree, "GEOMETRY", 20, row, both, skin, clear)
     # An instance is joined with the housing without a copy of its points and their attributes.
-    whole = node(tree, "GeometryNodeGeometryToInstance", 21, row)
-    tree.links.new(chosen, whole.inputs["Geometry"])
-    return whole.outputs["Instances"]
+    return node(tree, "GeometryNodeGeometryToInstance", 21, row, {"Geometry": chosen}).outputs["Instances"]
 
 
 def _stretch(tree: Any, deck: float, length: float) -> Any:
     """Add the nodes that give (1, 1, (z - deck) / length) at every vertex."""
-    place = node(tree, "GeometryNodeInputPosition", 0, -2)
-    parts = node(tree, "ShaderNodeSeparateXYZ", 1, -2)
-    tree.links.new(place.outputs["Position"], parts.inputs["Vector"])
-    line = number(tree, "MULTIPLY_ADD", 2, -2, parts.outputs["Z"], 1.0 / length, -deck / length)
-    stretch = node(tree, "ShaderNodeCombineXYZ", 4, -2)
-    stretch.inputs["X"].default_value = stretch.inputs["Y"].default_value = 1.0
-    tree.links.new(number(tree, "MAXIMUM", 3, -2, line, LEAST_STRETCH), stretch.inputs["Z"])
-    return stretch.outputs["Vector"]
+    line = number(tree, "MULTIPLY_ADD", 2, -2, read_height(tree, -2), 1.0 / length, -deck / length)
+    return combine(tree, 4, -2, X=1.0, Y=1.0, Z=number(tree, "MAXIMUM", 3, -2, line, LEAST_STRETCH))
 
 
 def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
@@ -135,33 +111,25 @@ def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
     force = attribute(tree, "force", "FLOAT", 0, row + 1)
     per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLORS)), top)
     levels = number(tree, "CEIL", 2, row + 1, number(tree, "MULTIPLY", 1, row + 1, force, per_newton))
-    within = node(tree, "ShaderNodeClamp", 3, row + 1)
-    within.inputs["Max"].default_value = len(heat.COLORS)
-    tree.links.new(levels, within.inputs["Value"])
-    return number(tree, "ADD", 3.5, row, within.outputs["Result"], float(first))
+    limits = {"Value": levels, "Max": len(heat.COLORS)}
+    within = node(tree, "ShaderNodeClamp", 3, row + 1, limits).outputs["Result"]
+    return number(tree, "ADD", 3.5, row, within, float(first))
 
 
 def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: float, row: float) -> Any:
     """Add the nodes that draw the arrows beside the pins."""
     force = attribute(tree, "force", "FLOAT", 1, row + 1)
-    pressed = node(tree, "FunctionNodeCompare", 3, row - 0.4)
-    pressed.data_type, pressed.operation = "FLOAT", "GREATER_THAN"
-    pressed.inputs["B"].default_value = LEAST
-    tree.links.new(force, pressed.inputs["A"])
-    shape = node(tree, "GeometryNodeObjectInfo", 3, row + 0.6)
-    shape.inputs["Object"].default_value = arrow
-    shape.inputs["As Instance"].default_value = True
+    pressed = node(
+        tree, "FunctionNodeCompare", 3, row - 0.4, {"A": force, "B": LEAST},
+        data_type="FLOAT", operation="GREATER_THAN",
+    )  # fmt: skip
+    shape = node(tree, "GeometryNodeObjectInfo", 3, row + 0.6, {"Object": arrow, "As Instance": True})
     per_newton = number(tree, "MULTIPLY", 1, row + 2, settings.outputs[ARROW_LENGTH], unit)
-    stretch = node(tree, "ShaderNodeCombineXYZ", 3, row + 2)
-    stretch.inputs["X"].default_value = stretch.inputs["Y"].default_value = 1.0
-    tree.links.new(number(tree, "MULTIPLY", 2, row + 1, force, per_newton), stretch.inputs["Z"])
-    instances = node(tree, "GeometryNodeInstanceOnPoints", 4, row)
-    tree.links.new(settings.outputs["Geometry"], instances.inputs["Points"])
-    tree.links.new(pressed.outputs["Result"], instances.inputs["Selection"])
-    tree.links.new(shape.outputs["Geometry"], instances.inputs["Instance"])
-    tree.links.new(stretch.outputs["Vector"], instances.inputs["Scale"])
-    both = node(tree, "GeometryNodeJoinGeometry", 5, row)
-    tree.links.new(instances.outputs["Instances"], both.inputs["Geometry"])
-    tree.links.new(pins, both.inputs["Geometry"])
-    arrows = settings.outputs[ARROWS]
-    return switch(tree, "GEOMETRY", 6, row - 1, arrows, pins, both.outputs["Geometry"])
+    size = number(tree, "MULTIPLY", 2, row + 1, force, per_newton)
+    instances = node(tree, "GeometryNodeInstanceOnPoints", 4, row, {
+        "Points": settings.outputs["Geometry"], "Selection": pressed.outputs["Result"],
+        "Instance": shape.outputs["Geometry"], "Scale": combine(tree, 3, row + 2, X=1.0, Y=1.0, Z=size),
+    })  # fmt: skip
+    both = {"Geometry": [instances.outputs["Instances"], pins]}
+    joined = node(tree, "GeometryNodeJoinGeometry", 5, row, both).outputs["Geometry"]
+    return switch(tree, "GEOMETRY", 6, row - 1, settings.outputs[ARROWS], pins, joined)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..bridge import SCALE
 from ..compat import bpy
-from .nodes import attribute, node, number
+from .nodes import attribute, combine, enabled, link, mesh_of, node, number, read_height, sample, store
 from .skin_lattice import Pass, SkinLattice
 
 #: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on the way.
@@ -52,19 +52,17 @@ def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
 def skin_nodes(tree: Any, sources: Any, pins: Any, kind: Any, row: float) -> Any:
     """Add the nodes that stretch a skin over pins; return its geometry."""
     names = [_prefixed(tree, words, kind, row + step) for step, words in enumerate(WEIGHTS)]
-    height = _separate_height(tree, row + 3)
+    height = read_height(tree, row + 3)
     index = node(tree, "GeometryNodeInputIndex", 1, row + 2).outputs["Index"]
-    points = _geometry(tree, sources.pins, 1, row)
-    value = _sample(tree, pins, height, "FLOAT", index, 2, row)
-    pair = _store_pair(tree, _store(tree, points, VALUE, "FLOAT", value, 3, row), 4, row)
-    lines = _geometry(tree, sources.rows, 6, row + 2)
+    points = mesh_of(tree, sources.pins, 1, row)
+    value = sample(tree, pins, height, "FLOAT", index, 2, row)
+    pair = _store_pair(tree, store(tree, points, VALUE, "FLOAT", value, 3, row), 4, row)
+    lines = mesh_of(tree, sources.rows, 6, row + 2)
     value = _sum(tree, pair, names, 6, row)
-    pair = _store_pair(tree, _store(tree, lines, VALUE, "FLOAT", value, 10, row), 11, row)
-    up = node(tree, "ShaderNodeCombineXYZ", 17, row + 1)
-    tree.links.new(_sum(tree, pair, names, 13, row), up.inputs["Z"])
-    raised = node(tree, "GeometryNodeSetPosition", 18, row)
-    tree.links.new(_geometry(tree, sources.skin, 16, row), raised.inputs["Geometry"])
-    tree.links.new(up.outputs["Vector"], raised.inputs["Offset"])
+    pair = _store_pair(tree, store(tree, lines, VALUE, "FLOAT", value, 10, row), 11, row)
+    up = combine(tree, 17, row + 1, Z=_sum(tree, pair, names, 13, row))
+    flat = mesh_of(tree, sources.skin, 16, row)
+    raised = node(tree, "GeometryNodeSetPosition", 18, row, {"Geometry": flat, "Offset": up})
     return raised.outputs["Geometry"]
 
 
@@ -91,50 +89,11 @@ def _write_weights(mesh: Any, step: Pass) -> None:
             made.data.foreach_set("vector", share.astype(np.float32).ravel())
 
 
-def _geometry(tree: Any, thing: Any, column: float, row: float) -> Any:
-    """Add the node that reads an object's mesh."""
-    made = node(tree, "GeometryNodeObjectInfo", column, row)
-    made.inputs["Object"].default_value = thing
-    return made.outputs["Geometry"]
-
-
 def _prefixed(tree: Any, words: str, kind: Any, row: float) -> Any:
     """Add the nodes that put words before a name."""
-    joined = node(tree, "GeometryNodeStringJoin", 0, row)
-    first = node(tree, "FunctionNodeInputString", -1, row)
-    first.string = words
+    first = node(tree, "FunctionNodeInputString", -1, row, string=words).outputs["String"]
     # What is linked first stands last.
-    tree.links.new(kind, joined.inputs["Strings"])
-    tree.links.new(first.outputs["String"], joined.inputs["Strings"])
-    return joined.outputs["String"]
-
-
-def _separate_height(tree: Any, row: float) -> Any:
-    """Add the nodes that read the height of a vertex."""
-    place = node(tree, "GeometryNodeInputPosition", 0, row)
-    parts = node(tree, "ShaderNodeSeparateXYZ", 1, row)
-    tree.links.new(place.outputs["Position"], parts.inputs["Vector"])
-    return parts.outputs["Z"]
-
-
-def _sample(tree: Any, table: Any, value: Any, kind: str, index: Any, column: float, row: float) -> Any:
-    """Add the node that reads a value of other vertices."""
-    made = node(tree, "GeometryNodeSampleIndex", column, row)
-    made.data_type, made.domain = kind, "POINT"
-    tree.links.new(table, made.inputs["Geometry"])
-    tree.links.new(value, _enabled(made.inputs, "Value"))
-    tree.links.new(index, made.inputs["Index"])
-    return _enabled(made.outputs, "Value")
-
-
-def _store(tree: Any, table: Any, name: str, kind: str, value: Any, column: float, row: float) -> Any:
-    """Add the node that stores a value at every vertex."""
-    made = node(tree, "GeometryNodeStoreNamedAttribute", column, row)
-    made.data_type, made.domain = kind, "POINT"
-    made.inputs["Name"].default_value = name
-    tree.links.new(table, made.inputs["Geometry"])
-    tree.links.new(value, _enabled(made.inputs, "Value"))
-    return made.outputs["Geometry"]
+    return node(tree, "GeometryNodeStringJoin", 0, row, {"Strings": [kind, first]}).outputs["String"]
 
 
 def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
@@ -142,11 +101,10 @@ def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
     here = attribute(tree, VALUE, "FLOAT", column, row + 1)
     sides = []
     for step, name in enumerate((PREVIOUS, FOLLOWING), 2):
-        found = node(tree, "GeometryNodeFieldAtIndex", column + 0.5, row + step)
-        found.data_type, found.domain = "FLOAT", "POINT"
-        tree.links.new(here, _enabled(found.inputs, "Value"))
-        tree.links.new(attribute(tree, name, "INT", column, row + step), found.inputs["Index"])
-        sides.append(_enabled(found.outputs, "Value"))
+        beside = {"Value": here, "Index": attribute(tree, name, "INT", column, row + step)}
+        kind = {"data_type": "FLOAT", "domain": "POINT"}
+        read = node(tree, "GeometryNodeFieldAtIndex", column + 0.5, row + step, beside, **kind)
+        sides.append(enabled(read.outputs, "Value"))
     before = number(tree, "SUBTRACT", column + 1, row + 2, here, sides[0])
     after = number(tree, "SUBTRACT", column + 1, row + 3, sides[1], here)
     product = number(tree, "MULTIPLY", column + 1, row + 4, before, after)
@@ -154,10 +112,8 @@ def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
     twice = number(tree, "MULTIPLY", column + 1, row + 6, same_way, 2.0)
     total = number(tree, "ADD", column + 1, row + 7, before, after)
     slope = number(tree, "DIVIDE", column + 1, row + 8, twice, total)  # Blender divides by 0 to 0
-    pair = node(tree, "ShaderNodeCombineXYZ", column + 1.5, row + 1)
-    tree.links.new(here, pair.inputs["X"])
-    tree.links.new(slope, pair.inputs["Y"])
-    return _store(tree, table, PAIR, "FLOAT_VECTOR", pair.outputs["Vector"], column + 1.7, row)
+    pair = combine(tree, column + 1.5, row + 1, X=here, Y=slope)
+    return store(tree, table, PAIR, "FLOAT_VECTOR", pair, column + 1.7, row)
 
 
 def _sum(tree: Any, table: Any, names: list[Any], column: float, row: float) -> Any:
@@ -166,19 +122,10 @@ def _sum(tree: Any, table: Any, names: list[Any], column: float, row: float) -> 
     parts = []
     for step, (side, name) in enumerate(zip((LOW, HIGH), names, strict=True)):
         at = attribute(tree, side, "INT", column, row + 6 + step)
-        weight = node(tree, "GeometryNodeInputNamedAttribute", column, row + 8 + step)
-        weight.data_type = "FLOAT_VECTOR"
-        tree.links.new(name, weight.inputs["Name"])
-        dot = node(tree, "ShaderNodeVectorMath", column + 2, row + 5 + step)
-        dot.operation = "DOT_PRODUCT"
-        tree.links.new(
-            _sample(tree, table, pair, "FLOAT_VECTOR", at, column + 1, row + 5 + step), dot.inputs[0]
-        )
-        tree.links.new(_enabled(weight.outputs, "Attribute"), dot.inputs[1])
+        weight = attribute(tree, name, "FLOAT_VECTOR", column, row + 8 + step)
+        there = sample(tree, table, pair, "FLOAT_VECTOR", at, column + 1, row + 5 + step)
+        dot = node(tree, "ShaderNodeVectorMath", column + 2, row + 5 + step, operation="DOT_PRODUCT")
+        for place, value in zip(dot.inputs, (there, weight), strict=False):
+            link(tree, value, place)
         parts.append(dot.outputs["Value"])
     return number(tree, "ADD", column + 3, row + 5, *parts)
-
-
-def _enabled(sockets: Any, name: str) -> Any:
-    """Return the socket of a name that is in use: nodes have one for each type, all of the same name."""
-    return next(one for one in sockets if one.name == name and one.enabled)
