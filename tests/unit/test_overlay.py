@@ -13,12 +13,13 @@ from digiclay.overlay.picture import (
     LETTERS,
     LINES,
     Box,
+    Color,
     Picture,
     choose_colors,
     contrast,
     round_axis,
     scale_curve,
-)
+)  # fmt: skip
 from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Content, Readings, find_room, lay_out
 from hypothesis import given
 from hypothesis import strategies as st
@@ -33,21 +34,12 @@ def session(**changes: object) -> Readings:
     """Return what a session of ten seconds tells, two pins picked."""
     time = np.linspace(0.0, 10.0, 1001)
     told = Readings(
-        name="Digital Clay",
-        method="virtual_master",
-        paused=False,
-        waiting=False,
-        factor=0.97,
-        errors=(2.1e-6, 4.6e-4),
-        set_point=0.4,
-        time=time,
-        force=0.4 + 0.1 * np.sin(time),
-        pins=(312, 40),
+        name="Digital Clay", method="virtual_master", paused=False, waiting=False, factor=0.97,
+        errors=(2.1e-6, 4.6e-4), set_point=0.4, time=time, force=0.4 + 0.1 * np.sin(time), pins=(312, 40),
         heights=np.column_stack([0.04 + 0.001 * np.sin(time), np.full(1001, 0.035)]),
-        modes=np.array([600, 10, 0, 15, 0, 0, 0, 0]),
-        colors=tuple(COLORS[mode] for mode in Mode),
+        modes=np.array([600, 10, 0, 15, 0, 0, 0, 0]), colors=tuple(COLORS[mode] for mode in Mode),
         seconds=5.0,
-    )
+    )  # fmt: skip
     return replace(told, **changes)
 
 
@@ -56,25 +48,17 @@ def said(picture: Picture) -> str:
     return " | ".join(words.text for words in picture.words)
 
 
-@pytest.mark.parametrize("back", [DARK, LIGHT, (0.5, 0.5, 0.5)])
-def test_letters_and_curves_stand_out_from_any_theme(back: tuple[float, float, float]) -> None:
-    chosen = choose_colors(back, back)  # a theme with letters of the color of the ground: the worst there is
+@given(COLOR, st.one_of(st.none(), COLOR))
+def test_letters_and_curves_stand_out_from_any_theme(back: Color, ink: Color | None) -> None:
+    chosen = choose_colors(back, ink or back)  # letters of the color of the ground: the worst there is
     # The guidelines' contrasts, as near as steps of a fortieth of the way to black or white come.
     assert min(contrast(ink, back) for ink in (chosen.ink, chosen.faint)) >= LETTERS - 0.01
     assert min(contrast(line, back) for line in (*chosen.pins, chosen.set_point, chosen.force)) >= LINES
-
-
-@given(COLOR, COLOR)
-def test_every_theme_gets_legible_letters(
-    back: tuple[float, float, float], ink: tuple[float, float, float]
-) -> None:
-    assert contrast(choose_colors(back, ink).ink, back) >= LETTERS
     assert contrast((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) == pytest.approx(21.0, rel=1e-12)
 
 
 def test_the_colors_of_the_force_are_explained_while_pins_wear_them() -> None:
-    plain = draw(session())
-    hot = draw(session(top=0.2))
+    plain, hot = draw(session()), draw(session(top=0.2))
     assert len(plain.boxes) == 1
     assert [box.color for box in hot.boxes[1:]] == list(heat.COLORS)
     assert "Force on a pin | 0 N | 0.2 N" in said(hot)
@@ -125,26 +109,22 @@ def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) ->
     assert box.width == 290.0 * scale
     points = [line.points for line in picture.lines]
     points += [np.array([[mark.x, mark.y]]) for mark in (*picture.words, *picture.dots)]
-    low, high = (
-        np.min([p.min(axis=0) for p in points], axis=0),
-        np.max([p.max(axis=0) for p in points], axis=0),
-    )
+    low = np.min([p.min(axis=0) for p in points], axis=0)
+    high = np.max([p.max(axis=0) for p in points], axis=0)
     assert (low >= [box.x, box.y]).all()
     assert (high <= [box.x + box.width, box.y + box.height]).all()
 
 
 def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
-    colors = choose_colors(DARK, LIGHT)
-    full = lay_out(session(), colors, ROOM, 1.0)
-    low = lay_out(session(), colors, (0.0, 0.0, 900.0, 240.0), 1.0)
-    middling = lay_out(session(), colors, (0.0, 0.0, 900.0, 320.0), 1.0)
-    assert ("Heights" in said(middling), "Pins by mode" in said(middling)) == (False, True)
-    assert "Pins by mode" in said(full)
-    assert "Total force" in said(low)
-    assert "Pins by mode" not in said(low)
-    assert low.boxes[0].height <= 240.0
-    assert lay_out(session(), colors, (0.0, 0.0, 250.0, 700.0), 1.0) == Picture()
-    assert lay_out(session(), colors, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
+    def fit(width: float, height: float) -> Picture:
+        return lay_out(session(), choose_colors(DARK, LIGHT), (0.0, 0.0, width, height), 1.0)
+
+    sections = ("Total force", "Heights", "Pins by mode")
+    for height, there in ((700.0, sections), (320.0, sections[::2]), (240.0, sections[:1])):
+        picture = fit(900.0, height)
+        assert [name for name in sections if name in said(picture)] == list(there)
+        assert picture.boxes[0].height <= height
+    assert fit(250.0, 700.0) == fit(900.0, 40.0) == Picture()
 
 
 @pytest.mark.parametrize("corner", ["bottom_left", "bottom_right", *TAKEN])

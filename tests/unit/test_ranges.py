@@ -65,20 +65,12 @@ def fit(*said: str, settings: tuple[Setting, ...] = ()) -> list[Range]:
     return fit_ranges([read_range(one) for one in said], find("slow_press"), settings)
 
 
-def test_every_whole_number_of_a_range_has_an_equal_share() -> None:
-    (rows,) = fit("layout.rows=11:15")
-    assert [rows.find_word(share) for share in (0.0, 0.19, 0.21, 0.5, 0.79, 0.81, 1.0)] == [
-        "11", "11", "12", "13", "14", "15", "15",
-    ]  # fmt: skip
-
-
-def test_a_whole_number_stays_one_in_si() -> None:
-    (rows,) = fit("layout.rows=11:15")
+def test_values_are_as_the_parameter_has_them() -> None:
+    rows, stroke = fit("layout.rows=11:15", "valve.stroke=20 um:40 um")
+    # Every whole number of a range has an equal share, and stays one in SI.
+    words = [rows.find_word(share) for share in (0.0, 0.19, 0.21, 0.5, 0.79, 0.81, 1.0)]
+    assert words == ["11", "11", "12", "13", "14", "15", "15"]
     assert repr(rows.convert("12")) == "12"
-
-
-def test_values_in_units_are_converted_to_si() -> None:
-    (stroke,) = fit("valve.stroke=20 um:40 um")
     assert (stroke.convert("30 um"), stroke.si) == (pytest.approx(30e-6, rel=1e-15), "m")
 
 
