@@ -50,7 +50,7 @@ def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file() ->
 
 def test_the_command_line_takes_it_wherever_it_takes_a_method(here, capsys):
     write_method(here)
-    size = ["--set", "layout.rows=9", "--set", "layout.columns=9", "--set", "simulation.duration=0.05"]
+    size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.05"]
     own = ["tap", "--method", "pad.py:SoftPad", "--quiet", *size]
     assert main(["run", *own, "--out", "r", "--no-errors"]) == 0
     assert json.loads((here / "r" / "metrics.json").read_text(encoding="utf-8"))["method"] == "soft_pad"
