@@ -29,35 +29,23 @@ CLEARANCE = 6e-3
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """Bed and fingertip at one time, with the sizes for drawing.
+    """Bed and fingertip at one time, with the sizes for drawing."""
 
-    Attributes
-    ----------
-    position : ndarray (n, 2)
-        Axes of the pins, m, the bed's center at the origin.
-    height : ndarray (n,)
-        Pin tops above the bed's floor, m.
-    mode : ndarray of int (n,)
-        Codes of `core.base.modes.Mode`.
-    force : ndarray (n,)
-        Force on each pin, N, pressing down is positive.
-    fingertip : ndarray (7,)
-        Lowest point of the fingertip, m, and its orientation as a quaternion w, x, y, z.
-    pitch : float
-        Distance between neighboring pins, m.
-    actuator : Actuator
-        Gives the pins' thickness (bore), stroke and rest height.
-    finger : Fingertip
-        Gives the fingertip's semi-axes.
-    """
-
+    #: (n, 2), axes of the pins, m, the bed's center at the origin.
     position: Floats
+    #: (n,), pin tops above the bed's floor, m.
     height: Floats
+    #: (n,), of `core.base.modes.Mode`.
     mode: Codes
+    #: (n,), on each pin, N, pressing down is positive.
     force: Floats
+    #: (7,), lowest point of the fingertip, m, and its orientation as a quaternion w, x, y, z.
     fingertip: Floats
+    #: Distance between neighboring pins, m.
     pitch: float = Layout().pitch
+    #: Gives the pins' thickness (bore), stroke and rest height.
     actuator: Actuator = field(default_factory=Actuator)
+    #: Gives the fingertip's semi-axes.
     finger: Fingertip = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
@@ -98,15 +86,10 @@ class Instant:
         bed = make_grid(layout)
         rest = actuator.rest_height
         return cls(
-            position=bed.positions,
-            height=np.full(bed.count, rest),
-            mode=np.full(bed.count, Mode.REST, np.int8),
-            force=np.zeros(bed.count),
-            fingertip=np.array([0.0, 0.0, rest + CLEARANCE, *LEVEL]),
-            pitch=layout.pitch,
-            actuator=actuator,
-            finger=finger,
-        )
+            bed.positions, np.full(bed.count, rest), np.full(bed.count, Mode.REST, np.int8),
+            np.zeros(bed.count), np.array([0.0, 0.0, rest + CLEARANCE, *LEVEL]), layout.pitch, actuator,
+            finger,
+        )  # fmt: skip
 
     @property
     def modes(self) -> list[Mode]:
@@ -130,10 +113,5 @@ def read(path: Path, index: int = -1) -> Instant:
         raise OutputError(f"{path} is not the history.npz of a run's folder.")
     run = finished_run.read_run(path.parent, *ARRAYS)
     scene = run.scene
-    return Instant.of(
-        run.history,
-        index,
-        pitch=scene.layout.pitch,
-        actuator=scene.actuator,
-        finger=find_ellipsoid(scene),
-    )
+    sizes = {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoid(scene)}
+    return Instant.of(run.history, index, **sizes)

@@ -57,24 +57,16 @@ def material(name: str, color: tuple[float, float, float], roughness: float, alp
 
 
 class Sources(NamedTuple):
-    """Objects drawn by a bed's geometry nodes, in a collection outside all Blender scenes.
+    """Objects drawn by a bed's geometry nodes, in a collection outside all Blender scenes."""
 
-    Attributes
-    ----------
-    collection : bpy.types.Collection
-        First a pin a mode, then a pin a level of force, in the order of their codes; then the others.
-    arrow : bpy.types.Object
-        An arrow of length 1 that points down and ends at the origin.
-    skin : SkinMeshes
-        Objects of the live skin.
-    clear : bpy.types.Material
-        Of a skin over pins that are drawn.
-    """
-
+    #: First a pin a mode, then a pin a level of force, in the order of their codes; then the others.
     collection: Any
+    #: An arrow of length 1 that points down and ends at the origin.
     arrow: Any
     housing: Any
+    #: Objects of the live skin.
     skin: SkinMeshes
+    #: Material of a skin over pins that are drawn.
     clear: Any
 
 

@@ -11,7 +11,6 @@ and straight between them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -42,47 +41,30 @@ class Weights(NamedTuple):
     high: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Pass:
-    """Interpolation along one direction.
+class Pass(NamedTuple):
+    """Interpolation along one direction."""
 
-    Attributes
-    ----------
-    previous, following : ndarray of int (k,)
-        Neighbors of each of the k values that are interpolated, for its slope; itself at an end.
-    low, high : ndarray of int (m,)
-        The two values each of the m points is between.
-    weights : dict of str to Weights
-        By the names of `KINDS`.
-    """
-
+    #: (k,), neighbors of each of the k values that are interpolated, for its slope; itself at an end.
     previous: Indices
     following: Indices
+    #: (m,), the two values each of the m points is between.
     low: Indices
     high: Indices
+    #: By the names of `KINDS`.
     weights: dict[str, Weights]
 
 
-@dataclass(frozen=True, eq=False)
-class SkinLattice:
-    """Skin of a bed.
+class SkinLattice(NamedTuple):
+    """Skin of a bed."""
 
-    Attributes
-    ----------
-    along, across : Pass
-        From pins to points on the rows of pins, and from these to the points of the skin.
-    place : ndarray (m, 2)
-        Points of the skin in plan, m.
-    sunk : ndarray of bool (m,)
-        Lower edge of the skin's sides.
-    faces : ndarray of int (f, 4)
-        Counter-clockwise from outside.
-    """
-
+    #: From pins to points on the rows of pins, and from these to the points of the skin.
     along: Pass
     across: Pass
+    #: (m, 2), points of the skin in plan, m.
     place: Floats
+    #: (m,), whether a point is on the lower edge of the skin's sides.
     sunk: NDArray[np.bool_]
+    #: (f, 4), counter-clockwise from outside.
     faces: Indices
 
 

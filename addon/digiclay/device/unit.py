@@ -40,21 +40,14 @@ EYE, SWITCHES = 1, ((2, "hide_viewport"), (4, "hide_render"))
 
 
 class Faults(NamedTuple):
-    """Missing and surplus objects of a bed; not to be stored, since undo invalidates them.
+    """Missing and surplus objects of a bed; not to be stored, since undo invalidates them."""
 
-    Attributes
-    ----------
-    bare : list of bpy.types.Object
-        Beds that have come without a fingertip of their own: copies, and beds of older files. And
-        fingertips that were copied without their ellipsoid, which cannot be selected.
-    left : list of bpy.types.Object
-        Fingertips, ellipsoids and housings whose bed or fingertip is gone.
-    strewn : list of bpy.types.Object
-        What beds are drawn with, come into a scene with an older bed that was appended.
-    """
-
+    #: Beds that have come without a fingertip of their own: copies, and beds of older files. And fingertips
+    #: that were copied without their ellipsoid, which cannot be selected.
     bare: list[Any]
+    #: Fingertips, ellipsoids and housings whose bed or fingertip is gone.
     left: list[Any]
+    #: What beds are drawn with, come into a scene with an older bed that was appended.
     strewn: list[Any]
 
 
@@ -138,17 +131,12 @@ def follow_visibility() -> None:
 
 def follow_selection() -> None:
     """Have a fingertip selected where its ellipsoid is, and active: a click on the ball takes hold of it."""
-    layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers]
     for tip in filter(None, map(view.fingertip_of, _beds())):
         ball = ellipsoid(tip)
-        if ball is None:
-            continue
-        for layer in layers:
-            if not (_is_in_layer(layer, tip) and _is_in_layer(layer, ball)):
-                continue
+        for layer in _list_layers(tip, ball) if ball is not None else ():
             # Selecting what is selected, too, would count as a change to be looked at.
-            held = tip.select_get(view_layer=layer) or not tip.visible_get(view_layer=layer)
-            if ball.select_get(view_layer=layer) and not held:
+            ready = tip.select_get(view_layer=layer) or not tip.visible_get(view_layer=layer)
+            if ball.select_get(view_layer=layer) and not ready:
                 tip.select_set(True, view_layer=layer)
             if layer.objects.active == ball:
                 layer.objects.active = tip
@@ -223,7 +211,7 @@ def _remove(found: Iterable[Any]) -> None:
             child.matrix_world = where
         for collection in part.users_collection:
             collection.objects.unlink(part)
-    for part in sorted(things, key=lambda one: one.get(ROLE) == ELLIPSOID):  # held by the others
+    for part in sorted(things, key=lambda each: each.get(ROLE) == ELLIPSOID):  # a property of the others
         if not part.users:
             bpy.data.objects.remove(part)
     # Deleted along with its bed, a fingertip was still held by that, and Blender has kept it.
@@ -245,8 +233,7 @@ def _unlink(thing: Any) -> None:
 def _hide_along(owner: Any, part: Any) -> None:
     """Hide a part in every way its owner is hidden, and show it again where it was hidden along."""
     before = now = int(part.get(HIDDEN, 0))
-    layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers]
-    both = [one for one in layers if _is_in_layer(one, owner) and _is_in_layer(one, part)]
+    both = _list_layers(owner, part)
     for layer in both:
         hidden, along = owner.hide_get(view_layer=layer), part.hide_get(view_layer=layer)
         if hidden and not along:
@@ -266,9 +253,10 @@ def _hide_along(owner: Any, part: Any) -> None:
         del part[HIDDEN]
 
 
-def _is_in_layer(layer: Any, thing: Any) -> bool:
-    """Return whether an object stands in a view layer."""
-    return bool(layer.objects.get(thing.name) == thing)
+def _list_layers(*things: Any) -> list[Any]:
+    """Return the view layers in which all of some objects stand."""
+    layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
+    return [layer for layer in layers if all(layer.objects.get(each.name) == each for each in things)]
 
 
 #: Time until the next look while an operator is under way, s.
@@ -283,23 +271,15 @@ PASSES = 3
 
 @dataclass
 class Watch:
-    """Memory of what beds have been looked at.
+    """Memory of what beds have been looked at."""
 
-    Attributes
-    ----------
-    known : frozenset of int or None
-        Uids of the objects seen; None before the first look.
-    mended : set of int
-        Uids of what had come with something missing, or where it does not belong.
-    came : str
-        What came last, "undo" or "redo", or an empty text.
-    pending : bool
-        Whether there is anything to look at.
-    """
-
+    #: Uids of the objects seen; None before the first look.
     known: frozenset[int] | None = None
+    #: Uids of what had come with something missing, or where it does not belong.
     mended: set[int] = field(default_factory=set)
+    #: What came last, "undo" or "redo", or an empty text.
     came: str = ""
+    #: Whether there is anything to look at.
     pending: bool = False
 
 
@@ -357,28 +337,26 @@ def note_change(scene: Any, graph: Any = None) -> None:
 @bpy.app.handlers.persistent
 def note_undo(*_: Any) -> None:
     """Look soon at what undo has come to."""
-    _watch.came = "undo"
-    _repair_soon()
+    _repair_soon("undo")
 
 
 @bpy.app.handlers.persistent
 def note_redo(*_: Any) -> None:
     """Look soon at what redo has come to."""
-    _watch.came = "redo"
-    _repair_soon()
+    _repair_soon("redo")
 
 
 @bpy.app.handlers.persistent
 def note_load(*_: Any) -> None:
     """Look soon at what another file has: it stays as it is."""
-    _watch.known, _watch.came = None, ""
+    _watch.known = None
     _watch.mended.clear()
-    _repair_soon()
+    _repair_soon("")
 
 
-def _repair_soon() -> None:
-    """Have a look when Blender is done with what it does now."""
-    _watch.pending = True
+def _repair_soon(came: str | None = None) -> None:
+    """Have a look when Blender is done with what it does now; `came`: "undo", "redo", "" after a load."""
+    _watch.pending, _watch.came = True, _watch.came if came is None else came
     if not bpy.app.background and not bpy.app.timers.is_registered(_repair_when_idle):
         bpy.app.timers.register(_repair_when_idle)
 

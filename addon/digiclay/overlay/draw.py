@@ -40,14 +40,7 @@ def draw(picture: Picture, width: float, height: float) -> None:
 def cursor(lines: list[Line], words: Sequence[Words] = ()) -> None:
     """Draw lines and text about the mouse. `words`: in pixels of the window."""
     _, _, width, height = gpu.state.viewport_get()
-    gpu.state.blend_set("ALPHA")
-    try:
-        for line in lines:
-            _stroke(line, (width, height))
-        for text in words:
-            _write(text)
-    finally:
-        gpu.state.blend_set("NONE")
+    draw(Picture(lines=lines, words=list(words)), width, height)
 
 
 def _stroke(line: Line, size: tuple[float, float]) -> None:

@@ -7,7 +7,7 @@ as its range, and meaning, symbol, bounds and default in its tooltip.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
@@ -178,9 +178,11 @@ def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
     setattr(group, name, value)
 
 
-def reset(group: Any, kind: type[Parameters], name: str) -> None:
-    """Write one parameter's default into its property."""
-    assign(group, kind, name, _fields(kind)[name].default)
+def fill(group: Any, kind: type[Parameters], names: Iterable[str], values: Mapping[str, Any]) -> None:
+    """Write some parameters into their properties: those that values give, and defaults of the others."""
+    fields = _fields(kind)
+    for name in names:
+        assign(group, kind, name, values.get(name, fields[name].default))
 
 
 def read(group: Any, kind: type[Parameters], notes: Notes, section: str) -> dict[str, Any]:

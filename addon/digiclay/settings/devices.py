@@ -21,21 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bed:
-    """Size of a bed.
-
-    Attributes
-    ----------
-    pitch : float
-        m.
-    share : float
-        Size of fingertip and blister, as a share of the paper's.
-    use : str
-        What it is for.
-    """
+    """Size of a bed, and what it is for."""
 
     rows: int
     columns: int
+    #: m.
     pitch: float
+    #: Size of fingertip and blister, as a share of the paper's.
     share: float
     use: str
 

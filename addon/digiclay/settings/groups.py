@@ -17,7 +17,7 @@ from ..core.scene.toml_table import PRESETS
 from ..roles import fingertip_of
 from ..ui_text import localize
 from . import finger_size
-from .declared import WHOLE, Update, assign, group, make_group, read, reset, title, whole
+from .declared import WHOLE, Update, fill, group, make_group, read, title, whole
 
 #: Blender keeps no reference to the texts of a list that is made on demand: this one does.
 OFFERED: list[tuple[str, str, str, int]] = []
@@ -83,16 +83,10 @@ PRESET_WORDS = {
 
 def take_preset(settings: Any, context: Any) -> None:
     """Set what the chosen preset, or another one, changes of the defaults."""
-    changed = {
-        (section, name) for preset in PRESETS.values() for section in preset for name in preset[section]
-    }
-    for section, name in sorted(changed):
-        own, kind = getattr(settings, section), import_parameters(section, "")
+    for section in sorted({section for preset in PRESETS.values() for section in preset}):
+        names = sorted({name for preset in PRESETS.values() for name in preset.get(section, {})})
         values = PRESETS[settings.preset].get(section, {})
-        if name in values:
-            assign(own, kind, name, values[name])
-        else:
-            reset(own, kind, name)
+        fill(getattr(settings, section), import_parameters(section, ""), names, values)
 
 
 def take_method(settings: Any, context: Any) -> None:
@@ -111,25 +105,17 @@ def _take_blister(settings: Any) -> None:
     """Set the blister that the method is made for; none where it forms none, or is not known here."""
     method = list_methods().get(method_of(settings))
     values = method.blister if method is not None else None
-    if values is None:
-        return
-    kind = import_parameters("blister", "")
-    for name in list_quantities(kind):
-        if name in values:
-            assign(settings.blister, kind, name, values[name])
-        else:
-            reset(settings.blister, kind, name)
+    if values is not None:
+        kind = import_parameters("blister", "")
+        fill(settings.blister, kind, list_quantities(kind), values)
 
 
 def take_arrangement(layout: Any, context: Any) -> None:
     """Set the share of the contact law a cell carries, which depends on how close the cells stand."""
     settings = layout.id_data.digiclay
-    kind = import_parameters("contact", "")
     share = ARRANGEMENTS[layout.arrangement].share
-    if share is not None:
-        assign(settings.contact, kind, "share", share)
-    else:
-        reset(settings.contact, kind, "share")
+    values = {} if share is None else {"share": share}
+    fill(settings.contact, import_parameters("contact", ""), ("share",), values)
 
 
 def take_size(fingertip: Any, context: Any) -> None:

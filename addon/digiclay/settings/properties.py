@@ -51,20 +51,13 @@ AWAY = 1e-6
 
 
 class StoredSettings(NamedTuple):
-    """All that `read_scene` reads: scenes of equal stored settings are equal.
+    """All that `read_scene` reads: scenes of equal stored settings are equal."""
 
-    Attributes
-    ----------
-    name : str
-        Of the bed.
-    file : str
-        Path of the .blend, at whose folder other paths may start.
-    values : dict
-        As Blender stores them.
-    """
-
+    #: Of the bed.
     name: str
+    #: Path of the .blend, at whose folder other paths may start.
     file: str
+    #: As Blender stores them.
     values: dict[str, Any]
 
 
