@@ -133,7 +133,9 @@ def follow_selection() -> None:
     """Have a fingertip selected where its ellipsoid is, and active: a click on the ball takes hold of it."""
     for tip in filter(None, map(view.fingertip_of, _beds())):
         ball = ellipsoid(tip)
-        for layer in _list_layers(tip, ball) if ball is not None else ():
+        if ball is None:
+            continue
+        for layer in _list_layers(tip, ball):
             # Selecting what is selected, too, would count as a change to be looked at.
             ready = tip.select_get(view_layer=layer) or not tip.visible_get(view_layer=layer)
             if ball.select_get(view_layer=layer) and not ready:
