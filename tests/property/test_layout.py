@@ -31,6 +31,22 @@ def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, i
     assert positions.min(axis=0) + positions.max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-16)
 
 
+@pytest.mark.parametrize(
+    ("arrangement", "corners", "farthest"),
+    [("aligned", True, 1.5), ("aligned", False, 1.1), ("staggered", True, 1.2), ("hexagonal", False, 1.1)],
+)
+def test_neighbors_are_the_nearest_cells_counter_clockwise(
+    arrangement: str, corners: bool, farthest: float
+) -> None:
+    layout = Layout(5, 6, 3e-3, arrangement)
+    x, y = make_grid(layout).positions.T
+    for cell, beside in enumerate(layout.find_neighbors(corners=corners)):
+        near = [other for other in beside if other >= 0]
+        away = np.hypot(x - x[cell], y - y[cell])
+        assert sorted([cell, *near]) == np.flatnonzero(away < farthest * 3e-3).tolist()
+        assert np.all(np.diff(np.arctan2(y[near] - y[cell], x[near] - x[cell]) % (2.0 * np.pi)) > 0.0)
+
+
 SMALL, LARGE, ASIDE = (1e-3, 0.0, 2e-3), (0.0, 0.0, 3e-3), (2e-3, 0.0, 2e-3)
 
 

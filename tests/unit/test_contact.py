@@ -115,6 +115,14 @@ def test_filters_agree_with_the_convolution(
         assert force[count, 0] == pytest.approx(expected, rel=tolerance)
 
 
+def test_a_pulp_one_of_whose_filters_is_cut_in_two_is_the_same() -> None:
+    halves = Relaxation((TIMES[0], *TIMES), (WEIGHTS[0], 0.5 * WEIGHTS[1], 0.5 * WEIGHTS[1], *WEIGHTS[2:]))
+    motion = Motion(lambda times: 40e-3 - 20e-3 * times)
+    whole, cut = (record(one_cell(relaxation=pulp), motion, 20).force for pulp in (Relaxation(), halves))
+    assert whole.max() > 0.05
+    assert cut == pytest.approx(whole, rel=1e-12)  # rounding
+
+
 def test_without_contact_the_pulp_decays_like_a_step_without_tension() -> None:
     aged, stepped = np.array([[0.3], [0.2], [0.1]]), np.array([0.3, 0.2, 0.1])
     Relaxation().age(aged, np.full(1, 7e-3))

@@ -165,6 +165,13 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(here, word, rule, capsys
             "command must not raise (got DigiclayError in line 12: no finger).",
         ),
         (building("return 3"), "build must return a controller with begin (got"),
+        (
+            building(
+                "from types import SimpleNamespace\n"
+                "    return SimpleNamespace(begin=int, locate=int, command=int, rows=-1)"
+            ),
+            "build must have rows, a whole number from 0 to 1000 (got -1).",
+        ),
     ],
 )  # fmt: skip
 def test_a_mistake_while_it_runs_is_a_line_with_file_and_rule(text: str, rule: str) -> None:
