@@ -148,6 +148,16 @@ def test_nothing_a_method_is_shown_leads_to_the_bed(here: Path) -> None:
         np.testing.assert_array_equal(cheat.history[key], values, key)
 
 
+def test_openings_are_limited_to_those_of_a_valve(here: Path) -> None:
+    heights = []
+    for number, opening in enumerate((-3, -1, 0, 1, 3)):
+        orders = f"return memory, Orders(opening=np.full(cells.height.size, {opening}))"
+        text = f"{PAD.partition('        down')[0]}        {orders}\n".replace("SoftPad", f"Pad{number}")
+        write_method(here, text, "open.py")
+        heights.append(run(small(load_method(f"open.py:Pad{number}"))).history["height"].sum())
+    assert heights[0] == heights[1] < heights[2] < heights[3] == heights[4]
+
+
 def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(here: Path) -> None:
     write_method(here)
     assert name_method("PIDControl2") == "pid_control2"
