@@ -2,8 +2,8 @@
 
 cosmic-ray makes the mutants. Its own runner writes each one into the source file and starts a Python for it;
 here each is loaded in a fork of one process that has numpy, SciPy and pytest imported already. No file is
-changed. A first run of the tests finds which of them execute each line, and how long they take; a mutant is
-judged by the quickest that execute its line.
+changed. A first run of the tests finds which of them execute each line, and how long they take: a mutant is
+judged by some that execute its line.
 
 Without modules named, a sample is taken: the mutants whose text has the smallest hashes. It is the same in
 every run, and an edit changes only what it touches.
@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import importlib
-import importlib.machinery
-import importlib.util
 import math
 import os
 import pickle
@@ -25,144 +24,139 @@ import signal
 import sys
 import tempfile
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType
 
 import coverage
 import pytest
-from mutation import CORE, ROOT, Mutant, mutants, sample
+from mutation import CORE, ROOT, Mutant, Place, find_places, mutants, sample
 
 #: Packages of the core that are changed, but modules that only declare or list.
 PACKAGES, DECLARING = ("model", "steppers", "engine", "control", "metrics"), ("methods", "interfaces")
-#: Folders of the tests that may judge; of those that execute a line, the quickest so many and so long, s.
-FOLDERS, MOST, JUDGING = ("unit", "property", "scenes", "regression", "convergence"), 40, 12.0
+#: Folders of the tests that may judge; of those that execute a line, so many and so long, s of
+#: processor time.
+FOLDERS, MOST, JUDGING = ("unit", "property", "scenes", "regression", "convergence"), 80, 12.0
 #: Tests that judge every mutant, after its own.
-EVERY = ["tests/regression/test_golden_run.py", "tests/regression/test_old_formats.py"]
+EVERY = ("tests/regression/test_golden_run.py", "tests/regression/test_old_formats.py")
 OPTIONS = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
 OPTIONS += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
-#: Memory a mutant may take, bytes; the time of its tests, in times of what they take without one and s more.
-MEMORY, PATIENCE, ALLOWANCE = 6 * 2**30, 4.0, 40.0
-#: The longest that the first run of the tests may take, s.
-LONGEST = 900.0
+#: Memory a mutant may take, bytes; processor time, in times of what its tests take without it, and s more.
+MEMORY, PATIENCE, ALLOWANCE = 6 * 2**30, 4.0, 20.0
+#: The longest that the first run of the tests may take, s; and a test in it, s of processor time.
+LONGEST, LONG = 900.0, 5.0
 #: Status of pytest where a mutant is noticed: failed, broken off, a fault inside, tests not imported.
 NOTICED = (1, 2, 3, 4)
-Lines = dict[tuple[str, int], list[str]]
-
-
-class Changed(importlib.machinery.SourceFileLoader):
-    """Finds and loads one module with other source than its file has."""
-
-    def __init__(self, name: str, path: Path, source: str) -> None:
-        super().__init__(name, str(path))
-        self._source = source
-
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> importlib.machinery.ModuleSpec | None:
-        """Return the loader of the one module."""
-        if fullname != self.name:
-            return None
-        return importlib.util.spec_from_file_location(fullname, self.path, loader=self)
-
-    def get_code(self, fullname: str) -> CodeType:
-        """Return the changed code, and leave the caches alone."""
-        return compile(self._source, self.path, "exec", dont_inherit=True)
+Lines = dict[Place, set[str]]
+#: By name: what a process does, and the longest that it may take, s.
+Tasks = dict[str, tuple[Callable[[], int], float]]
 
 
 class Tracer:
-    """Plugin of pytest that records which lines of the core each test executes, and how long it takes, s."""
+    """Plugin of pytest: which lines of the core each test executes, and its processor time, s."""
 
     def __init__(self) -> None:
         source = [str(CORE / package) for package in PACKAGES]
         self.coverage = coverage.Coverage(data_file=None, source=source, config_file=False)
         self.times: dict[str, float] = defaultdict(float)
+        self.slow: set[str] = set()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Add the time of a phase of a test; one that fails judges nothing."""
-        self.times[report.nodeid] += math.inf if report.failed else report.duration
+        """Let no test judge that fails."""
+        self.times[report.nodeid] += 0.0 if report.passed else math.inf
+
+    def pytest_runtest_setup(self, item: pytest.Item) -> None:
+        """Try no other row of a test one of whose rows takes long."""
+        if item.nodeid.partition("[")[0] in self.slow:
+            pytest.skip("too long for a judge")
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        """Ascribe what is executed to the test."""
+        """Ascribe what is executed to the test, and end one that takes long."""
         self.coverage.switch_context(item.nodeid)
+
+        def stop(number: int, frame: object) -> None:
+            self.slow.add(item.nodeid.partition("[")[0])
+            pytest.fail("too long for a judge")
+
+        before = sum(os.times()[:4])
+        signal.signal(signal.SIGPROF, stop)
+        signal.setitimer(signal.ITIMER_PROF, 0.0 if item.nodeid.startswith(EVERY) else LONG)
         yield
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        self.times[item.nodeid] += sum(os.times()[:4]) - before
         self.coverage.switch_context("")
 
     def run(self, files: Sequence[str], output: Path) -> int:
         """Run files of tests, and write the tests of each line and the times of all."""
+        for module in list_modules():  # lines executed at import are ascribed to no test
+            importlib.import_module(f"digiclay.core.{module}")
         self.coverage.start()
         pytest.main([*OPTIONS, *files], plugins=[self])
         self.coverage.stop()
         data, lines = self.coverage.get_data(), {}
         for path in data.measured_files():
             for line, tests in data.contexts_by_lineno(path).items():
-                lines[path, line] = [test for test in tests if self.times.get(test, math.inf) < math.inf]
+                lines[path, line] = {test for test in tests if self.times.get(test, math.inf) < math.inf}
         output.write_bytes(pickle.dumps((lines, dict(self.times))))
         return 0
 
 
-def judge(mutant: Mutant, tests: Sequence[str]) -> int:
-    """Run tests on a mutant; return pytest's status."""
+def judge(mutant: Mutant, tests: Sequence[str], limit: int) -> int:
+    """Run tests on a mutant, so long, s of processor time; return pytest's status."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    changed = Changed(f"digiclay.core.{mutant.module}", mutant.path, mutant.source())
-    sys.meta_path.insert(0, changed)  # type: ignore[arg-type]
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+    source, load = mutant.source(), SourceFileLoader.get_code
+
+    def load_changed(loader: SourceFileLoader, name: str) -> CodeType | None:
+        changed = name == f"digiclay.core.{mutant.module}"
+        return compile(source, loader.path, "exec", dont_inherit=True) if changed else load(loader, name)
+
+    SourceFileLoader.get_code = load_changed  # type: ignore[assignment,method-assign]
     return int(pytest.main(["-x", *OPTIONS, *tests]))
 
 
-@dataclass
-class Task:
-    """What a fork does; its name, what it returns a status of, and the longest it may take, s."""
-
-    name: str
-    work: Callable[[], int]
-    limit: float
-    started: float = 0.0
-
-
-def fork(task: Task, output: Path) -> int:
-    """Start a task in a process and a session of its own, which writes into a file."""
-    task.started, process = time.monotonic(), os.fork()
-    if process == 0:
-        status = 3
-        try:
-            os.setsid()
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
-            with output.open("wb") as file:
-                os.dup2(file.fileno(), 1)
-                os.dup2(file.fileno(), 2)
-            status = task.work()
-        finally:
-            os._exit(status)
-    return process
+def start(work: Callable[[], int], output: Path) -> int:
+    """Start a function in a process and a session of its own, which writes into a file."""
+    if process := os.fork():
+        return process
+    status = 3
+    try:
+        os.setsid()
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        with output.open("wb") as file:
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+        status = work()
+    finally:
+        os._exit(status)
 
 
-def end(process: int) -> None:
-    """End a process, and all that it has started."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process, signal.SIGKILL)
+def end(processes: Iterable[int]) -> None:
+    """End processes, and all that they have started."""
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process, signal.SIGKILL)
 
 
-def run(todo: Sequence[Task], workers: int, until: float, folder: Path) -> Iterator[tuple[Task, int | None]]:
-    """Run tasks, so many at a time; yield each with its status (None: too slow), begun until a time."""
-    waiting, running = list(reversed(todo)), dict[int, Task]()
+def run(todo: Tasks, workers: int, until: float, folder: Path) -> Iterator[tuple[str, int | None]]:
+    """Run functions begun until a time, so many at once; yield name and status (None: too slow) of each."""
+    waiting, running = list(reversed(todo)), dict[int, tuple[str, float]]()
     with contextlib.ExitStack() as left:
-        left.callback(lambda: [end(process) for process in running])
+        left.callback(end, running)
         while running or (waiting and time.monotonic() < until):
             while waiting and len(running) < workers and time.monotonic() < until:
-                task = waiting.pop()
-                running[fork(task, folder / f"{task.name}.txt")] = task
+                work, limit = todo[name := waiting.pop()]
+                running[start(work, folder / f"{name}.txt")] = name, time.monotonic() + limit
             time.sleep(0.02)
-            for process, task in list(running.items()):
+            for process, (name, last) in list(running.items()):
                 done, status = os.waitpid(process, os.WNOHANG)
-                if done or time.monotonic() - task.started > task.limit:
-                    end(process)
-                    if not done:
-                        os.waitpid(process, 0)
+                if done or time.monotonic() > last:
+                    end([process])
                     del running[process]
-                    yield task, os.waitstatus_to_exitcode(status) if done else None
+                    yield name, os.waitstatus_to_exitcode(status) if done else None
 
 
 def list_files() -> list[str]:
@@ -175,23 +169,23 @@ def list_files() -> list[str]:
 
 def trace(workers: int, folder: Path) -> tuple[Lines, dict[str, float]]:
     """Run the tests that may judge; return the tests that execute each line, and the times of all, s."""
-    files, lines, times = list_files(), defaultdict[tuple[str, int], list[str]](list), dict[str, float]()
+    files, lines, times = list_files(), defaultdict[Place, set[str]](set), dict[str, float]()
     outputs = [folder / f"{i}.pickle" for i in range(workers)]
-    tasks = [
-        Task(output.stem, lambda i=i, output=output: Tracer().run(files[i::workers], output), LONGEST)
+    todo = {
+        output.stem: (functools.partial(Tracer().run, files[i::workers], output), LONGEST)
         for i, output in enumerate(outputs)
-    ]
-    for task, status in run(tasks, workers, math.inf, folder):
+    }
+    for name, status in run(todo, workers, math.inf, folder):
         if status != 0:
-            print((folder / f"{task.name}.txt").read_text(errors="replace")[-4000:])
+            print((folder / f"{name}.txt").read_text(errors="replace")[-4000:])
             raise SystemExit(f"mutants: FAILED (the first run of the tests ended with status {status})")
     for output in outputs:
         found, took = pickle.loads(output.read_bytes())
         times |= took
         for line, tests in found.items():
-            lines[line] += tests
+            lines[line] |= tests
     failed = [test for test, took in times.items() if took == math.inf]
-    if any(test.partition("::")[0] in EVERY for test in failed):
+    if any(test.startswith(EVERY) for test in failed):
         raise SystemExit(f"mutants: FAILED (without a mutation, these fail: {', '.join(failed)})")
     if failed:  # while it is traced, such as one that counts calls
         print(f"not among the judges: {', '.join(failed)}", flush=True)
@@ -199,23 +193,23 @@ def trace(workers: int, folder: Path) -> tuple[Lines, dict[str, float]]:
 
 
 def choose(mutant: Mutant, lines: Lines, times: dict[str, float]) -> list[str]:
-    """Return the tests that judge a mutant: the quickest that execute its line.
+    """Return the tests that judge a mutant: those that execute little else, then the quickest of each file.
 
-    A line that is executed at import is judged by the quickest tests of each line of its module.
+    A line that is executed at import is judged by tests that execute lines which use the name it defines.
     """
-    path = str(mutant.path)
-    judges = set(lines.get((path, mutant.line), ()))
-    if not judges:
-        several = [
-            sorted(tests, key=times.__getitem__)[:3] for (file, _), tests in lines.items() if file == path
-        ]
-        judges = {test for tests in several for test in sorted(tests, key=times.__getitem__)[:3]}
-    chosen, total = [], 0.0
-    for test in sorted(judges, key=times.__getitem__)[:MOST]:
-        total += times[test]
-        if total > JUDGING and chosen:
-            break
-        chosen.append(test)
+    shown = find_places(mutant, {place for place, tests in lines.items() if tests})
+    judges = sorted(set[str]().union(*(lines[place] for place in shown)), key=times.__getitem__)
+    sizes = Counter(test for tests in lines.values() for test in tests)
+    several, files, ranks = sorted(judges, key=sizes.__getitem__)[: MOST // 2], Counter[str](), Counter[str]()
+    for test in judges:
+        file = test.partition("::")[0]
+        ranks[test] = files[file] = files[file] + 1
+    several += sorted(judges, key=ranks.__getitem__)
+    chosen, left = list[str](), JUDGING
+    for test in dict.fromkeys(several):
+        if times[test] <= left and len(chosen) < MOST:
+            left -= times[test]
+            chosen.append(test)
     return [*chosen, *EVERY]
 
 
@@ -243,20 +237,20 @@ def judge_all(chosen: Sequence[Mutant], given: argparse.Namespace, started: floa
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         lines, times = trace(given.workers, folder)
-        tasks, by_name = [], dict[str, Mutant]()
-        for number, mutant in enumerate(chosen):
+        todo, by_name = Tasks(), {f"mutant{number}": mutant for number, mutant in enumerate(chosen)}
+        for name, mutant in by_name.items():
             tests = choose(mutant, lines, times)
-            limit = ALLOWANCE + PATIENCE * sum(times.get(test, 0.0) for test in tests)
-            by_name[f"mutant{number}"] = mutant
-            tasks.append(Task(f"mutant{number}", lambda m=mutant, t=tests: judge(m, t), limit))
-        for task, status in run(tasks, given.workers, started + given.limit, folder):
+            limit = int(ALLOWANCE + PATIENCE * sum(times.get(test, 0.0) for test in tests))
+            # It may wait, and other programs may run.
+            todo[name] = functools.partial(judge, mutant, tests, limit), 4.0 * limit
+        for name, status in run(todo, given.workers, started + given.limit, folder):
             if status == 0:
-                survivors.append(f"survived: {by_name[task.name].describe()}")
+                survivors.append(f"survived: {by_name[name].describe()}")
                 print(survivors[-1], flush=True)  # seen also where the run is broken off
             elif status is None or status < 0 or status in NOTICED:
                 killed += 1
             else:
-                raise SystemExit(f"mutants: FAILED ({by_name[task.name]}: pytest ended with status {status})")
+                raise SystemExit(f"mutants: FAILED ({by_name[name]}: pytest ended with status {status})")
     return killed, survivors
 
 

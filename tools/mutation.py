@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,18 +15,13 @@ from cosmic_ray.plugins import get_operator, operator_names
 
 ROOT = Path(__file__).parents[1]
 CORE = ROOT / "addon" / "digiclay" / "core"
+#: File and line.
+Place = tuple[str, int]
 #: Operators of cosmic-ray whose mutants mean something in numerical code.
 COMPARED = {"Lt": ("LtE", "Gt"), "LtE": ("Lt", "Gt"), "Gt": ("GtE", "Lt"), "GtE": ("Gt", "Lt")}
 COMPARED |= {"Eq": ("NotEq",), "NotEq": ("Eq",), "Is": ("IsNot",), "IsNot": ("Is",)}
-COMPUTED = {
-    "Add": ("Sub",),
-    "Sub": ("Add",),
-    "Mul": ("Div",),
-    "Div": ("Mul",),
-    "Pow": ("Mul",),
-    "Mod": ("Mul",),
-}
-COMPUTED |= {"BitOr": ("BitAnd",), "BitAnd": ("BitOr",), "FloorDiv": ("Mul",)}
+COMPUTED = {"Add": "Sub", "Sub": "Add", "Mul": "Div", "Div": "Mul", "Pow": "Mul", "Mod": "Mul"}
+COMPUTED |= {"BitOr": "BitAnd", "BitAnd": "BitOr", "FloorDiv": "Mul"}
 OTHERS = (
     "AddNot", "NumberReplacer", "ReplaceAndWithOr", "ReplaceOrWithAnd", "ReplaceTrueWithFalse",
     "ReplaceFalseWithTrue", "ReplaceBreakWithContinue", "ReplaceContinueWithBreak",
@@ -68,7 +64,7 @@ def operators() -> list[str]:
     """Return the names of the operators that are used."""
     wanted = {f"core/{name}" for name in OTHERS}
     wanted |= {f"core/ReplaceComparisonOperator_{a}_{b}" for a, names in COMPARED.items() for b in names}
-    wanted |= {f"core/ReplaceBinaryOperator_{a}_{b}" for a, names in COMPUTED.items() for b in names}
+    wanted |= {f"core/ReplaceBinaryOperator_{a}_{b}" for a, b in COMPUTED.items()}
     lacking = wanted - set(operator_names())
     assert not lacking, f"cosmic-ray has no {sorted(lacking)}"
     return sorted(wanted)
@@ -99,6 +95,28 @@ def mutants(module: str) -> Iterator[Mutant]:
         for occurrence, (start, end) in enumerate(places):
             if not any(first <= start and end <= last for first, last in left_out):
                 yield Mutant(module, name, occurrence, *start)
+
+
+def find_places(mutant: Mutant, executed: Set[Place]) -> Set[Place]:
+    """Return executed lines that show a mutant: its own; its statement's; uses of its name; or any."""
+    path, text = str(mutant.path), mutant.path.read_text(encoding="utf-8")
+    around = [
+        node for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.stmt) and node.lineno <= mutant.line <= (node.end_lineno or 0)
+    ][-1]  # fmt: skip
+    names = {
+        node.id for node in ast.walk(around) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    }
+    users = {
+        (file, line)
+        for file in {file for file, _ in executed}
+        for line, used in enumerate(Path(file).read_text(encoding="utf-8").splitlines(), 1)
+        if not names.isdisjoint(re.findall(r"\w+", used))
+    }
+    whole = {(path, line) for line in range(around.lineno, (around.end_lineno or 0) + 1)}
+    own = {place for place in executed if place[0] == path}
+    choices = ({(path, mutant.line)}, whole, users & own, users, own)
+    return next((places & executed for places in choices if places & executed), set())
 
 
 def sample(every: Sequence[Mutant], count: int) -> list[Mutant]:
