@@ -29,7 +29,10 @@ settings.register_profile(
 )
 # Where it only counts that a test fails, as in tools/mutants.py: no failing example is made simpler.
 settings.register_profile(
-    "first_failure", settings.get_profile("repeatable"), phases=(Phase.explicit, Phase.generate), max_examples=20
+    "first_failure",
+    settings.get_profile("repeatable"),
+    phases=(Phase.explicit, Phase.generate),
+    max_examples=20,
 )
 settings.load_profile(os.environ.get("DIGICLAY_HYPOTHESIS", "repeatable"))
 
