@@ -12,6 +12,8 @@ from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
+from tests.assemble import master
+
 BEHAVIORS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 REST = 40e-3
 #: Speed of a free pin at full valve without a conduit, m/s, two digits.
@@ -53,6 +55,17 @@ def orders(behavior: Any, measurement: Measurement) -> Commands:
 def speeds(behavior: Any, command: np.ndarray) -> np.ndarray:
     """Return the speed of a pin without load under some commands: opening squared times the free speed."""
     return np.sign(command) * command**2 * behavior.drive.up[-1]
+
+
+def test_a_lead_of_the_hybrid_is_taken_back_where_method_one_takes_over() -> None:
+    hybrid = assemble(resolve({"control": {"method": "hybrid"}})).controller
+    memory = hybrid.begin()._replace(master=master(x=30e-3))
+    found = []
+    for lead in (0.0, 0.5):
+        measurement = seen(hybrid, target=1.0 + lead)
+        measurement.own[hybrid._at.lead] = lead * 1e-3
+        found.append(hybrid.command(memory, measurement)[1].target)
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-14)  # rounding
 
 
 # All of them
