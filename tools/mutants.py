@@ -25,7 +25,7 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType
@@ -36,9 +36,8 @@ from mutation import CORE, ROOT, Mutant, Place, find_places, mutants, sample
 
 #: Packages of the core that are changed, but modules that only declare or list.
 PACKAGES, DECLARING = ("model", "steppers", "engine", "control", "metrics"), ("methods", "interfaces")
-#: Folders of the tests that may judge; of those that execute a line, so many and so long, s of
-#: processor time.
-FOLDERS, MOST, JUDGING = ("unit", "property", "scenes", "regression", "convergence"), 80, 12.0
+#: Folders of the tests that may judge, and how long those of a mutant take, s of processor time.
+FOLDERS, JUDGING = ("unit", "property", "scenes", "regression", "convergence"), 12.0
 #: Tests that judge every mutant, after its own.
 EVERY = ("tests/regression/test_golden_run.py", "tests/regression/test_old_formats.py")
 OPTIONS = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
@@ -67,27 +66,41 @@ class Tracer:
         """Let no test judge that fails."""
         self.times[report.nodeid] += 0.0 if report.passed else math.inf
 
-    def pytest_runtest_setup(self, item: pytest.Item) -> None:
-        """Try no other row of a test one of whose rows takes long."""
-        if item.nodeid.partition("[")[0] in self.slow:
-            pytest.skip("too long for a judge")
-
-    @pytest.hookimpl(hookwrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        """Ascribe what is executed to the test, and end one that takes long."""
-        self.coverage.switch_context(item.nodeid)
+    @contextlib.contextmanager
+    def limit(self, item: pytest.Item) -> Iterator[None]:
+        """Let a part of a test fail that takes long, and try no other row of it."""
+        name = item.nodeid.partition("[")[0]
 
         def stop(number: int, frame: object) -> None:
-            self.slow.add(item.nodeid.partition("[")[0])
+            self.slow.add(name)
             pytest.fail("too long for a judge")
 
-        before = sum(os.times()[:4])
+        if name in self.slow:
+            pytest.skip("too long for a judge")
         signal.signal(signal.SIGPROF, stop)
-        signal.setitimer(signal.ITIMER_PROF, 0.0 if item.nodeid.startswith(EVERY) else LONG)
-        yield
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        self.times[item.nodeid] += sum(os.times()[:4]) - before
+        signal.setitimer(signal.ITIMER_PROF, 0.0 if name.startswith(EVERY) else LONG)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
+        """Limit the fixtures."""
+        with self.limit(item):
+            yield
+
+    pytest_runtest_call = pytest_runtest_setup
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
+        """Ascribe what is executed to the test."""
+        before = sum(os.times()[:4])
+        self.coverage.switch_context(item.nodeid)
+        done = yield
         self.coverage.switch_context("")
+        self.times[item.nodeid] += sum(os.times()[:4]) - before
+        return done
 
     def run(self, files: Sequence[str], output: Path) -> int:
         """Run files of tests, and write the tests of each line and the times of all."""
@@ -161,7 +174,9 @@ def run(todo: Tasks, workers: int, until: float, folder: Path) -> Iterator[tuple
 
 def list_files() -> list[str]:
     """Return the files of tests that import what is changed, or assemble it."""
-    mark = re.compile(rf"digiclay\.core\.({'|'.join(PACKAGES)})\b|tests\.assemble|tests\.reliefs")
+    mark = re.compile(
+        rf"digiclay\.core\.({'|'.join(PACKAGES)}|scene.schema)\b|tests\.assemble|tests\.reliefs"
+    )
     files = (path for name in FOLDERS for path in sorted((ROOT / "tests" / name).glob("test_*.py")))
     found = [str(path.relative_to(ROOT)) for path in files if mark.search(path.read_text(encoding="utf-8"))]
     return sorted({*found, *EVERY})
@@ -193,21 +208,27 @@ def trace(workers: int, folder: Path) -> tuple[Lines, dict[str, float]]:
 
 
 def choose(mutant: Mutant, lines: Lines, times: dict[str, float]) -> list[str]:
-    """Return the tests that judge a mutant: those that execute little else, then the quickest of each file.
+    """Return the tests that judge a mutant, of those that execute its line.
 
-    A line that is executed at import is judged by tests that execute lines which use the name it defines.
+    In turn one that executes little but its module, one that executes much of it as well, and one of another
+    file. A line that is executed at import is judged by tests of lines which use the name it defines.
     """
     shown = find_places(mutant, {place for place, tests in lines.items() if tests})
     judges = sorted(set[str]().union(*(lines[place] for place in shown)), key=times.__getitem__)
     sizes = Counter(test for tests in lines.values() for test in tests)
-    several, files, ranks = sorted(judges, key=sizes.__getitem__)[: MOST // 2], Counter[str](), Counter[str]()
+    inner = Counter(test for place in lines if place[0] == str(mutant.path) for test in lines[place])
+    files, ranks = Counter[str](), dict[str, int]()
     for test in judges:
         file = test.partition("::")[0]
         ranks[test] = files[file] = files[file] + 1
-    several += sorted(judges, key=ranks.__getitem__)
+    orders = (
+        sorted(judges, key=lambda test: inner[test] / sizes[test], reverse=True),
+        sorted(judges, key=lambda test: inner[test] ** 2 / sizes[test], reverse=True),
+        sorted(judges, key=ranks.__getitem__),
+    )
     chosen, left = list[str](), JUDGING
-    for test in dict.fromkeys(several):
-        if times[test] <= left and len(chosen) < MOST:
+    for test in dict.fromkeys(test for several in zip(*orders, strict=True) for test in several):
+        if times[test] <= left:
             left -= times[test]
             chosen.append(test)
     return [*chosen, *EVERY]
