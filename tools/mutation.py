@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
-from cosmic_ray.plugins import get_operator, operator_names
+from cosmic_ray.plugins import get_operator
 
 ROOT = Path(__file__).parents[1]
 CORE = ROOT / "addon" / "digiclay" / "core"
@@ -65,8 +65,6 @@ def operators() -> list[str]:
     wanted = {f"core/{name}" for name in OTHERS}
     wanted |= {f"core/ReplaceComparisonOperator_{a}_{b}" for a, names in COMPARED.items() for b in names}
     wanted |= {f"core/ReplaceBinaryOperator_{a}_{b}" for a, b in COMPUTED.items()}
-    lacking = wanted - set(operator_names())
-    assert not lacking, f"cosmic-ray has no {sorted(lacking)}"
     return sorted(wanted)
 
 
@@ -74,14 +72,9 @@ def idle(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Return from where to where (line, column) a mutant says nothing: annotations, decorators, messages."""
     nodes: list[ast.AST] = []
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            nodes += node.decorator_list
-        if isinstance(node, ast.FunctionDef) and node.returns:
-            nodes.append(node.returns)
-        if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation:
-            nodes.append(node.annotation)
-        if isinstance(node, ast.Raise):
-            nodes.append(node)
+        nodes += getattr(node, "decorator_list", [])
+        nodes += filter(None, (getattr(node, "returns", None), getattr(node, "annotation", None)))
+        nodes += [node] if isinstance(node, ast.Raise) else []
     return [((n.lineno, n.col_offset), (n.end_lineno, n.end_col_offset)) for n in nodes]  # type: ignore[attr-defined]
 
 
