@@ -223,10 +223,10 @@ def beginning(name: str, lasting: float, stepper: str, step: float, *settings: s
     return replace(scene, simulation=replace(scene.simulation, duration=duration))
 
 
-def moved(known: Scene, x: float, z: float, lasting: float | None = None) -> Scene:
-    """Return a scene whose finger takes the same way elsewhere, m, and that lasts so long, s."""
+def moved(known: Scene, x: float, z: float, lasting: float | None = None, pace: float = 1.0) -> Scene:
+    """Return a scene of the same way elsewhere, m, in a share of its time, that lasts so long, s."""
     points = tuple(
-        replace(point, position=(point.position[0] + x, point.position[1], point.position[2] + z))
+        replace(point, time=point.time * pace, position=tuple(np.add(point.position, (x, 0.0, z))))
         for point in known.section("trajectory").waypoints
     )
     simulation = replace(known.simulation, duration=lasting or known.simulation.duration)

@@ -121,7 +121,7 @@ def assert_withstands(
     assert_within_reach(system, way(spots, turn), run.height)
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(jumps, turns, beds, parts, st.sampled_from(PERIODS), STEPPERS)
 @example(SIDEWAYS, LEVEL, Layout(13, 13), {}, 5e-3, "bernoulli")
 @example(DOWN, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
@@ -132,7 +132,7 @@ def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
     assert_withstands(bed, spots, turn, period, stepper, **changes)
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(jumps, turns, st.sampled_from(PERIODS))
 def test_the_adaptive_stepper_withstands_jumps(
     spots: list[Spot], turn: tuple[float, ...], period: float
@@ -140,7 +140,7 @@ def test_the_adaptive_stepper_withstands_jumps(
     assert_withstands(Layout(3, 3), spots, turn, period, "adaptive")
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.lists(jumps, min_size=2, max_size=3), STEPPERS)
 @example([SIDEWAYS, DOWN], "bernoulli")
 def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> None:
@@ -155,7 +155,7 @@ def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> No
         assert np.all(still == 40e-3)
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(
     st.lists(st.tuples(st.sampled_from([1, 5, 20]), straight, straight, deep), min_size=3, max_size=5),
     st.floats(-1.0, 1.0), st.integers(0, 8), st.sampled_from([1.6e-6, 1.6e-9]),
@@ -188,7 +188,7 @@ def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
 above = st.tuples(st.sampled_from([1, 5, 20, 50]), far, far, st.integers(1, 20).map(float))
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.lists(above, min_size=2, max_size=4), st.sampled_from(PERIODS), STEPPERS)
 @example([(5, 0.0, 0.0, 6.0), (5, -30.0, 0.0, 4.0)], 5e-3, "bernoulli")
 def test_a_finger_that_passes_above_all_pins_leaves_nothing_behind(

@@ -45,7 +45,7 @@ def bed(stepper: str = "bernoulli", **parts: object) -> System:
     return make_system(CELLS, stepper=stepper, step=0.25e-3 if stepper != "bernoulli" else 1e-3, **parts)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(points, turns, st.floats(0.0, 100.0), steppers)
 @example([(0.0, 0.0, 45.0), (0.0, 0.0, 36.0), (9.0, 3.0, 38.0)], (0.0, 0.0, 0.0), 40.0, "runge_kutta_4")
 def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are_openings(
@@ -68,7 +68,7 @@ def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are
     assert near.max(initial=0.0) <= max(run.last.active.peak, run.last.peak)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(points, st.integers(0, COUNT - 1))
 def test_a_step_leaves_the_state_it_was_given_as_it_was(
     spots: list[tuple[float, float, float]], when: int
@@ -85,7 +85,7 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was(
     assert np.array_equal(whole(once), whole(again))
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(points, st.integers(1, COUNT - 1))
 def test_a_session_twice_or_interrupted_is_the_same_session_bit_for_bit(
     spots: list[tuple[float, float, float]], when: int
@@ -103,7 +103,7 @@ commands = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)
 valves = st.sampled_from([{}, {"valve": Valve(orifice_diameter=0.8e-3), "fluid": Fluid(760.0, 0.65e-6)}])
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(commands, valves)
 def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: dict[str, object]) -> None:
     # Flow of the exact opening by a fine sum, through the law itself; no load, no end stop, no dead time.

@@ -48,7 +48,7 @@ class Everywhere:
         return self.inner.command(memory, seen)
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(points)
 @example([  # the finger is felt by one cell, and travels along a row: cells lie exactly abeam of it
     (-0.2, -1.5, 34.1), (-3.0, -7.9, 49.0), (2.1, 3.0, 45.1), (-3.3, 9.6, 40.6), (-1.3, -5.4, 37.7),

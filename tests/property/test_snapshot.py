@@ -46,7 +46,7 @@ def refusals(data: bytes) -> list[str]:
 places = st.one_of(st.integers(0, len(KEPT) - 12), st.integers(0, 700), st.integers(0, 700))
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(places, st.binary(max_size=12))
 def test_bytes_that_are_changed_are_noticed_or_make_another_state(at: int, some: bytes) -> None:
     data = KEPT[:at] + some + KEPT[at + len(some) :]
@@ -62,7 +62,7 @@ def test_bytes_that_are_cut_or_added_are_noticed(at: int, some: bytes) -> None:
     assert all(refusals(KEPT[:17] + some))
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(st.lists(st.tuples(st.integers(-100, 100), st.integers(340, 480)), min_size=2, max_size=5))
 def test_a_state_anywhere_in_a_session_is_taken_up_exactly(spots: list[tuple[int, int]]) -> None:
     times = np.linspace(0.0, 0.4, len(spots))

@@ -1,9 +1,8 @@
-"""A new law is one file and one line: it runs alone and in batches, and is found wherever parameters are."""
+"""A new law or behavior is one file and one line: it runs alone and in batches, and is found everywhere."""
 
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from digiclay.core.base.quantity import Parameters, quantity
 from digiclay.core.model.contact import ExponentialLaw
 from digiclay.core.model.valve import Orifice
 
-from tests.package_copy import ROOT, copy_package, find_changes, run_python
+from tests.package_copy import copy_package, find_changes, run_python
 
 #: An equal-percentage valve: the lift grows exponentially with the opening.
 VALVE = '''
@@ -84,16 +83,70 @@ class Pad(ExponentialLaw, Parameters):
         """m, 1/m."""
         return math.log(2.0) / self.doubling
 '''
-#: What runs in the copy: three values of each law alone and in one batch; a line of JSON for each law.
+#: A sponge gives way under a force, and swells back slowly, by a share of its way a second.
+SPONGE = '''
+"""Sponge: a pressed pin gives way, and swells back slowly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.control_interface import Commands, Measurement
+from .device_info import DeviceInfo
+from .drive import CellwiseControl, TouchParameters, check_damping, make_drive
+
+
+@dataclass(frozen=True)
+class Sponge(TouchParameters):
+    """Damping and swelling."""
+
+    damping: float = quantity(5.0, "force for the speed at which a pin sinks", unit="N s/m", above=0.0)
+    swelling_time: float = quantity(0.3, "time constant of the swelling", unit="s", symbol="τ_w", above=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SpongeControl(CellwiseControl):
+    """Controller of the sponge; a cell remembers for how many periods it has been pressed."""
+
+    parameters: Sponge
+
+    name = "sponge"
+    rows = 1
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Let pressed cells sink, and the others swell; see `Controller`."""
+        known, rest = self.parameters, self.actuator.rest_height
+        pressed = seen.force >= known.felt_force
+        seen.own[0] = np.where(pressed, seen.own[0] + 1.0, 0.0)
+        speed = np.where(pressed, -seen.force / known.damping, (rest - seen.height) / known.swelling_time)
+        mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
+        target = np.full(seen.height.shape, rest)
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+
+
+def build(parameters: Sponge, device: DeviceInfo) -> SpongeControl:
+    """Build the sponge's controller for a device."""
+    check_damping(parameters.damping, device.cell, device.period)
+    drive = make_drive(parameters, device.cell, device.period)
+    return SpongeControl(parameters, device.cell.actuator, drive)
+'''
+#: What runs in the copy: three values of each part alone and in one batch; a line of JSON for each.
 SESSION = """
 import json, sys, tomllib
 import numpy as np
+from digiclay.core.batch.packing import make_batch
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.model.contact import Contact
+from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.run_scene import run
-from digiclay.settings.groups import GROUPS
+from digiclay.settings.groups import GROUPS, METHOD_GROUPS
 
 def scene(*settings):
     return load(find("tap"), [Setting(*one.split("=")) for one in settings])
@@ -102,19 +155,20 @@ def height(scene):
     return run(scene).history["height"]
 
 for asked in sys.argv[1:]:
-    section, law, key, *values = asked.split()
-    scenes = [scene(f"{section}.law={law}", f"{section}.{key}={value}") for value in values]
+    section, choice, name, key, *values = asked.split()
+    scenes = [scene(f"{section}.{choice}={name}", f"{section}.{key}={value}") for value in values]
     alone = [height(one) for one in scenes]
     batch = {number: result.history["height"].copy() for number, result in run_together(scenes)}
-    said = format_scene(scenes[1])
+    text = format_scene(scenes[1])
+    group = {**GROUPS, "control": METHOD_GROUPS.get(name)}[section].__annotations__
     print(json.dumps({
         "batch": max(float(np.abs(batch[i] - alone[i]).max()) for i in range(len(values))),
         "apart": float(np.abs(alone[0] - alone[-1]).max()),
         "default": float(np.abs(height(scene()) - alone[0]).max()),
-        "told": resolve(tomllib.loads(said)) == scenes[1],
-        "stepper": scenes[0].simulation.stepper,
-        "panel": [name in GROUPS[section].__annotations__ for name in ("law", key)],
-        "law in file": f'law = "{law}"' in said,
+        "joined": type(make_batch([assemble(one) for one in scenes]).controller).__name__,
+        "read back": resolve(tomllib.loads(text)) == scenes[1],
+        "panel": key in group and (choice == "method" or choice in group),
+        "in file": f'{choice} = "{name}"' in text,
     }))
 plain = resolve({"simulation": {"duration": 0.01}})
 print(json.dumps(["law =" in format_scene(plain), run(plain.with_sections(contact=Contact())).periods]))
@@ -127,43 +181,49 @@ def copy(tmp_path: Path) -> Path:
     return copy_package(tmp_path)
 
 
-def add_law(copy: Path, section: str, row: str, name: str, text: str) -> None:
-    """Write a law's file, and its row into the list of laws."""
-    model = copy / "addon" / "digiclay" / "core" / "model"
-    (model / name).write_text(text.lstrip(), encoding="utf-8")
-    laws = model / "laws.py"
-    lines = laws.read_text(encoding="utf-8").splitlines(keepends=True)
-    place = lines.index(f'    "{section}": {{\n') + 2
-    laws.write_text("".join([*lines[:place], f"        {row}\n", *lines[place:]]), encoding="utf-8")
+def add_part(copy: Path, table: str, line: str, row: str, name: str, text: str) -> None:
+    """Write a part's file, and its row behind a line of a table of parts."""
+    core = copy / "addon" / "digiclay" / "core"
+    (core / table).with_name(name).write_text(text.lstrip(), encoding="utf-8")
+    head, found, tail = (core / table).read_text(encoding="utf-8").partition(line)
+    assert found
+    (core / table).write_text(f"{head}{line}    {row}\n{tail}", encoding="utf-8")
 
 
-#: Section, row of the list of laws, file and its text.
-EQUAL = '"equal_percentage": ("model.valve_exponential", "EqualPercentage"),'
-LAWS = (
-    ("valve", EQUAL, "valve_exponential.py", VALVE),
-    ("contact", '"pad": ("model.pad", "Pad"),', "pad.py", CONTACT),
+#: Table of the parts, line before its new row, row, file and its text.
+VALVES, CONTACTS = '("model.valve", "Valve"),\n', '("model.contact", "Contact"),\n'
+METHODS = "METHODS: dict[str, Method] = {\n"
+EQUAL = '    "equal_percentage": ("model.valve_exponential", "EqualPercentage"),'
+SPONGE_ROW = '"sponge": Method("control.sponge", "Sponge", recovers=True),'
+PARTS = (
+    ("model/laws.py", VALVES, EQUAL, "valve_exponential.py", VALVE),
+    ("model/laws.py", CONTACTS, '    "pad": ("model.pad", "Pad"),', "pad.py", CONTACT),
+    ("control/methods.py", METHODS, SPONGE_ROW, "sponge.py", SPONGE),
 )
 
 
-def test_new_laws_are_a_file_and_a_line_each_and_change_no_other_test(copy: Path) -> None:
-    for law in LAWS:
-        add_law(copy, *law)
-    assert find_changes(copy) == sorted(["laws.py", *(name for *_, name, _ in LAWS)])
-    asked = ("valve equal_percentage rangeability 10 20 40", "contact pad doubling 0.3e-3 0.4e-3 0.6e-3")
-    *laws, plain = (json.loads(line) for line in run_python(copy, "-c", SESSION, *asked).splitlines())
-    for words, found in zip(asked, laws, strict=True):
+def test_new_laws_and_a_new_behavior_are_a_file_and_a_line_each(copy: Path) -> None:
+    for part in PARTS:
+        add_part(copy, *part)
+    tables = {Path(table).name for table, *_ in PARTS}
+    assert find_changes(copy) == sorted([*tables, *(name for *_, name, _ in PARTS)])
+    asked = (
+        "valve law equal_percentage rangeability 10 20 40",
+        "contact law pad doubling 0.3e-3 0.4e-3 0.6e-3",
+        "control method sponge swelling_time 0.1 0.3 0.9",
+    )
+    *parts, plain = (json.loads(line) for line in run_python(copy, "-c", SESSION, *asked).splitlines())
+    for words, found in zip(asked, parts, strict=True):
+        section, choice, name, key, *_ = words.split()
         # Sums in another order: a last bit here and there.
         assert found.pop("batch") < 1e-12
         assert min(found.pop("apart"), found.pop("default")) > 1e-5
-        assert found == {"told": True, "stepper": "bernoulli", "law in file": True, "panel": [True, True]}
-        section, law, key, *_ = words.split()
-        options = ("describe", "tap", "--parameters", "--set", f"{section}.law={law}")
+        # All runs of a batch in one call, not one after the other.
+        joined = "SpongeControl" if name == "sponge" else "VirtualMasterBatch"
+        assert found == {"joined": joined, "read back": True, "panel": True, "in file": True}
+        options = ("describe", "tap", "--parameters", "--set", f"{section}.{choice}={name}")
         assert f"{section}.{key} = " in run_python(copy, "-m", "digiclay", *options)
     assert plain == [False, 2]  # a scene without a word of laws
-    shutil.copytree(ROOT / "tests", copy / "tests")
-    shutil.copy(ROOT / "pyproject.toml", copy)
-    old = str(copy / "tests" / "regression" / "test_old_formats.py")
-    run_python(copy, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", f"--rootdir={copy}", old)
 
 
 @pytest.mark.parametrize(
@@ -197,8 +257,8 @@ def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base: type, name
 def test_a_law_that_lacks_what_a_law_has_is_refused_in_a_line(
     copy: Path, number: int, old: str, new: str, said: str
 ) -> None:
-    section, row, name, text = LAWS[number]
-    add_law(copy, section, row, name, text.replace(old, new))
+    *place, text = PARTS[number]
+    add_part(copy, *place, text.replace(old, new))
     make = "from digiclay.core.scene.toml_table import resolve; from digiclay.core.base.errors import *\n"
     assert said in run_python(copy, "-c", f"{make}try: resolve({{}})\nexcept ParameterError as e: print(e)")
 

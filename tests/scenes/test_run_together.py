@@ -18,7 +18,7 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference
 from digiclay.core.session.run_scene import Result, run
 
-from tests.assemble import STACKABLE, moved, sample
+from tests.assemble import STACKABLE, followed, moved, sample
 
 #: Sums in another order: a last bit here and there. Heights are centimeters, forces tenths of a newton.
 HEIGHT, FORCE = 1e-12, 1e-10
@@ -92,10 +92,9 @@ def assert_all_as_alone(scenes: Sequence[Scene], *, judge: bool = False, errors:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
-    settings = [f"control.method={method}", "simulation.duration=1.5"]
     devices = ((f"valve.stroke={25 + 5 * i}e-6", f"actuator.rest_height={40 - 0.2 * i}e-3") for i in range(2))
-    known = [sample(STACKABLE[method], *settings, *device) for device in devices]
-    scenes = [moved(one, 0.7e-3 * i, -0.2e-3 * i, 0.9 + 0.2 * i) for i, one in enumerate(known)]
+    known = [sample(STACKABLE[method], f"control.method={method}", *device) for device in devices]
+    scenes = [moved(one, 0.7e-3 * i, -0.2e-3 * i, 0.5 + 0.05 * i, 0.3) for i, one in enumerate(known)]
     assert_all_as_alone(scenes, errors=True)
 
 
@@ -143,16 +142,17 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
     changes: dict[str, Sequence[str]],
 ) -> None:
     settings = [[f"{key}={value}" for value in values] for key, values in changes.items()]
-    assert_all_as_alone([sample("tap", *one) for one in zip(*settings, strict=True)], errors=True)
+    scenes = [sample("tap", "simulation.duration=0.3", *one) for one in zip(*settings, strict=True)]
+    assert_all_as_alone(scenes, errors=True)
 
 
 @pytest.mark.parametrize(
     ("name", "keys", "settings", "errors"),
     [
-        ("elastic_press", {"stiffness": (10, 40), "settling_time": (20e-3, 40e-3)}, ("duration=1.0",), False),
-        ("plastic_press", {"yield_force": (0.02, 0.05), "damping": (5, 8)}, ("duration=1.0",), False),
+        ("elastic_press", {"stiffness": (10, 40), "settling_time": (20e-3, 40e-3)}, ("duration=0.5",), False),
+        ("plastic_press", {"yield_force": (0.02, 0.05), "damping": (5, 8)}, ("duration=0.5",), False),
         *(
-            ("tap", {"force_gain": (3, 5)}, (f"stepper={by}", f"physics_step={step}", "duration=0.25"), True)
+            ("tap", {"force_gain": (3, 5)}, (f"stepper={by}", f"physics_step={step}", "duration=0.17"), True)
             for by, step in (("richardson", "5e-4"), ("adaptive", "5e-3"), ("runge_kutta_4", "1e-3"))
         ),
         ("tap", {"force_gain": (3, 5)}, ("duration=5e-3",), False),  # a single period
@@ -169,19 +169,26 @@ def test_behaviors_and_steppers_do_what_they_do_alone(
 @pytest.mark.parametrize(
     ("name", "key", "values", "settings"),
     [
-        # The ridge ends after 10 s: by then every metric has a value.
-        ("ridge_mound_valley", "control.force_gain", (3, 5), ("simulation.duration=10.3",)),
         ("tap", "control.force_gain", (3, 5), ("layout.arrangement=hexagonal",)),
-        ("slow_press", "control.force_gain", (3, 5), ("recorder.every=7", "simulation.duration=1.003")),
+        ("slow_press", "control.force_gain", (3, 5), ("recorder.every=7", "simulation.duration=0.503")),
         # The cells are chosen anew every 32 periods or sooner: most of their sets have no row of their own.
-        ("plastic_press", "contact.exponent", (2000, 1990), ("recorder.every=400", "simulation.duration=3")),
+        ("plastic_press", "contact.exponent", (2e3, 1990), ("recorder.every=99", "simulation.duration=0.9")),
         ("tap", "actuator.rest_height", (0.01, 0.02), ("simulation.duration=0.1",)),  # nothing is touched
     ],
 )  # fmt: skip
 def test_what_is_recorded_and_judged_of_a_run_is_that_of_the_run_alone(
     name: str, key: str, values: Sequence[float], settings: Sequence[str]
 ) -> None:
-    assert_all_as_alone([sample(name, *settings, f"{key}={value}") for value in values], judge=True)
+    pace = 0.3 if name == "plastic_press" else 1.0
+    known = (sample(name, *settings, f"{key}={value}") for value in values)
+    assert_all_as_alone([moved(one, 0.0, 0.0, pace=pace) for one in known], judge=True)
+
+
+def test_every_metric_of_a_ridge_is_that_of_the_run_alone() -> None:
+    way = ((0, -14, 0, 41.5), (0.3, -14, 0, 37), (0.6, -14, 0, 37), (1.8, 14, 0, 37), (2.1, 14, 0, 37))
+    methods = ({"method": "virtual_master", "force_gain": gain} for gain in (3, 5))
+    for found in assert_all_as_alone([followed("", way, control=one) for one in methods], judge=True):
+        assert None not in (found.metrics[name] for name in METRICS)
 
 
 def test_pins_pressed_onto_their_end_stops_come_to_what_they_come_to_alone() -> None:
@@ -202,14 +209,19 @@ def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
     assert_all_as_alone([twice, moved(twice, 1e-3, -0.5e-3)])
 
 
-def test_without_a_finger_or_a_controller_a_stack_stands_still() -> None:
-    settings = ("control=absent", "fingertip=absent", "simulation.duration=0.1")
-    assert_all_as_alone([replace(sample("tap", *settings), name=name) for name in "ab"])
-
-
-def test_runs_that_start_from_a_shape_come_to_what_they_come_to_alone() -> None:
-    known = sample("dome_peaked", "layout.rows=15", "layout.columns=15", "simulation.duration=2.5")
-    assert_all_as_alone([moved(known, 0.7e-3 * i, -0.5e-3 * i) for i in range(2)])
+@pytest.mark.parametrize(
+    ("name", "settings", "lasting"),
+    [
+        ("tap", ("control=absent", "fingertip=absent"), 0.1),
+        ("dome_peaked", ("layout.rows=11", "layout.columns=11"), 1.4),
+    ],
+    ids=["without a finger or a controller", "from a shape"],
+)
+def test_a_bed_that_stands_still_or_shapes_itself_does_so_as_alone(
+    name: str, settings: Sequence[str], lasting: float
+) -> None:
+    known = sample(name, *settings)
+    assert_all_as_alone([moved(known, 0.7e-3 * i, -0.5e-3 * i, lasting, 0.5) for i in range(2)])
 
 
 def test_a_run_that_diverges_ends_in_its_own_error_and_the_others_go_on() -> None:
@@ -283,9 +295,10 @@ def noisy(name: str, *settings: str) -> list[Scene]:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
-    scenes = noisy(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
+    scenes = noisy(STACKABLE[method], f"control.method={method}")
     # Fingers that come down elsewhere and differently far: other cells of each, and not as many.
-    assert_all_as_alone([moved(one, 2e-3 * i, -0.2e-3 * i, 1.1 - 0.2 * i) for i, one in enumerate(scenes)])
+    ends = (0.5, 0.45, 0.4)
+    assert_all_as_alone([moved(one, 2e-3 * i, -0.2e-3 * i, ends[i], 0.3) for i, one in enumerate(scenes)])
 
 
 @pytest.mark.parametrize(
@@ -305,9 +318,9 @@ def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method: st
 def test_readings_that_are_rounded_late_or_estimated_are_those_of_the_run_alone(
     method: str, sensors: Sequence[str], *, noise: bool
 ) -> None:
-    settings = [f"control.method={method}", *(f"sensors.{one}" for one in sensors), "simulation.duration=0.6"]
+    settings = [f"control.method={method}", *(f"sensors.{one}" for one in sensors)]
     known = noisy("slow_press", *settings) if noise else [sample("slow_press", *settings)] * 3
-    assert_all_as_alone([moved(one, 0.7e-3 * i, -1e-3 * i) for i, one in enumerate(known)])
+    assert_all_as_alone([moved(one, 0.7e-3 * i, -1e-3 * i, 0.25, 0.3) for i, one in enumerate(known)])
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states", "viscous"])
