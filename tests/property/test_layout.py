@@ -86,7 +86,7 @@ def test_a_disc_has_all_cells_within_its_radius_and_bounds_hold_it_closely(
     # On the rim itself rounding may decide either way; a disc widened by 1e-9 has those too.
     distance = np.hypot(bed.x - x, bed.y - y)
     surely, perhaps = distance <= radius * (1 - 1e-12), distance <= radius * (1 + 2e-9) + 1e-17
-    disc, cells = bed.disc(x, y, radius), bed.within(bed.bounds(x, y, radius))
+    disc, cells = bed.disc(x, y, radius), bed.box(x, y, radius)
     # Of a batch a run may have none.
     none, covered = bed.covered(widen_disc(join_discs([None, (x, y, radius)]), 1e-9 * radius)).T
     assert not none.any()

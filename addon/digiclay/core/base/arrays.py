@@ -32,13 +32,8 @@ class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
     """Numbers such that arrays of a shape can be calculated with them: ``Constants((0.0, 1.0))[shape]``.
 
     Numpy takes two operands of one shape twice as fast as an array and a number, so for the
-    cells of one run, (n,), each becomes an array. These are kept, shared and read-only.
-
-    Parameters
-    ----------
-    numbers : tuple of float, or of ndarray (b,) where the runs differ
-    kind : type
-        Of the arrays' elements.
+    cells of one run, (n,), each becomes an array of elements of a kind; these are kept, shared and
+    read-only. Numbers that differ from run to run are arrays (b,).
     """
 
     def __init__(self, numbers: tuple[Any, ...], kind: type = np.float64) -> None:

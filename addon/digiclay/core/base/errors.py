@@ -20,20 +20,9 @@ class DigiclayError(Exception):
 
 
 class ParameterError(DigiclayError, ValueError):
-    """Parameter outside its rule.
+    """Parameter outside its rule, which starts with ``must``; the value has its unit, the hint what is meant.
 
-    Parameters
-    ----------
-    owner : str
-        The part that owns the parameter, as users know it (``"Valve"``).
-    field : str
-        The parameter's name; empty when the rule joins several of them.
-    rule : str
-        What must hold, starting with ``must``.
-    value : str
-        The offending value, with its unit.
-    hint : str, optional
-        What is usually meant.
+    The owner is the part as users know it (``"Valve"``); the field is empty when the rule joins several.
     """
 
     def __init__(self, owner: str, field: str, rule: str, value: str, hint: str = "") -> None:
@@ -63,21 +52,7 @@ class StateError(DigiclayError):
 
 
 class DivergenceError(DigiclayError, ArithmeticError):
-    """Integration with values beyond all bounds.
-
-    Parameters
-    ----------
-    time : float
-        Simulated time at the start of the step that failed, s.
-    cell : int
-        Index of the first cell that failed.
-    quantity : str
-        What is no longer finite, or out of its range.
-    value : float
-        Its value.
-    remedy : str
-        What usually helps.
-    """
+    """Integration with values beyond all bounds: time, s, first cell, its quantity and value."""
 
     def __init__(self, time: float, cell: int, quantity: str, value: float, remedy: str) -> None:
         self.time, self.cell, self.quantity, self.value, self.remedy = time, cell, quantity, value, remedy

@@ -114,13 +114,7 @@ def list_quantities(parameters: type[Parameters] | Parameters) -> dict[str, Quan
 
 @dataclass(frozen=True)
 class Parameters:
-    """Base of every part's parameters: frozen, and valid once built.
-
-    Raises
-    ------
-    ParameterError
-        On a wrong type, a number that is not finite, or a value out of bounds.
-    """
+    """Base of every part's parameters: frozen, and valid once built; ParameterError tells what is wrong."""
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)

@@ -328,21 +328,11 @@ def describe_structure(scene: Scene, findings: Findings | None = None) -> Any:
     steps = scene.simulation.control_period, scene.simulation.steps, scene.simulation.stepper
     motion: Motion = findings.find(MOTIONS, (physics, fingertips, steps), make_motion, scene)
     bed: Grid = findings.find(BEDS, scene.layout, make_grid, scene.layout)
-    nodes = tuple(
-        (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in _plans(motion)
-    )
+    plan = motion.plan
+    plans = (plan,) if isinstance(plan, BernoulliPlan) else (plan.coarse, plan.fine)
+    nodes = tuple((plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in plans)
     kind = findings.find(KINDS, physics, classify, physics)
     return (*common, kind, count_rows(scene, bed, motion), nodes, motion.instants.size)
-
-
-def _plans(motion: Motion) -> tuple[BernoulliPlan, ...]:
-    """Return the plans of closed-form steps, the coarse one first; none with another stepper."""
-    match motion.stepper.name:
-        case "bernoulli":
-            return (motion.plan,)
-        case "richardson":
-            return motion.plan.coarse, motion.plan.fine
-    return ()
 
 
 def make_batch(systems: Sequence[System]) -> Batch:

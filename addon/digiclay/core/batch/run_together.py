@@ -161,24 +161,10 @@ class Histories:
         return self._history.finish(period, recording.every)
 
 
-@dataclass(frozen=True, eq=False)
-class SampledPath:
-    """Fingertip path over a bed, at some times."""
-
-    time: Floats
-    """(t,): s."""
-    fingertip: Floats
-    """(t, 7): Lowest point, m, and quaternion."""
-    cells: NDArray[np.intp]
-    """(m,): Those that are the nearest to it at some time, ascending."""
-
-
-def make_path(grid: Grid, trajectory: Trajectory, time: Floats) -> SampledPath:
-    """Compute a fingertip path at times (t,), s."""
-    tip = trajectory.poses(time)
+def find_nearest_cells(grid: Grid, tip: Floats) -> NDArray[np.intp]:
+    """Return the cells that are the nearest to a fingertip of poses (t, 7) at some time, ascending."""
     places = np.unique(tip[:, :2], axis=0)
-    nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
-    return SampledPath(time, tip, np.unique(nearest))
+    return np.unique([np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places])
 
 
 class Sums:
@@ -192,7 +178,8 @@ class Sums:
         self._first = play.state.row(0)
         self._sums = np.zeros((count, 5, len(play.runs)))
         self._following = np.zeros((count, len(play.runs)), np.intp)
-        self._ways: dict[Any, SampledPath] = {}
+        # Times, poses and nearest cells of each path: most runs of a batch share one.
+        self._ways: dict[Any, tuple[Floats, Floats, NDArray[np.intp]]] = {}
 
     def observe(self, now: Instant) -> None:
         """Sum a control period up."""
@@ -221,11 +208,10 @@ class Sums:
         same = tuple(finger.trajectory for finger in scene.fingers), time, count, period
         if same not in self._ways:
             moments = np.minimum(np.arange(count) * self._every, period) * time
-            self._ways[same] = make_path(grid, play.ways[run], moments)
-        way = self._ways[same]
-        metrics = compute_metrics_from_sums(
-            sums, way.time, way.fingertip, grid.positions, scene.set_point, way.cells
-        )
+            tip = play.ways[run].poses(moments)
+            self._ways[same] = moments, tip, find_nearest_cells(grid, tip)
+        moments, tip, cells = self._ways[same]
+        metrics = compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells)
         return report(scene, now.ended(index), metrics)
 
     def _sum(self, active: ActiveSet) -> Floats:

@@ -14,8 +14,6 @@ from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-#: First row, last row, first column, last column.
-Bounds = tuple[int, int, int, int]
 #: Center x, y and radius, m.
 Disc = tuple[float, float, float]
 #: The same of a run, or arrays (b,) of a batch, in which a radius of -inf stands for no disc.
@@ -126,29 +124,20 @@ class Grid:
         """Positions of the cells, shape (n, 2), m."""
         return np.column_stack([self.x, self.y])
 
-    def bounds(self, x: float, y: float, radius: float) -> Bounds:
-        """Return rows and columns of all cells within a radius of a point, m; a last below a first: none."""
+    def box(self, x: float, y: float, radius: float) -> Cells:
+        """Return the cells of the rows and columns that a disc may reach, m, in ascending order."""
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
-        return (
-            max(0, math.ceil((y - radius - bottom) / spacing - RELATIVE_TOLERANCE)),
-            min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + RELATIVE_TOLERANCE)),
-            max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - RELATIVE_TOLERANCE)),
-            min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + RELATIVE_TOLERANCE)),
-        )
-
-    def within(self, bounds: Bounds) -> Cells:
-        """Return the cells of some rows and columns, in ascending order."""
-        low_row, high_row, low, high = bounds
-        if low_row > high_row or low > high:
-            return np.empty(0, np.intp)
-        columns = self.layout.columns
-        rows = np.arange(low_row * columns, high_row * columns + 1, columns)
+        low_row = max(0, math.ceil((y - radius - bottom) / spacing - RELATIVE_TOLERANCE))
+        high_row = min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + RELATIVE_TOLERANCE))
+        low = max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - RELATIVE_TOLERANCE))
+        high = min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + RELATIVE_TOLERANCE))
+        rows = np.arange(low_row * plan.columns, high_row * plan.columns + 1, plan.columns)
         return (rows[:, None] + np.arange(low, high + 1)).ravel()
 
     def disc(self, x: float, y: float, radius: float) -> Cells:
         """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
-        cells = self.within(self.bounds(x, y, radius))
+        cells = self.box(x, y, radius)
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + RELATIVE_TOLERANCE)]
 

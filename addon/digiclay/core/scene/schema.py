@@ -144,12 +144,8 @@ class Finger:
 class Scene:
     """Complete definition of a session; equal scenes give equal sessions, bit for bit.
 
-    A part that is None is left out: it costs nothing, and its module is not imported.
-
-    Raises
-    ------
-    ParameterError
-        When parts do not go together; its owner is the section's name.
+    A part that is None is left out: it costs nothing, and its module is not imported. Raises ParameterError
+    when parts do not go together; its owner is the section's name.
     """
 
     layout: Layout

@@ -53,7 +53,8 @@ def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Sce
         for section in SECTIONS
         if section not in FINGER_PARTS
     }
-    method = _take_method(shared["control"])
+    method = (shared["control"] or {}).pop("method", "virtual_master")
+    find_method(method)  # refuses an unknown one
     defaults = {section: dict(values) for section, values in PRESETS[texts["preset"]].items()}
     parts: dict[str, Any] = {}
     for section, own in shared.items():
@@ -147,13 +148,6 @@ def _read_section(section: str, value: Any, owner: str = "") -> dict[str, Any] |
         return dict(value)
     rule = f"must be a section, [{section}]" + (f', or "{ABSENT}"' if section in OPTIONAL else "")
     raise ParameterError(owner + section, "", rule, show_value(value))
-
-
-def _take_method(control: dict[str, Any] | None) -> str:
-    """Take the method out of the control's section."""
-    method = (control or {}).pop("method", "virtual_master")
-    find_method(method)
-    return str(method)
 
 
 def _forms_blister(method: str, own: dict[str, Any]) -> bool:

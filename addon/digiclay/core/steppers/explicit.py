@@ -35,8 +35,6 @@ class ExplicitPlan:
 class Explicit:
     """Base of the explicit steppers, which march through the segments of a period.
 
-    Notes
-    -----
     A method that has left its region of stability throws pins from stop to stop, and the stops
     would hide it. But there are heights no pin can come to, see `Speeds.reach`. A cell that does is
     given up as infinite, which the check for finite numbers at the end of the period finds, and
