@@ -1,22 +1,25 @@
-"""The errors a run reports are honest: compared with the same commands integrated all but exactly."""
+"""The errors a run reports are honest, and the adaptive stepper keeps within its tolerance."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
-from digiclay.core.scene.scene_source import Setting, find, load
-from digiclay.core.scene.schema import Scene
+from digiclay.core.model.valve import Fluid, Valve
+from digiclay.core.scene.scene_source import SAMPLES
 from digiclay.core.session.accuracy import SHARE, Errors, estimate_errors, has_every_command
-from digiclay.core.session.run_scene import History, run
+from digiclay.core.session.run_scene import run
+
+from tests.assemble import AWAY, beginning, one_cell, record, scripted
 
 #: Shorter than the longest session, but with a press and a lift in it.
 LASTS = 0.9
 #: Errors below this are rounding and the reference's own, m and N.
 NOTHING = {"height": 1e-11, "force": 1e-9}
 #: Every sample scene, and those that meet every method.
-ALL = sorted(path.stem for path in find("tap").parent.glob("*.toml"))
+ALL = sorted(path.stem for path in SAMPLES.glob("*.toml"))
 SCENES = ("ridge_mound_valley", "tap")
 METHODS = [
     ("bernoulli", 1e-3),
@@ -33,63 +36,58 @@ CASES = [
 ]
 
 
-def scene_of(name: str, stepper: str, step: float) -> Scene:
-    """Return a sample scene with another stepper and step, cut to a few seconds."""
-    settings = [Setting("simulation.stepper", f'"{stepper}"'), Setting("simulation.physics_step", str(step))]
-    scene = load(find(name), settings)
-    short = min(scene.simulation.duration, LASTS)
-    return replace(scene, simulation=replace(scene.simulation, duration=short))
-
-
 @cache
 def judged(name: str, stepper: str, step: float) -> tuple[Errors, Errors]:
-    """Return the estimated errors of a run, and the true ones."""
-    scene = scene_of(name, stepper, step)
-    history = run(scene).history
-    assert history is not None
-    estimate = estimate_errors(scene, history)
-    assert estimate is not None
-    return estimate, _true(scene, history)
+    """Return the estimated errors of a run, and the true ones.
 
-
-def _true(scene: Scene, history: History) -> Errors:
-    """Return the errors against Richardson's form at a tenth of the step, a quarter of those of 1 ms.
-
-    That is a fifth, or half, of the step of the judge itself. Its error is some 1e-11 m, where the best of
-    the cases has 4e-11 m.
+    The true ones are those against Richardson's form at a tenth of the step, a quarter of those of 1 ms. That
+    is a fifth, or half, of the step of the judge itself. Its error is some 1e-11 m, where the best of the
+    cases has 4e-11 m.
     """
-    step = 1e-3 if scene.simulation.physics_step > 1e-3 else 5e-4
-    errors = estimate_errors(
-        replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=step)), history
-    )
-    assert errors is not None
+    scene = beginning(name, LASTS, stepper, step)
+    history = run(scene).history
+    finer = replace(scene.simulation, stepper="richardson", physics_step=1e-3 if step > 1e-3 else 5e-4)
+    estimate, true = (estimate_errors(one, history) for one in (scene, replace(scene, simulation=finer)))
     # `estimate_errors` makes an estimate of the difference; here the difference is wanted.
-    return Errors(errors.height / SHARE, errors.force / SHARE, errors.total_force / SHARE)
+    return estimate, Errors(true.height / SHARE, true.force / SHARE, true.total_force / SHARE)
 
 
-@pytest.mark.parametrize("kind", ["height", "force"])
 @pytest.mark.parametrize(("name", "stepper", "step"), CASES)
 def test_the_true_error_is_at_most_twice_the_estimate_and_that_no_more_than_twenty_times_it(
-    name: str, stepper: str, step: float, kind: str
+    name: str, stepper: str, step: float
 ) -> None:
-    estimate, true = (getattr(errors, kind) for errors in judged(name, stepper, step))
-    assert true <= 2.0 * estimate + NOTHING[kind]
-    assert estimate <= 20.0 * true + NOTHING[kind]
+    for kind, nothing in NOTHING.items():
+        estimate, true = (getattr(errors, kind) for errors in judged(name, stepper, step))
+        assert true <= 2.0 * estimate + nothing, kind
+        assert estimate <= 20.0 * true + nothing, kind
 
 
-def test_a_run_that_was_thinned_cannot_be_estimated() -> None:
-    scene = scene_of("tap", "bernoulli", 1e-3)
-    assert scene.recorder is not None
+def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summary_tells_it() -> None:
+    scene = beginning("tap", LASTS, "bernoulli", 1e-3)
     assert not has_every_command(replace(scene, recorder=replace(scene.recorder, every=2)))
+    result = run(scene)
+    assert estimate_errors(scene, result.history, stopped=lambda: True) is None
+    said = result.with_errors(Errors(2e-6, 5e-4, 1e-3)).summary()
+    assert said.endswith("height error about 2 µm, force error about 0.5 mN")
 
 
-def test_no_estimate_is_made_once_it_is_stopped() -> None:
-    scene = scene_of("tap", "bernoulli", 1e-3)
-    history = run(scene).history
-    assert history is not None
-    assert estimate_errors(scene, history, stopped=lambda: True) is None
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("name", [*SCENES, "slow_press"])
+def test_the_adaptive_stepper_keeps_the_heights_within_its_tolerance(name: str, tolerance: float) -> None:
+    scene = beginning(name, 1.2, "adaptive", 5e-3, f"simulation.tolerance={tolerance}")
+    # The reference is Richardson's extrapolation at half of 1 ms. Another half changes the errors by 2e-11 m.
+    exact = replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=1e-3))
+    assert estimate_errors(exact, run(scene).history).height <= tolerance
 
 
-def test_the_summary_tells_the_errors() -> None:
-    result = run(scene_of("tap", "bernoulli", 1e-3)).with_errors(Errors(2e-6, 5e-4, 1e-3))
-    assert result.summary().endswith("height error about 2 µm, force error about 0.5 mN")
+def test_a_free_pin_keeps_within_the_tolerance_over_many_commands() -> None:
+    # The errors of a pin that nothing presses add up: 60 reversals of a valve that is turbulent in between.
+    script = scripted(lambda t, x, y: (1.0, -0.6, 0.8, -1.0, 0.3, -0.2)[round(t / 20e-3) % 6])
+    parts = {"valve": Valve(orifice_diameter=0.8e-3), "fluid": Fluid(760.0, 0.65e-6)}
+    known = {"control": script, "period": 20e-3, "dead_time": 0.0, **parts}
+    exact, found = (
+        record(one_cell(stepper=name, step=step, **known), AWAY, 60).height
+        for name, step in (("bernoulli", 0.1e-3), ("adaptive", 20e-3))
+    )
+    assert np.ptp(found) > 1e-3
+    assert np.abs(found - exact).max() <= one_cell(stepper="adaptive").stepper.tolerance

@@ -10,45 +10,22 @@ stand still, and the pulp over them relaxes exponentially.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from types import SimpleNamespace as Numbers
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.system import System
 from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from tests.assemble import Record, record, sample
 
-Floats = NDArray[np.float64]
-
 #: A valve open less than this lets through 1e-14 of its full flow: 1 nm in the whole session.
 SHUT = 1e-7
 #: How far a pin and the finger together come closer in a period, at most, m.
 MARGIN = 1e-3
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """The parameters, read off the system."""
-
-    area: float
-    high: float
-    low: float
-    laminar: float
-    turbulent: float
-    resistance: float
-    knee: float
-    lag: float
-    dead_time: float
-    b: float
-    m: float
-    share: float
-    rates: Floats
-    weights: Floats
-    axes: Floats
 
 
 def numbers() -> Numbers:
@@ -117,15 +94,9 @@ def integrate(p: Numbers, curve: CubicHermiteSpline, system: System, run: Record
 
 
 def advance(
-    p: Numbers,
-    curve: CubicHermiteSpline,
-    x: Floats,
-    y: Floats,
-    full: Floats,
-    command: Floats,
-    start: float,
-    end: float,
-) -> None:
+    p: Numbers, curve: CubicHermiteSpline, x: Floats, y: Floats, full: Floats, command: Floats,
+    start: float, end: float,
+) -> None:  # fmt: skip
     """Integrate the cells that something happens to from `start` to `end`, in place; all others relax."""
     lowest = np.minimum(underside(p, curve(start), x, y), underside(p, curve(end), x, y))
     near = full[0] + MARGIN > lowest
