@@ -15,7 +15,7 @@ from digiclay.core.session.run_scene import run
 from tests.assemble import AWAY, beginning, one_cell, record, scripted
 
 #: Shorter than the longest session, but with a press and a lift in it.
-LASTS = 0.9
+LASTS = 0.6
 #: Errors below this are rounding and the reference's own, m and N.
 NOTHING = {"height": 1e-11, "force": 1e-9}
 #: Every sample scene, and those that meet every method.
@@ -74,7 +74,7 @@ def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summar
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("name", [*SCENES, "slow_press"])
 def test_the_adaptive_stepper_keeps_the_heights_within_its_tolerance(name: str, tolerance: float) -> None:
-    scene = beginning(name, 1.2, "adaptive", 5e-3, f"simulation.tolerance={tolerance}")
+    scene = beginning(name, LASTS, "adaptive", 5e-3, f"simulation.tolerance={tolerance}")
     # The reference is Richardson's extrapolation at half of 1 ms. Another half changes the errors by 2e-11 m.
     exact = replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=1e-3))
     assert estimate_errors(exact, run(scene).history).height <= tolerance

@@ -152,7 +152,7 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
         ("elastic_press", {"stiffness": (10, 40), "settling_time": (20e-3, 40e-3)}, ("duration=0.5",), False),
         ("plastic_press", {"yield_force": (0.02, 0.05), "damping": (5, 8)}, ("duration=0.5",), False),
         *(
-            ("tap", {"force_gain": (3, 5)}, (f"stepper={by}", f"physics_step={step}", "duration=0.17"), wrong)
+            ("tap", {"force_gain": (3, 5)}, (f"stepper={by}", f"physics_step={step}", "duration=0.2"), wrong)
             for by, step, wrong in (
                 ("richardson", "5e-4", True), ("adaptive", "5e-3", False), ("runge_kutta_4", "1e-3", True),
             )
