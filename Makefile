@@ -84,13 +84,13 @@ guide-pictures: ## follow the guide in a window, and retake its pictures
 test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids; reproduce the paper
 	@tools/programs .reports/proof.log "admesh assimp prusa-slicer" "admesh assimp-utils prusa-slicer"
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids, the paper" 600 -- $(HANGS) tests/proof
+	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids, the paper" 600 -- $(HANGS) -n auto --dist loadfile tests/proof
 
 docs: ## build the site in site/, without a warning, and check it: links, search in a browser, commands of all pages
 	@$(ENVIRONMENT) requirements/docs.txt $(IN_311)
 	@tools/programs .reports/docs.log "chromium chromedriver" "chromium chromium-driver"
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --quiet
-	@rm -f .reports/docs.txt; $(PART) .reports/docs.txt "the site: links, search, commands of all pages" 1500 -- tests/site
+	@rm -f .reports/docs.txt; $(PART) .reports/docs.txt "the site: links, search, commands of all pages" 1500 -- -n auto --dist loadgroup tests/site
 
 test-release: ## release a copy, and run its wheel in bare Pythons 3.11, 3.12, 3.13 with lowest and highest libraries
 	@$(ENVIRONMENT) requirements/release.txt $(IN_311)
