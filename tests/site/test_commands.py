@@ -115,12 +115,12 @@ def _commands() -> list[Command]:
 
 
 def _place(page: Path) -> Any:
-    """Return a page as a case; those that call `make`, which works in the checkout, run one after the other."""
+    """Return a page as a case; those that call `make` in the checkout run one after the other."""
     marks = [pytest.mark.xdist_group("make")] if "make demo" in page.read_text(encoding="utf-8") else []
     return pytest.param(page, marks=marks, id=page.relative_to(ROOT).as_posix())
 
 
-@pytest.mark.parametrize("page", map(_place, PAGES))
+@pytest.mark.parametrize("page", [_place(page) for page in PAGES])
 def test_every_command_of_the_page_is_carried_out(page: Path, tmp_path: Path) -> None:
     assert play(page.read_text(encoding="utf-8"), tmp_path, _excused()) == []
 
