@@ -110,8 +110,7 @@ def test_a_session_without_a_shape_is_what_it_was_before() -> None:
     assert one["total_force"].max() > 0.1
 
 
-@pytest.mark.parametrize("moment", [0.3, 3.0])
-@pytest.mark.parametrize("method", EDITING)
+@pytest.mark.parametrize(("method", "moment"), [("elastic", 0.3), *((method, 3.0) for method in EDITING)])
 def test_a_state_is_kept_and_taken_up_bit_for_bit(method: str, moment: float) -> None:
     # While the shape is coming up, and while the finger presses it.
     made = scene(method)

@@ -81,7 +81,7 @@ def test_without_a_touch_the_shape_comes_out_as_it_went_in(tmp_path: Path, shape
 def test_the_folder_alone_repeats_the_run(tmp_path: Path) -> None:
     source = tmp_path / "shape.npy"
     np.save(source, np.eye(4))
-    out = form(tmp_path, str(source))
+    out = form(tmp_path, str(source), "--finger", "press")
     source.unlink()
     again = run(load(out / "scene.toml")).history
     assert again

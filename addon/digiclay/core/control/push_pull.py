@@ -119,15 +119,15 @@ class PushPullControl:
 
     def _drag_targets(self, seen: Measurement, listening: Flags) -> Floats:
         """Return the targets after a cycle; what the cells remember is brought up to date in place."""
-        known, left = self.parameters, seen.own[0]
+        gains, left = self.parameters, seen.own[0]
         error = seen.target - seen.height
         # A height dragged to the threshold lies on it, but for rounding.
-        moved = (np.abs(error) > known.threshold * (1.0 + RELATIVE_TOLERANCE)) & listening
+        moved = (np.abs(error) > gains.threshold * (1.0 + RELATIVE_TOLERANCE)) & listening
         was = left > 0.0
-        cycles = 1.0 + round(known.release_time / (CYCLE * self.period))
+        cycles = 1.0 + round(gains.release_time / (CYCLE * self.period))
         left[:] = np.where(moved, cycles, np.where(listening, np.maximum(left - 1.0, 0.0), 0.0))
         released = was & (left == 0.0)
-        play = np.minimum(np.maximum(error, -known.threshold), known.threshold)
+        play = np.minimum(np.maximum(error, -gains.threshold), gains.threshold)
         followed: Floats = np.where(moved, seen.height + play, seen.target)
         seen.own[1] = np.where(moved, followed - seen.target, 0.0) / (CYCLE * self.period)
         np.putmask(followed, released, seen.height)

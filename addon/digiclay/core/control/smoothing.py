@@ -123,8 +123,9 @@ def order_periods(
 ) -> Iterator[Controller]:
     """Yield the controller of each control period, s, by its row of orders (t, 4)."""
     # As quick as a display is, and never quicker than the control period allows.
-    known = DriveParameters(settling_time=max(DriveParameters().settling_time, 2.0 * period))
-    drive, margin = make_drive(known, cell, period), MARGIN * max(grid.layout.pitch, grid.layout.row_spacing)
+    parameters = DriveParameters(settling_time=max(DriveParameters().settling_time, 2.0 * period))
+    drive = make_drive(parameters, cell, period)
+    margin = MARGIN * max(grid.layout.pitch, grid.layout.row_spacing)
     for x, y, radius, strength in orders.tolist():
         if radius == 0.0:
             yield method

@@ -55,11 +55,11 @@ def find_start(pid: int) -> float | None:
 def _find_start_in_linux(pid: int) -> float | None:
     """Return when a process was started, from /proc."""
     try:
-        told = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
         booted = re.search(r"^btime (\d+)$", Path("/proc/stat").read_text(encoding="ascii"), re.MULTILINE)
     except OSError:
         return None
-    state, *fields = told.rpartition(")")[2].split()  # the command's name may hold blanks and brackets
+    state, *fields = status.rpartition(")")[2].split()  # the command's name may hold blanks and brackets
     if state in "ZX":  # it has ended, and its parent has not asked how
         return None
     return int(booted[1]) + int(fields[18]) / os.sysconf("SC_CLK_TCK") if booted else 0.0
@@ -68,11 +68,11 @@ def _find_start_in_linux(pid: int) -> float | None:
 def _ask_ps(pid: int) -> float | None:
     """Return when a process was started, from ps; macOS has no /proc."""
     with suppress(OSError, ValueError, subprocess.SubprocessError):
-        told = subprocess.run(
+        answer = subprocess.run(
             ["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=10.0,
             env={**os.environ, "LC_ALL": "C"}, check=False,
         ).stdout.strip()  # fmt: skip
-        return time.mktime(time.strptime(told, "%a %b %d %H:%M:%S %Y")) if told else None
+        return time.mktime(time.strptime(answer, "%a %b %d %H:%M:%S %Y")) if answer else None
     return 0.0
 
 

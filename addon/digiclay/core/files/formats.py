@@ -45,7 +45,7 @@ class Head(NamedTuple):
 
 def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
     """Return what arrays of a file .npz are; KeyError without one, ValueError for a head that is untrue."""
-    found = {}
+    heads = {}
     for name in names:
         entry = archive.getinfo(f"{name}.npy")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
@@ -55,8 +55,8 @@ def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head
             actual = entry.file_size - file.tell()
         if head.size != actual:
             raise ValueError(f"{name} must have {head.size:,} bytes, as its head says (got {actual:,})")
-        found[name] = head
-    return found
+        heads[name] = head
+    return heads
 
 
 def _head(file: IO[bytes], name: str) -> Head:

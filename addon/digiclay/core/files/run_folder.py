@@ -81,19 +81,19 @@ def is_unfinished(path: Path) -> bool:
 def remove_abandoned(folder: Path, name: str = "") -> None:
     """Remove what ended processes of this machine left unfinished of a name, or of any."""
     try:
-        found = sorted(folder.iterdir())
+        paths = sorted(folder.iterdir())
     except OSError:
         return
-    for path in found:
-        known = UNFINISHED.fullmatch(path.name)
+    for path in paths:
+        match = UNFINISHED.fullmatch(path.name)
         # Nothing here tells whether other machines are still at what they prepare on a shared drive.
-        if known is None or (name and known["name"] != name) or known["host"] not in (None, find_host()):
+        if match is None or (name and match["name"] != name) or match["host"] not in (None, find_host()):
             continue
         with suppress(OSError):
-            if may_have_made(int(known["pid"]), path.lstat().st_mtime):
+            if may_have_made(int(match["pid"]), path.lstat().st_mtime):
                 continue
-            target = path.with_name(known["name"])
-            if known["kind"] == "old" and not os.path.lexists(target):
+            target = path.with_name(match["name"])
+            if match["kind"] == "old" and not os.path.lexists(target):
                 path.rename(target)
             elif path.is_dir() and not path.is_symlink():
                 shutil.rmtree(path, ignore_errors=True)

@@ -32,13 +32,13 @@ def parse_tables(text: str) -> dict[str, Any]:
         raise ValueError(f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)")
     for piece in _PIECES.finditer(text):
         if piece["key"]:
-            said = f"a key must have at most {PARTS} names, got {piece['key'][:20]}..."
+            rule = f"a key must have at most {PARTS} names, got {piece['key'][:20]}..."
         elif piece["word"] and len(piece["word"]) > LETTERS:
-            said = f"a word or number must have at most {LETTERS} letters, got {len(piece['word'])}"
+            rule = f"a word or number must have at most {LETTERS} letters, got {len(piece['word'])}"
         else:
             continue
         line = text.count("\n", 0, piece.start()) + 1
-        raise ValueError(f"{said} (at line {line})")
+        raise ValueError(f"{rule} (at line {line})")
     return tomllib.loads(text)
 
 
@@ -72,15 +72,15 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
 
 def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
     """Build a part from its section `own`; `defaults`: values that differ from the class's own."""
-    known = list_quantities(kind)
-    refuse_unknown(section, own, (*known, "method") if section == "control" else tuple(known))
-    given = {key: _measured(section, key, value, known[key].unit) for key, value in own.items()}
+    quantities = list_quantities(kind)
+    refuse_unknown(section, own, (*quantities, "method") if section == "control" else tuple(quantities))
+    given = {key: _measured(section, key, value, quantities[key].unit) for key, value in own.items()}
     try:
         return kind(**{**defaults, **given})
     except ParameterError as error:
         rule = error.rule.replace(f"{error.owner}.", f"{section}.")
-        said = own.get(error.field)
-        value = show_value(said) if isinstance(said, str) else shorten(error.value)
+        own_value = own.get(error.field)
+        value = show_value(own_value) if isinstance(own_value, str) else shorten(error.value)
         raise ParameterError(section, error.field, rule, value, error.hint) from None
 
 

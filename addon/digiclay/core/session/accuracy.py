@@ -150,8 +150,8 @@ def estimate_errors(
     done, largest = len(history["time"]) - 1, np.zeros(3)
     for row, state in enumerate(periods(system, scene.trajectories(), begin(system), done), 1):
         height, force = state.row(0), state.row(system.rows.force)
-        found = compare(height, force, history["height"][row], history["force"][row])
-        np.maximum(largest, found, out=largest)
+        apart = compare(height, force, history["height"][row], history["force"][row])
+        np.maximum(largest, apart, out=largest)
         if progress:
             progress(row, done)
         if stopped and stopped():
@@ -208,7 +208,7 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
         if not np.isfinite(state.active.block).all():
             return begin_stretch(reset(monitor), after), None
         if not waiting and monitor.reached is not None:
-            found = compare(state.row(0), state.row(system.rows.force), *monitor.reached)
-            return replace(monitor, state=None, waiting=(), reached=None), Errors.estimate(found)
+            apart = compare(state.row(0), state.row(system.rows.force), *monitor.reached)
+            return replace(monitor, state=None, waiting=(), reached=None), Errors.estimate(apart)
         monitor = replace(monitor, state=state, waiting=tuple(waiting), done=monitor.done + 1)
     return monitor, None

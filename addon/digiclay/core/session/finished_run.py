@@ -55,11 +55,11 @@ def read_run(folder: Path, *names: str) -> Run:
     try:
         with zipfile.ZipFile(path) as archive:
             kept = {Path(name).stem for name in archive.namelist()}
-            held = read_heads(
+            heads = read_heads(
                 archive, [name for name in ("time", *names) if name in kept or name not in LATER]
             )
-            _refuse(path, scene, held)
-            history = {name: read_array(archive, name) for name in held}
+            _refuse(path, scene, heads)
+            history = {name: read_array(archive, name) for name in heads}
     except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
         raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
     for name, values in history.items():
@@ -71,25 +71,25 @@ def read_run(folder: Path, *names: str) -> Run:
     return Run(scene, history)
 
 
-def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
+def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     """Refuse arrays that a run of this scene does not leave, before they are unpacked."""
-    rows = held["time"].shape[0] if held["time"].shape else 0
+    rows = heads["time"].shape[0] if heads["time"].shape else 0
     most = (scene.recorder or Recorder()).rows(scene.periods)
     if not 0 < rows <= most:
         rule = f"must have from 1 to the {most:,} rows of its scene's {scene.periods:,} control periods"
         raise OutputError(f"{path} {rule} (got {rows:,}).")
-    known = {"n": scene.cells, "t": rows}
-    for name, head in held.items():
-        shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
+    sizes = {"n": scene.cells, "t": rows}
+    for name, head in heads.items():
+        shape = tuple(sizes[size] if isinstance(size, str) else size for size in SHAPES[name])
         if head.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
         kinds, called = KINDS.get(name, ("if", "numbers"))
         if head.kind.kind not in kinds or head.kind.itemsize > 8:
             raise OutputError(f"{path}: {name} must hold {called} of at most 8 bytes (got {head.kind}).")
-    size, free = sum(head.size for head in held.values()), measure_available_memory()
+    size, free = sum(head.size for head in heads.values()), measure_available_memory()
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
-        raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(held)}).")
+        raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(heads)}).")
 
 
 def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:

@@ -106,10 +106,10 @@ class Film(Moving):
 
     def rows(self, time: Sequence[float] | Floats) -> NDArray[np.intp]:
         """Return the recorded row nearest to each frame; the parameters are those of `moments`."""
-        moments, known = self.moments(time), np.asarray(time, dtype=np.float64)
-        after = np.searchsorted(known, moments).clip(0, len(known) - 1)
+        moments, times = self.moments(time), np.asarray(time, dtype=np.float64)
+        after = np.searchsorted(times, moments).clip(0, len(times) - 1)
         before = (after - 1).clip(0)
-        nearer = moments - known[before] < known[after] - moments
+        nearer = moments - times[before] < times[after] - moments
         return np.where(nearer, before, after)
 
 

@@ -77,9 +77,9 @@ class Result:
 
     def with_errors(self, errors: Errors) -> Result:
         """Return the result with its estimated errors among the metrics."""
-        found = {f"{name}_error": value for name, value in asdict(errors).items()}
-        units = {name: ERRORS[name].unit for name in found}
-        return replace(self, metrics={**self.metrics, **found, "units": {**self.metrics["units"], **units}})
+        added = {f"{name}_error": value for name, value in asdict(errors).items()}
+        units = {name: ERRORS[name].unit for name in added}
+        return replace(self, metrics={**self.metrics, **added, "units": {**self.metrics["units"], **units}})
 
 
 class Ended(NamedTuple):
@@ -111,14 +111,14 @@ def evaluate(
         "total_force": rows["force"].sum(axis=1),
         "position": system.grid.positions,
     }
-    found: dict[str, Any] = compute_metrics(history, scene.set_point)
+    metrics: dict[str, Any] = compute_metrics(history, scene.set_point)
     if system.cell.touch is not None:
         depth = find_indentations(system.cell.touch.fingertip, history)
-        found["max_indentation"] = float(depth.max())
-        found["beyond_a_finger"] = describe_excess(found["max_total_force"], found["max_indentation"])
-        if found["beyond_a_finger"]:
+        metrics["max_indentation"] = float(depth.max())
+        metrics["beyond_a_finger"] = describe_excess(metrics["max_total_force"], metrics["max_indentation"])
+        if metrics["beyond_a_finger"]:
             history["beyond_a_finger"] = is_beyond(history["total_force"], depth)
-    return replace(report(scene, ended, found, versions), history=history)
+    return replace(report(scene, ended, metrics, versions), history=history)
 
 
 def report(

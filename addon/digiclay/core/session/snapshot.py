@@ -111,7 +111,7 @@ class Snapshot:
 
 def dump(system: System, state: State) -> bytes:
     """Return a state as bytes, which do not change as the session continues."""
-    held, rows = state.active, system.rows
+    active, rows = state.active, system.rows
     arrays: list[NDArray[Any]] = []
     memory = flatten(state.memory, arrays)
     header = {
@@ -121,12 +121,12 @@ def dump(system: System, state: State) -> bytes:
         "period": state.period,
         "peak": state.peak,
         "gathered": {
-            "cells": held.cells.size,
-            "near": held.near,
-            "fingers": [{"reach": held.reach}],
-            "control": held.control,
-            "peak": held.peak,
-            "until": held.until,
+            "cells": active.cells.size,
+            "near": active.near,
+            "fingers": [{"reach": active.reach}],
+            "control": active.control,
+            "peak": active.peak,
+            "until": active.until,
         },
         "memory": memory,
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
@@ -138,9 +138,9 @@ def dump(system: System, state: State) -> bytes:
             (state.rows, "<f8"),
             (state.modes, "i1"),
             (state.aged, "<f8"),
-            (held.cells, "<i8"),
-            (held.block, "<f8"),
-            (held.mode, "i1"),
+            (active.cells, "<i8"),
+            (active.block, "<f8"),
+            (active.mode, "i1"),
         )
     ]
     # One copy: the arrays are joined as they stand.
@@ -161,7 +161,7 @@ def load(system: System, data: bytes) -> State:
     template = system.controller.begin()
     gathered = header["gathered"]
     cells = kept.arrays["cells"].astype(np.intp)
-    held = ActiveSet(
+    active = ActiveSet(
         rows,
         cells,
         gathered["near"],
@@ -180,7 +180,7 @@ def load(system: System, data: bytes) -> State:
         kept.arrays["modes"],
         kept.arrays["aged"],
         header["peak"],
-        held,
+        active,
         memory,
     )
 
@@ -218,10 +218,10 @@ def _read(data: bytes) -> Snapshot:
         first = len(START) + 4
         length = int.from_bytes(data[len(START) : first], "little")
         header = json.loads(data[first : first + length])
-        cells, held = read_count(header["cells"]), header["gathered"]
+        cells, gathered = read_count(header["cells"]), header["gathered"]
         if data.startswith(FIRST):
-            held = header["gathered"] = {**held, "fingers": [{"reach": held["reach"]}]}
-        count, taken = Rows(*map(read_count, header["rows"])).count, read_count(held["cells"])
+            gathered = header["gathered"] = {**gathered, "fingers": [{"reach": gathered["reach"]}]}
+        count, taken = Rows(*map(read_count, header["rows"])).count, read_count(gathered["cells"])
         shapes: list[tuple[str, tuple[int, ...]]] = [
             ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),
             ("<i8", (taken,)), ("<f8", (count, taken)), ("i1", (taken,)),
@@ -230,14 +230,14 @@ def _read(data: bytes) -> Snapshot:
         arrays, end = _read_arrays(data, first + length, shapes)
         if end != len(data):
             raise _make_error(f"must have {end} bytes and has {len(data)}")
-        numbers = [header["peak"], held["peak"], header["control_period"]]
-        numbers += [read_count(value) for value in (header["period"], held["until"], held["near"])]
-        discs = [held["control"], *(finger["reach"] for finger in held["fingers"])]
+        numbers = [header["peak"], gathered["peak"], header["control_period"]]
+        numbers += [read_count(value) for value in (header["period"], gathered["until"], gathered["near"])]
+        discs = [gathered["control"], *(finger["reach"] for finger in gathered["fingers"])]
         numbers += [number for disc in discs for number in _read_disc(disc) or ()]
         names = ("rows", "modes", "aged", "cells", "block", "mode")
         kept = Snapshot(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
         # A memory of nothing is None; one that is not there at all is damage.
-        sound = "memory" in header and held["near"] <= taken and all(map(math.isfinite, numbers))
+        sound = "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
         raise _make_error(f"is damaged: {type(error).__name__}") from None
     if not sound or not _is_sound(kept, cells):
@@ -249,14 +249,14 @@ def _read_arrays(
     data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]
 ) -> tuple[list[NDArray[Any]], int]:
     """Return copies of the arrays that stand in `data` from a place on, and where they end."""
-    found = []
+    arrays = []
     for name, shape in shapes:
         kind, count = np.dtype(name), math.prod(shape)
         if kind.hasobject or kind.itemsize == 0 or at + count * kind.itemsize > len(data):
             raise ValueError(f"no room for {count} of {kind}")
-        found.append(np.frombuffer(data, kind, count, at).reshape(shape).copy())
+        arrays.append(np.frombuffer(data, kind, count, at).reshape(shape).copy())
         at += count * kind.itemsize
-    return found, at
+    return arrays, at
 
 
 def _is_sound(kept: Snapshot, count: int) -> bool:

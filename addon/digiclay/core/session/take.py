@@ -172,15 +172,15 @@ def from_bytes(data: bytes) -> Take:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             there = archive.namelist()
             names = [*PARTS, *(name for name in ("version", SMOOTHING) if f"{name}.npy" in there)]
-            held = read_heads(archive, names)
+            heads = read_heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to no more than it is.
-            size = sum(head.size for head in held.values())
+            size = sum(head.size for head in heads.values())
             if size > len(data):
                 raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
             parts = {name: read_array(archive, name) for name in names}
         scene, start, poses, end = (parts[name] for name in PARTS)
         if "version" not in parts:
-            poses = poses[:, None]  # the first version held one finger
+            poses = poses[:, None]  # the first version had one finger
         elif not PLAIN <= int(parts["version"].reshape(())) <= VERSION:
             raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
         resolved = resolve(parse_tables(scene.tobytes().decode()))
