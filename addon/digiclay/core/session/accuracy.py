@@ -41,14 +41,11 @@ STRETCH, PAUSE, SPREAD = 20, 180, 4
 
 @dataclass(frozen=True)
 class Errors:
-    """Largest errors over all cells: over all rows of a run, or at the end of a stretch of a live session."""
+    """Largest errors of height, m, force of a cell, N, and total, N: of a run, or at a live stretch's end."""
 
     height: float
-    """m."""
     force: float
-    """Of a cell, N."""
     total_force: float
-    """Of all cells together, N."""
 
     @classmethod
     def estimate(cls, largest: Floats) -> Errors:

@@ -83,14 +83,11 @@ class Result:
 
 
 class Ended(NamedTuple):
-    """End of a session."""
+    """End of a session: control periods done, time they took, s, losses where the controller counts them."""
 
     periods: int
-    """Control periods done."""
     run_time: float
-    """Time the simulation took, s."""
     losses: int | None
-    """In the controller's memory; None if that does not count."""
 
 
 def evaluate(

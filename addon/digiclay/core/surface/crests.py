@@ -335,14 +335,11 @@ class Crest:
 
 
 class Ridge(NamedTuple):
-    """Part of a feature: lines that meet, or a mound."""
+    """Part of a feature: lines that meet, longest first, or a mound; its top (m, 2) and half width, m."""
 
     crests: tuple[Crest, ...]
-    """The longest first; none for a mound."""
     core: Floats
-    """(m, 2): Places along the top, m."""
     half: float
-    """Half its width, m."""
 
 
 def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[Ridge, ...]:

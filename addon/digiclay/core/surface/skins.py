@@ -205,20 +205,15 @@ def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) ->
 
 @dataclass(frozen=True, eq=False)
 class SurfaceGrid:
-    """Points of a skin, row by row."""
+    """Rows and columns of points of a skin, `parts` a pitch: in plan (m, 2), now and before (m,), m."""
 
     formed: Formed
-    """The pins under it."""
     parts: int
-    """Points a pitch."""
     position: Floats
-    """(m, 2): Points in plan, m."""
     height: Floats
     former: Floats
-    """(m,): The skin, and the skin as it was before, m."""
     rows: int
     columns: int
-    """Of points."""
 
     @cached_property
     def faces(self) -> Faces:
