@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.window.blender_window import Seen
 
-PLAYED = {"script": "see_the_form.py", "size": (1000, 640), "by_hand": True}
+PLAYED = {"script": "see_the_form.py", "by_hand": True}
 #: Orange pixels that have another cause than an outline: the dot at the origin of an object, icons.
 FEW = 150
 
