@@ -13,22 +13,36 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session import live_session
 from digiclay.device import unit
 from digiclay.device.instant import Instant
+from digiclay.live import handlers
+from digiclay.sessions import running
 
 from tests.blender.at_hand import done
 
 
+def enable(on: bool) -> None:
+    """Enable the extension, or take it back, unless it is so already."""
+    if on != hasattr(bpy.types.Object, "digiclay"):
+        (digiclay.register if on else digiclay.unregister)()
+
+
 @pytest.fixture(scope="module", autouse=True)
-def factory_settings() -> None:
-    """Start every file of tests from Blender's own preferences and add-ons."""
+def factory_settings() -> Iterator[None]:
+    """Start every file of tests from Blender's own preferences and add-ons.
+
+    What stays registered after the last one crashes or hangs Blender at its exit.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=False)
+    yield
+    enable(False)
 
 
 @pytest.fixture(autouse=True)
-def factory_file() -> None:
-    """Start every test from Blender's factory file: a cube, a camera, a lamp.
+def factory_file(request: pytest.FixtureRequest) -> None:
+    """Start every test from Blender's factory file, with a cube, and with the extension where it asks for it.
 
-    Preferences stay within a file of tests: to load them too takes five times as long.
+    Preferences and the extension stay within a file of tests: each takes twice as long as the file.
     """
+    enable("extension" in request.fixturenames)
     bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
 
 
@@ -39,11 +53,12 @@ def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def extension() -> Iterator[None]:
-    """Enable the extension and take it back: what stays registered crashes or hangs Blender at exit."""
-    digiclay.register()
+def extension(factory_file: None) -> Iterator[None]:
+    """End all sessions of a test, with which the extension is enabled, and its messages."""
     yield
-    digiclay.unregister()
+    handlers.end_all("ended with its test")
+    running.TABLE.selected.clear()
+    running.set_message("")
 
 
 @pytest.fixture
@@ -63,13 +78,11 @@ def formed() -> Instant:
 
 
 @pytest.fixture
-def watched(factory_file: None) -> Iterator[None]:
-    """Enable the extension and look after beds as in a window, in an empty scene; take all back."""
-    digiclay.register()
+def watched(extension: None) -> Iterator[None]:
+    """Look after beds as in a window, in an empty scene; take all back."""
     unit.watch()
     bpy.ops.object.select_all(action="SELECT")
     bpy.ops.object.delete()
     done("Empty")
     yield
     unit.unregister()
-    digiclay.unregister()

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.control.methods import METHODS
+from digiclay.core.model.layout import Layout
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
 from digiclay.settings import own_presets, properties
-from digiclay.settings.devices import BEDS
+from digiclay.settings.devices import BEDS, make_scene
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -33,20 +34,24 @@ def add(**chosen: Any) -> Any:
     return bpy.context.object
 
 
-@pytest.mark.parametrize(
-    ("chosen", "table"),
-    [
-        ({}, {}),
-        *(({"method": name}, {"control": {"method": name}}) for name in METHODS),
-        *(({"preset": name}, {"preset": name}) for name in PRESETS),
-    ],
-)
-def test_a_bed_is_a_scene_files_but_for_the_ground(chosen: dict[str, str], table: dict[str, Any]) -> None:
-    wanted = resolve(table)
-    if wanted.method == "virtual_master":
-        wanted = resolve({**table, "control": {"ground": "cell"}})
-    bed = add(**chosen)
-    assert properties.scene_of(bed) == wanted.with_sections(name=bed.name)
+#: What can be chosen, and the scene file of it.
+CHOICES: list[tuple[dict[str, str], dict[str, Any]]] = [
+    ({}, {}),
+    *(({"preset": name}, {"preset": name}) for name in PRESETS),
+    *(({"method": name}, {"control": {"method": name}}) for name in METHODS),
+]
+
+
+def test_a_bed_is_a_scene_files_but_for_the_ground() -> None:
+    for number, (chosen, table) in enumerate(CHOICES):
+        wanted = resolve(table)
+        if wanted.method == "virtual_master":
+            wanted = resolve({**table, "control": {"ground": "cell"}})
+        made = make_scene(chosen.get("preset", "paper"), Layout(), chosen.get("method", "virtual_master"))
+        assert made.with_sections(name=wanted.name) == wanted, chosen
+        if number in (0, 2, len(CHOICES) - 1):
+            bed = add(**chosen)
+            assert properties.scene_of(bed) == wanted.with_sections(name=bed.name), chosen
 
 
 def test_a_preset_of_the_user_s_own_is_offered_and_taken(preset: str) -> None:
@@ -64,7 +69,7 @@ def test_another_method_than_the_preset_s_brings_its_own_gains(preset: str) -> N
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 9), (6, 6)])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
 def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows: int, columns: int, method: str) -> None:
-    scene = properties.scene_of(add(rows=rows, columns=columns, method=method))
+    scene = make_scene("paper", Layout(rows=rows, columns=columns), method)
     assert scene.blister.radius <= max(rows, columns) * 3e-3 / 2 * (1 + 1e-9)
     assert scene.blister.flat_radius < scene.blister.radius < scene.blister.edge_radius
 

@@ -21,16 +21,13 @@ from tests.assemble import replayed
 pytestmark = pytest.mark.usefixtures("extension")
 
 
-@pytest.mark.parametrize("name", list_samples())
-def test_every_sample_session_opens_as_the_bed_it_describes(name: str) -> None:
+@pytest.mark.parametrize("name", ["ridge_mound_valley", "dome_peaked", list_samples()[-1]])
+def test_a_sample_session_opens_as_the_bed_it_describes(name: str) -> None:
     assert bpy.ops.digiclay.add_sample(sample=f"session:{name}", take=False) == {"FINISHED"}
     bed, wanted = bpy.context.object, load(find(name))
     made = properties.scene_of(bed)
-    assert (made.layout, made.control, made.section("fingertip")) == (
-        wanted.layout,
-        wanted.control,
-        wanted.section("fingertip"),
-    )
+    for section in ("layout", "control", "fingertip"):
+        assert made.section(section) == wanted.section(section)
     start = wanted.section("trajectory").waypoints[0].position
     # 32 bits of a few tenths of a Blender unit.
     assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - start).max() < 1e-7
@@ -39,8 +36,8 @@ def test_every_sample_session_opens_as_the_bed_it_describes(name: str) -> None:
     assert made.shape is None or made.shape.heights
 
 
-@pytest.mark.parametrize("name", list_shapes())
-def test_every_sample_shape_opens_on_a_bed_that_displays_it(name: str) -> None:
+@pytest.mark.parametrize("name", ["face", "knot", list_shapes()[-1]])
+def test_a_sample_shape_opens_on_a_bed_that_displays_it(name: str) -> None:
     assert bpy.ops.digiclay.add_sample(sample=f"shape:{name}") == {"FINISHED"}
     height = bridge.read_cells(bpy.context.object.data)["height"]
     # The dead band at either end.

@@ -35,10 +35,10 @@ def picture(path: Path) -> np.ndarray:
 
 def of_the_hue(pixels: np.ndarray, color: tuple[float, float, float]) -> int:
     """Count the pixels that look like a color in light or shadow: its hue, colored, not near black."""
-    hue = colorsys.rgb_to_hsv(*color)[0]
-    found = [colorsys.rgb_to_hsv(*pixel) for pixel in pixels.reshape(-1, 3)]
+    hue, low, high = colorsys.rgb_to_hsv(*color)[0], pixels.min(axis=2), pixels.max(axis=2)
+    colored = pixels[(high > 0.2) & (high - low > 0.5 * high)]
     # The palette's hues are at least 0.07 apart, of 1 all round.
-    return sum(abs(h - hue) < 0.03 and s > 0.5 and v > 0.2 for h, s, v in found)
+    return sum(abs(colorsys.rgb_to_hsv(*pixel)[0] - hue) < 0.03 for pixel in colored)
 
 
 def bed_in(mode: Mode) -> Instant:

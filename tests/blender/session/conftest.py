@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
-import digiclay
 import pytest
 from digiclay.live import handlers
 
@@ -14,12 +12,9 @@ from tests.blender.session.live import Clock
 
 
 @pytest.fixture(autouse=True)
-def extension(factory_file: None) -> Iterator[None]:
-    """Enable the extension, watch undo and loading as a session does, and take all back."""
-    digiclay.register()
+def watching(extension: None) -> None:
+    """Watch undo and loading as a session does."""
     handlers.watch()
-    yield
-    digiclay.unregister()
 
 
 @pytest.fixture

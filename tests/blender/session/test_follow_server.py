@@ -170,7 +170,6 @@ def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Pa
     ("number", "words"),
     [
         (signal.SIGKILL, "has ended"),
-        (signal.SIGINT, "has ended"),  # in order
         (signal.SIGSTOP, "No pose from"),  # its port is open still
     ],
 )
