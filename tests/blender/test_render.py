@@ -68,9 +68,8 @@ def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(
 def test_the_legend_names_the_modes_present_in_the_palette_that_the_open_file_wears(tmp_path: Path) -> None:
     other = palettes.PALETTES["tol_muted"][Mode.HOLD]
     for seen, unseen in ((COLORS[Mode.HOLD], other), (other, COLORS[Mode.HOLD])):
-        size = {"width": 2 * WIDTH, "height": 2 * HEIGHT}
-        out = still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", Still(**size, samples=2))
-        legend = picture(out)[:, : 2 * WIDTH // 5]
+        look = Still(width=WIDTH, height=HEIGHT, samples=2)
+        legend = picture(still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", look))[:, : WIDTH // 5]
         assert of_the_hue(legend, seen) > 20
         assert of_the_hue(legend, unseen) < 20
         view.build(bed_in(Mode.HOLD), bpy.context.collection)

@@ -19,16 +19,17 @@ from digiclay.exchange import image_reader
 from digiclay.live import bed_state
 from digiclay.settings import properties
 
+from tests.blender.at_hand import new_bed
+
 pytestmark = pytest.mark.usefixtures("extension")
 
 #: Dead band of the height control, and the 32 bits a bed's vertices have.
 SHOWN = 10e-6 + 1e-8
 
 
-def bed(side: int = 13, **known: Any) -> Any:
-    """Add a bed."""
-    assert bpy.ops.mesh.digital_clay_add(rows=side, columns=side, **known) == {"FINISHED"}
-    return bpy.context.object
+def bed() -> Any:
+    """Open a file with a small bed, active."""
+    return new_bed(rows=13, columns=13)
 
 
 def heights(thing: Any) -> np.ndarray:
@@ -157,7 +158,8 @@ def test_a_mesh_made_of_the_clay_is_the_same_clay_when_it_goes_in_again() -> Non
     mesh = bpy.context.object
     assert not view.is_bed(mesh)
     bpy.ops.object.select_all(action="DESELECT")
-    other = bed()
+    bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
+    other = bpy.context.object
     other.location = made.location
     mesh.select_set(True)
     assert bpy.ops.digiclay.shape_from_object(fit="placed") == {"FINISHED"}
@@ -278,6 +280,6 @@ def test_the_sample_pictures_are_the_same_to_blender_and_to_pillow() -> None:
 
 
 def test_a_bed_of_many_cells_keeps_its_shape_in_the_file() -> None:
-    made = bed(60, pitch=3.0)
+    made = new_bed(rows=60, columns=60)
     assert bpy.ops.digiclay.shape_sample(sample="face") == {"FINISHED"}
     assert len(made.digiclay.shape.heights) < 6 * Layout(60, 60).rows ** 2

@@ -27,6 +27,8 @@ from digiclay.device.instant import Instant
 from digiclay.recorded import bake, takes
 from numpy.typing import NDArray
 
+from tests.blender.at_hand import open_bed
+
 Floats = NDArray[np.float64]
 COUNT = 100  # control periods of 5 ms: half a second
 
@@ -60,8 +62,9 @@ def build() -> Any:
 @pytest.fixture
 def bed() -> Any:
     """Return a bed in the open file."""
+    made = open_bed("rest", build)
     bpy.context.scene.render.fps = 40  # a frame is five control periods
-    return build()
+    return made
 
 
 def shown(bed: Any, frame: float) -> Floats:

@@ -19,7 +19,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.device import heat, view
 from digiclay.device.instant import Instant
 
-from tests.blender.at_hand import instances
+from tests.blender.at_hand import instances, open_bed
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
@@ -37,7 +37,7 @@ def drawn_pins(bed: Any) -> tuple[np.ndarray, list[str]]:
 @pytest.fixture
 def bed(formed: Instant) -> Any:
     """The formed bed, built in the open scene."""
-    return view.build(formed, bpy.context.scene.collection)
+    return open_bed("formed", lambda: view.build(formed, bpy.context.scene.collection))
 
 
 def test_the_pins_stand_where_the_arrays_say_in_the_material_of_their_mode(bed: Any, formed: Instant) -> None:
