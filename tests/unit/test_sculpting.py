@@ -29,8 +29,8 @@ def test_a_press_forms_the_bed_as_it_goes_on() -> None:
 
 def test_simulated_time_is_the_walls() -> None:
     hand, session = Hand(), started()
-    session = hand.move(session, [(0.0, 46.0)] * 300)
-    assert session.state.period == pytest.approx(300 * TICK / 5e-3, abs=1)
+    session = hand.move(session, [(0.0, 46.0)] * 90)
+    assert session.state.period == pytest.approx(90 * TICK / 5e-3, abs=1)
     assert session.factor == pytest.approx(1.0, abs=0.01)
 
 
@@ -148,7 +148,7 @@ def test_a_gain_that_is_changed_takes_effect_and_nothing_jumps() -> None:
 def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
     hand, session = Hand(), started()
     circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 30)]
-    session = hand.move(session, [*circle * 16])  # longer than the trace's ten seconds, so that it is full
+    session = hand.move(session, [*circle * 11])  # longer than the trace's ten seconds, so that it is full
     assert session.errors is not None
     assert 0.0 < session.errors.height < 1e-4
     tracemalloc.start()
