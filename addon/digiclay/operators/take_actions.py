@@ -23,10 +23,6 @@ class ChosenTake:
 
     take: bpy.props.StringProperty(name="Take", description="Number of the take; empty: the last one")
 
-    def chosen_take(self, context: Any) -> takes.Entry:
-        """Return the entry of the take; raises DigiclayError when the bed has none of that number."""
-        return takes.find(bed_of(context), self.take)
-
 
 @action("digiclay.take_record", "Record Take", cannot_record)
 def record_take(operator: Any, context: Any) -> None:
@@ -75,14 +71,14 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser, with the name of the take."""
         try:
-            name = self.chosen_take(context).name
+            name = takes.find(bed_of(context), self.take).name
         except DigiclayError:
             name = "take"
         self.filepath = bpy.path.clean_name(name) + ".toml"
         return super().invoke(context, event)
 
     def perform(self, context: Any) -> None:
-        entry = self.chosen_take(context)
+        entry = takes.find(bed_of(context), self.take)
         take = takes.read(bed_of(context), entry.number)
         # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
         file = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".toml"))
@@ -99,7 +95,7 @@ class RemoveTake(ChosenTake, Action, bpy.types.Operator):
     needs = no_bed, no_take
 
     def perform(self, context: Any) -> None:
-        takes.remove(bed_of(context), self.chosen_take(context).number)
+        takes.remove(bed_of(context), takes.find(bed_of(context), self.take).number)
 
 
 class PlayStrokes(FileAction, bpy.types.Operator):

@@ -125,8 +125,8 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
             column = self.layout.column(align=True)
             column.active, column.enabled = in_use(settings, section), not is_edited(context)
             group = part_group(settings, section)
-            known = list_quantities(import_parameters(section, method_of(settings)))
-            for name in (WHOLE + name if quantity.whole else name for name, quantity in known.items()):
+            quantities = list_quantities(import_parameters(section, method_of(settings)))
+            for name in (WHOLE + name if quantity.whole else name for name, quantity in quantities.items()):
                 place = column.row(align=True)
                 # A number's label stands in its field: beside it the sidebar would cut off the unit.
                 place.use_property_split = group.bl_rna.properties[name].type in BESIDE

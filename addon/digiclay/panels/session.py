@@ -33,13 +33,13 @@ def session_panel(sidebar: Any, context: Any) -> None:
         _buttons(column, session)
         _server(sidebar.layout, session)
         _numbers(sidebar.layout, session)
-    said = (
+    words = (
         session.blocking_reason and localize("Waits: {}", session.blocking_reason)
         if session
         else running.last_message(bed)
     )
-    if said:
-        draw_lines(sidebar.layout, said, "ERROR" if session else "INFO")
+    if words:
+        draw_lines(sidebar.layout, words, "ERROR" if session else "INFO")
 
 
 def _buttons(column: Any, session: Running) -> None:

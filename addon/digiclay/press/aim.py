@@ -39,13 +39,13 @@ class Target:
 
 def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
     """Return the nearest place on a bed that is seen under a pixel of the context's region."""
-    found, hider = look_at(context, xy)
-    return found if hider is None else None
+    target, hider = look_at(context, xy)
+    return target if hider is None else None
 
 
 def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any | None]:
     """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any."""
-    found, nearest, eye = None, np.inf, np.zeros(3)
+    target, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
         if not view.is_bed(bed):
             continue
@@ -59,10 +59,10 @@ def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any |
         origin, direction = _ray(context, bed, xy)
         distance = bridge.uniform(bed) * float((point - origin) @ direction)
         if distance < nearest:
-            found, nearest, eye = Target(bed, cells, height, point), distance, origin
-    if found is None:
+            target, nearest, eye = Target(bed, cells, height, point), distance, origin
+    if target is None:
         return None, None
-    return found, find_hider(context, found.bed, _place(found.bed, eye), _place(found.bed, found.point))
+    return target, find_hider(context, target.bed, _place(target.bed, eye), _place(target.bed, target.point))
 
 
 def read_surface(bed: Any) -> tuple[Grid, Floats]:

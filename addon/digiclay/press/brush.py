@@ -46,9 +46,9 @@ def find_kind(finger: Fingertip) -> FingerKind | None:
     return next((kind for kind in FINGERS.values() if _same(kind.finger, finger)), None)
 
 
-def _same(one: Fingertip, other: Fingertip) -> bool:
+def _same(first: Fingertip, other: Fingertip) -> bool:
     """Return whether two fingers have the same semi-axes."""
-    pairs = ((one.length, other.length), (one.width, other.width), (one.height, other.height))
+    pairs = ((first.length, other.length), (first.width, other.width), (first.height, other.height))
     return all(abs(a - b) < SAME for a, b in pairs)
 
 

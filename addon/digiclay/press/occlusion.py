@@ -76,11 +76,11 @@ def list_surfaces(context: Any, bed: Any) -> Iterator[tuple[Any, Any]]:
             yield thing, thing.matrix_world
     if not instancers:  # a bed of 10 000 pins has as many instances to go through
         return
-    for one in graph.object_instances:
-        if one.is_instance and one.parent.original in instancers and _hides(one.object):
+    for instance in graph.object_instances:
+        if instance.is_instance and instance.parent.original in instancers and _hides(instance.object):
             # A mesh that nodes instance has no original; Blender crashes on an evaluated curve.
-            mesh = one.object.type == "MESH"
-            yield one.object if mesh else one.object.original, one.matrix_world
+            mesh = instance.object.type == "MESH"
+            yield instance.object if mesh else instance.object.original, instance.matrix_world
 
 
 def _hides(thing: Any) -> bool:
@@ -140,17 +140,17 @@ def find_free_place(context: Any, bed: Any) -> tuple[Floats, str]:
     surfaces = [(thing, matrix, *_bounds(thing, matrix)) for thing, matrix in list_surfaces(context, bed)]
 
     def overlapping(place: Floats) -> list[Any]:
-        return [one for one in surfaces if (one[2] < place + high).all() and (one[3] > place + low).all()]
+        return [row for row in surfaces if (row[2] < place + high).all() and (row[3] > place + low).all()]
 
     def hider(place: Floats, among: list[Any]) -> Any:
-        beds = [one[0] for one in overlapping(place) if view.is_bed(one[0])]
-        return beds[0] if beds else _find_hider(context, bed, place, (low, high), [one[:2] for one in among])
+        beds = [row[0] for row in overlapping(place) if view.is_bed(row[0])]
+        return beds[0] if beds else _find_hider(context, bed, place, (low, high), [row[:2] for row in among])
 
     there = overlapping(cursor)
     hides = hider(cursor, there)
     if hides is None:
         return cursor, ""
-    first, last = np.min([one[2] for one in there], axis=0), np.max([one[3] for one in there], axis=0)
+    first, last = np.min([row[2] for row in there], axis=0), np.max([row[3] for row in there], axis=0)
     middle, gap = (first + last) / 2.0, GAP * (high - low)
     places = [] if view.is_bed(hides) else [(np.array([*middle[:2], last[2]]), ON_TOP)]
     for axis in (0, 1):
@@ -158,7 +158,7 @@ def find_free_place(context: Any, bed: Any) -> tuple[Floats, str]:
             place = cursor.copy()
             place[axis] = edge
             places.append((place, BESIDE))
-    for place, words in sorted(places, key=lambda one: float(np.linalg.norm(one[0] - cursor))):
+    for place, words in sorted(places, key=lambda row: float(np.linalg.norm(row[0] - cursor))):
         if hider(place, surfaces) is None:
             return place, localize(words, hides.name)
     return cursor, localize(NOWHERE, hides.name)
@@ -182,12 +182,12 @@ def _bounds(thing: Any, matrix: Any) -> Floats:
 def _find_hider(context: Any, bed: Any, place: Floats, box: Any, surfaces: list[Any]) -> Any | None:
     """Return the object that hides more of the pins of a bed at a place than may be; None without."""
     (left, front, _), (right, back, top) = box
-    eye, found = context.region_data.view_matrix.inverted(), []
+    eye, hiders = context.region_data.view_matrix.inverted(), []
     for x in np.linspace(left, right, SIDE + 2)[1:-1]:
         for y in np.linspace(front, back, SIDE + 2)[1:-1]:
             end = place + np.array([x, y, top])
             parallel = context.region_data.window_matrix[3][3] == 1.0
             start = end + FAR * np.array(eye.col[2][:3]) if parallel else np.array(eye.translation)
-            found.append(find_hider(context, bed, start, end, surfaces))
-    things = [thing for thing in found if thing is not None]
-    return things[len(things) // 2] if len(things) > HIDDEN * len(found) else None
+            hiders.append(find_hider(context, bed, start, end, surfaces))
+    things = [thing for thing in hiders if thing is not None]
+    return things[len(things) // 2] if len(things) > HIDDEN * len(hiders) else None

@@ -120,26 +120,26 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
         return
     if any(operator.bl_idname in ADJUSTING for operator in context.window.modal_operators):
         return
-    found, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y))
+    target, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y))
     if hider is not None:
         words = localize("{} hides the bed", hider.name)
         cursor([], make_label(words, xy, context.preferences.system.ui_scale))
         return
-    if found is None or view.fingertip_of(found.bed) is None:
+    if target is None or view.fingertip_of(target.bed) is None:
         return
     settings = tool.operator_properties(OPERATOR)
-    depth, kind = 1e-3 * settings.depth, _shown_brush(found.bed, settings)
+    depth, kind = 1e-3 * settings.depth, _shown_brush(target.bed, settings)
     rims = [
-        touch_outline(found.bed, found.grid, found.height, found.point * [*mirror, 1.0], depth, kind)
+        touch_outline(target.bed, target.grid, target.height, target.point * [*mirror, 1.0], depth, kind)
         for mirror in SYMMETRIES[settings.symmetry]
     ]
-    drawn = [*(np.concatenate([rim, rim[:1]]) for rim in rims), *_trail(found)]
+    drawn = [*(np.concatenate([rim, rim[:1]]) for rim in rims), *_trail(target)]
     corner = np.array([region.x, region.y])
-    lines = [corner + bridge.project(context, found.bed, points) for points in drawn]
+    lines = [corner + bridge.project(context, target.bed, points) for points in drawn]
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
     amount = 1e-3 * getattr(settings, amount_name(kind))
-    text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), kind, amount, settings.strength)
+    text = describe_brush(bridge.finger_of(view.fingertip_of(target.bed)), kind, amount, settings.strength)
     color = SMOOTHING if kind is Brush.SMOOTH else LIGHT
     label = make_label(text, xy, context.preferences.system.ui_scale)
     cursor(make_lines(shown, width, color), label)
@@ -152,17 +152,17 @@ def _shown_brush(bed: Any, settings: Any) -> Brush:
     return last.brush if last is not None and last.held else Brush(settings.brush)
 
 
-def _trail(found: aim.Target) -> list[Floats]:
+def _trail(target: aim.Target) -> list[Floats]:
     """Return what the finger has still to go along, and its rim where it is now, on the pins; or nothing."""
-    session = running.find(found.bed)
+    session = running.find(target.bed)
     if session is None or not session.strokes:
         return []
     finger, pose, kind = find_ellipsoid(session.scene), session.pose, session.strokes[0].brush
-    depth = float(found.height.max()) - pose[2]
-    rim = pose[:2] + find_outline(finger, pose[3:], depth, kind, found.grid.layout)
+    depth = float(target.height.max()) - pose[2]
+    rim = pose[:2] + find_outline(finger, pose[3:], depth, kind, target.grid.layout)
     first, *later = [path for stroke in session.strokes for path in stroke.ahead]
     ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
-    return [drape(found.grid, found.height, way) for way in ways if len(way) > 1]
+    return [drape(target.grid, target.height, way) for way in ways if len(way) > 1]
 
 
 def _scale_key(key: str, scalar: float) -> tuple[str, dict[str, Any], dict[str, Any]]:
@@ -233,7 +233,7 @@ def _put_down() -> None:
     """Take up the first tool in every window where this one is in hand: else its cursor is still drawn."""
     for window in bpy.context.window_manager.windows:
         tool = window.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
-        area = next((one for one in window.screen.areas if one.type == "VIEW_3D"), None)
+        area = next((area for area in window.screen.areas if area.type == "VIEW_3D"), None)
         if tool is not None and tool.idname == PressTool.bl_idname and area is not None:
             with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
                 bpy.ops.wm.tool_set_by_id(name="builtin.select_box", space_type="VIEW_3D")

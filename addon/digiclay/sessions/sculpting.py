@@ -48,7 +48,7 @@ def begin_session(
 ) -> tuple[Running, str]:
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost."""
     system = assemble(scene)
-    state, said = _load_state(system, kept)
+    state, lost = _load_state(system, kept)
     pose = clamp_pose(pose, system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
@@ -56,7 +56,7 @@ def begin_session(
         clock=Clock(), trace=recent_trace.start(system.period), monitor=accuracy.start(scene),
         next_gesture=Moment(state.period, now, pose),
     )  # fmt: skip
-    return running, said
+    return running, lost
 
 
 def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
@@ -65,9 +65,9 @@ def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
         return begin(system), ""
     # The state of other parts has heights at least; what has none is of no use.
     refused = ""
-    for read, said in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
+    for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
         try:
-            return read(system, kept), said and localize(said)
+            return read(system, kept), words and localize(words)
         except StateError as error:
             refused = localize("The bed begins at rest. {}", error)
     return begin(system), refused

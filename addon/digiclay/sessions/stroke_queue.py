@@ -44,7 +44,7 @@ def last_place(running: Running) -> tuple[float, float] | None:
 
 def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:
     """Return the session with one of its strokes changed, if it still has it."""
-    strokes = tuple(change(one) if one.number == number else one for one in running.strokes)
+    strokes = tuple(change(stroke) if stroke.number == number else stroke for stroke in running.strokes)
     return replace(running, strokes=strokes)
 
 

@@ -122,14 +122,14 @@ class Stroke:
     @property
     def ahead(self) -> tuple[Floats, ...]:
         """Places the finger has not come to yet, (k, 2), m: of the path it is at, and of those after it."""
-        path = np.array([(one.x, one.y) for one in self.samples])
+        path = np.array([(sample.x, sample.y) for sample in self.samples])
         later = tuple(path * mirror for mirror in self.mirrors[self.image + 1 :])
         return (path[self.reached :] * self.mirrors[self.image], *later)
 
     def place(self, index: int) -> tuple[float, float]:
         """Return where a sample is on the path the fingertip is at, m."""
-        (along, across), one = self.mirrors[self.image], self.samples[index]
-        return along * one.x, across * one.y
+        (along, across), sample = self.mirrors[self.image], self.samples[index]
+        return along * sample.x, across * sample.y
 
 
 def start(
@@ -154,8 +154,8 @@ def draw(
     start = max(samples[first - 1].time, time - DRAWING)
     count = len(samples) - first
     spread = (
-        replace(one, time=start + (time - start) * (index + 1) / count)
-        for index, one in enumerate(samples[first:])
+        replace(sample, time=start + (time - start) * (index + 1) / count)
+        for index, sample in enumerate(samples[first:])
     )
     return replace(stroke, samples=(*samples[:first], *spread), heard=time, burst=first)
 

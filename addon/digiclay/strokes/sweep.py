@@ -133,12 +133,12 @@ def find_spike(stroke: Stroke, grid: Grid, target: Floats, finger: Fingertip, bl
 
 def measure_excess_heights(grid: Grid, height: Floats) -> Floats:
     """Return how far each pin is above all neighbors, (n,), m; negative below all of them, else 0."""
-    one = np.asarray(height)
-    beside = np.append(one, np.nan)[grid.layout.find_neighbors(corners=True)]
+    height = np.asarray(height)
+    beside = np.append(height, np.nan)[grid.layout.find_neighbors(corners=True)]
     highest, lowest = np.fmax.reduce(beside, axis=1), np.fmin.reduce(beside, axis=1)
     # A bed of a single pin has no neighbors.
-    highest, lowest = np.where(np.isnan(highest), one, highest), np.where(np.isnan(lowest), one, lowest)
-    excess: Floats = np.maximum(one - highest, 0.0) - np.maximum(lowest - one, 0.0)
+    highest, lowest = np.where(np.isnan(highest), height, highest), np.where(np.isnan(lowest), height, lowest)
+    excess: Floats = np.maximum(height - highest, 0.0) - np.maximum(lowest - height, 0.0)
     return excess
 
 
@@ -148,12 +148,12 @@ def _find_form(stroke: Stroke, grid: Grid, finger: Fingertip, blister: Blister) 
     if stroke.brush is Brush.LOWER:
         return finger.height * (1.0 - math.sqrt(1.0 - part * part)) if part < 1.0 else math.inf
     first, second = blister.evaluate_profile(np.array([0.0, grid.layout.pitch])).clip(0.0)
-    return float(first - second) * max(one.depth for one in stroke.samples)
+    return float(first - second) * max(sample.depth for sample in stroke.samples)
 
 
 def _lie_under_path(stroke: Stroke, grid: Grid, cells: NDArray[np.intp], radius: float) -> NDArray[np.bool_]:
     """Tell which pins lie within a radius, m, of the stroke's path, or of one of its mirror images."""
-    drawn = np.array([(one.x, one.y) for one in stroke.samples])
+    drawn = np.array([(sample.x, sample.y) for sample in stroke.samples])
     near = np.zeros(cells.size, np.bool_)
     for mirror in stroke.mirrors:
         path = drawn * mirror
