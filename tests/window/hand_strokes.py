@@ -68,7 +68,7 @@ def finish(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | N
 
 def rest(blender: Any) -> Iterator[float | None]:
     """Let the pins come to rest: a tick simulates all the time since the one before, however long it was."""
-    yield 0.5
+    yield 2.0
     yield from blender.settle()
 
 
