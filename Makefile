@@ -90,7 +90,7 @@ docs: ## build the site in site/, without a warning, and check it: links, search
 	@$(ENVIRONMENT) requirements/docs.txt $(IN_311)
 	@tools/programs .reports/docs.log "chromium chromedriver" "chromium chromium-driver"
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --quiet
-	@rm -f .reports/docs.txt; $(PART) .reports/docs.txt "the site: links, search, commands of all pages" 1500 -- -n auto --dist loadgroup tests/site
+	@rm -f .reports/docs.txt; $(PART) .reports/docs.txt "the site: links, search, commands of all pages" 1500 -- -n auto tests/site
 
 test-release: ## release a copy, and run its wheel in bare Pythons 3.11, 3.12, 3.13 with lowest and highest libraries
 	@$(ENVIRONMENT) requirements/release.txt $(IN_311)

@@ -82,7 +82,6 @@ def _excused() -> set[str]:
     return {command for group in _listed()["group"] for command in group["commands"]}
 
 
-@functools.cache
 def execute(command: str, folder: Path) -> str:
     """Carry out a command in a folder; return why it failed, or ""."""
     program, *words = shlex.split(command)
@@ -98,31 +97,28 @@ def execute(command: str, folder: Path) -> str:
 
 
 def play(text: str, folder: Path, excused: set[str]) -> list[str]:
-    """Carry out the commands of a page that are not excused, in a folder with its files; return the failures.
-
-    `make` runs in the checkout, where it belongs, and once for all pages.
-    """
+    """Carry out the commands of a page that are not excused, in a folder with its files; return failures."""
     for name, source in _listed()["own"].items():
         shutil.copyfile(ROOT / source, folder / name)
     for name, content in find_files(text).items():
         (folder / name).write_text(content, encoding="utf-8")
     once = dict.fromkeys(command.text for command in find_commands(text) if command.text not in excused)
-    return list(filter(None, (execute(one, ROOT if one.startswith("make ") else folder) for one in once)))
+    return list(filter(None, (execute(one, folder) for one in once if not one.startswith("make "))))
 
 
 def _commands() -> list[Command]:
     return [command for page in PAGES for command in find_commands(page.read_text(encoding="utf-8"))]
 
 
-def _place(page: Path) -> Any:
-    """Return a page as a case; those that call `make` in the checkout run one after the other."""
-    marks = [pytest.mark.xdist_group("make")] if "make demo" in page.read_text(encoding="utf-8") else []
-    return pytest.param(page, marks=marks, id=page.relative_to(ROOT).as_posix())
-
-
-@pytest.mark.parametrize("page", [_place(page) for page in PAGES])
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_every_command_of_the_page_is_carried_out(page: Path, tmp_path: Path) -> None:
     assert play(page.read_text(encoding="utf-8"), tmp_path, _excused()) == []
+
+
+def test_every_make_of_the_pages_is_carried_out_in_the_checkout_where_it_belongs() -> None:
+    made = sorted({one.text for one in _commands() if one.text.startswith("make ")} - _excused())
+    assert "make demo" in made
+    assert list(filter(None, (execute(one, ROOT) for one in made))) == []
 
 
 def test_a_command_that_fails_is_noticed(tmp_path: Path) -> None:
