@@ -67,7 +67,7 @@ def test_noise_of_other_cells_periods_quantities_and_seeds_is_independent() -> N
 @pytest.mark.parametrize("seed", [8, np.array([8, 3])])
 def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed: Any) -> None:
     shape = np.shape(seed)
-    drawn = NoiseAhead(seed)
+    drawn = NoiseAhead(seed, 1.0, 1.0)
     some = [2, 7]
     asked = [(4, 9), (4, 30), (5, 9), (19, 30), (20, 30), (19, 30), (4, 30), (4, 31), (5, some), (5, 9)]
     for period, cells in asked:

@@ -108,9 +108,10 @@ def draw_normals(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Float
 def _mix(words: Words) -> Words:
     """Scramble 64-bit words: any bit of one changes about half the bits of its result."""
     words = words + np.uint64(WEYL)
-    words = (words ^ (words >> np.uint64(30))) * np.uint64(FIRST)
-    words = (words ^ (words >> np.uint64(27))) * np.uint64(SECOND)
-    return words ^ (words >> np.uint64(31))
+    for shift, factor in ((30, FIRST), (27, SECOND), (31, 1)):
+        words ^= words >> np.uint64(shift)
+        words *= np.uint64(factor)
+    return words
 
 
 def _draw_uniform(counter: Words) -> Floats:
@@ -120,21 +121,23 @@ def _draw_uniform(counter: Words) -> Floats:
 
 
 class NoiseAhead:
-    """Normal numbers of the coming periods, drawn at once for the cells read last.
+    """Noise of the coming periods, drawn at once for the cells read last.
 
-    They depend on seed, a number or (b,), period and cell alone, so any leading part of the cells is served.
+    It depends on seed, a number or (b,), period and cell alone, so any leading part of the cells is served.
+    `deviations` are those of forces, N, and heights, m, numbers or (b,).
     """
 
-    def __init__(self, seed: Any) -> None:
-        self._seed, self._first = seed, 0
+    def __init__(self, seed: Any, *deviations: Any) -> None:
+        self._seed, self._deviations, self._first = seed, deviations, 0
         self._cells, self._drawn = np.empty(0, np.intp), np.empty((2, 0, 0))
 
     def draw(self, period: int, cells: NDArray[np.intp]) -> Floats:
-        """Return `draw_normals` of a period, shape (2, m[, b])."""
+        """Return the noise of forces, N, and heights, m, in a period, shape (2, m[, b])."""
         late, count = period - self._first, len(cells)
         if not 0 <= late < self._drawn.shape[1] or cells.tobytes() != self._cells[:count].tobytes():
             self._first, self._cells, late = period, cells.copy(), 0
-            self._drawn = np.array(draw_normals(self._seed, period + np.arange(AHEAD), cells))
+            normals = draw_normals(self._seed, period + np.arange(AHEAD), cells)
+            self._drawn = np.array([by * each for by, each in zip(self._deviations, normals, strict=True)])
         return self._drawn[:, late, :count]
 
 
@@ -166,13 +169,13 @@ class Noisy(Stateless):
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return forces and heights with noise; a force may read below 0."""
         force, height = self.inner.measure(own, truth)
-        first, second = self._ahead.draw(truth.period, truth.cells)
-        return force + self.force * first, height + self.height * second
+        of_force, of_height = self._ahead.draw(truth.period, truth.cells)
+        return force + of_force, height + of_height
 
     @cached_property
     def _ahead(self) -> NoiseAhead:
-        """Numbers drawn ahead; keeping them changes no reading."""
-        return NoiseAhead(self.seed)
+        """Noise drawn ahead; keeping it changes no reading."""
+        return NoiseAhead(self.seed, self.force, self.height)
 
 
 @dataclass(frozen=True)
