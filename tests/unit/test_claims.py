@@ -1,4 +1,4 @@
-"""Folders are claimed: one process writes at a time, and what a killed one leaves goes away."""
+"""Folders are claimed and files locked: one process at a time, and what a killed one leaves goes away."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,17 +16,19 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.files.file_lock import find_host, hold_lock
+from digiclay.core.files.file_lock import find_host, find_start, hold_lock, hold_record, may_have_made
 from digiclay.core.files.run_folder import (
     claim_files,
     claim_folder,
     find_lock,
+    is_unfinished,
+    name_unfinished,
     remove_abandoned,
     resolve_inside,
     write_folder,
 )
 
-from tests.other_process import PROGRAM, dead, start
+from tests.other_process import PROGRAM, dead, finish, start
 from tests.timeouts import TIMEOUT, wait_until
 
 #: A session of hours.
@@ -60,10 +63,8 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
     assert main(["batch", "jobs.toml", "--out", "b", "--prepare", "--quiet"]) == 0
     assert main(["run", "my.toml", "--out", "older", "--quiet", "--no-errors"]) == 0
-    before, commands = (
-        names(Path("older")),
-        ["run my.toml", "form dome", "compare my.toml", "paper", "job b/jobs/my"],
-    )
+    before = names(Path("older"))
+    commands = ["run my.toml", "form dome", "compare my.toml", "paper", "job b/jobs/my"]
     commands += ["sweep my.toml --vary layout.rows=3,4", "batch jobs.toml"]
     with claim_folder(Path("o"), overwrite=False), claim_folder(Path("older"), overwrite=True):
         for command in commands:
@@ -86,13 +87,12 @@ def test_a_session_of_hours_keeps_its_folder_until_it_is_killed(refused: Any) ->
     assert names() == ["my.toml", "o"]
 
 
-@pytest.mark.parametrize("series", ["sweep", "batch"])
-def test_a_second_series_in_one_folder_is_refused_at_once(series: str, refused: Any) -> None:
+@pytest.mark.parametrize("line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"])
+def test_a_second_series_in_one_folder_is_refused_at_once(line: str, refused: Any) -> None:
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
-    command = {"sweep": "sweep my.toml --vary layout.rows=3,4 --workers 1", "batch": "batch jobs.toml"}[
-        series
-    ].split()
-    assert main([*command, "--out", "o", "--quiet"]) == 0
+    command = line.split()
+    finished = [*command, "--prepare"] if command[0] == "batch" else command  # nothing is to be simulated
+    assert main([*finished, "--out", "o", "--quiet"]) == 0
     with hold_lock(Path("o/.lock"), "no"):
         refused([*command, "--out", "o", "--quiet"], REFUSED.format("worked in"))
         refused(["run", "my.toml", "--out", "o", "--quiet"], "o holds other things than a run")
@@ -194,3 +194,83 @@ def test_a_path_that_leads_out_of_a_folder_is_refused(here: Path) -> None:
     for parts in (("..",), ("runs", "..", ".."), ("",), ("link", "a"), (str(here / "elsewhere"),)):
         with pytest.raises(OutputError, match="leads out of o"):
             resolve_inside(Path("o"), *parts)
+
+
+# Locks, and the processes that hold them
+
+
+def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_away() -> None:
+    gone, since = dead(), find_start(os.getpid())
+    left = [f".o.{gone}.part", f".o.{gone}@{find_host()}.part", f".o.{os.getpid()}.part"]
+    kept = [
+        f".o.{os.getpid()}@{find_host()}.part",  # this one lives
+        f".o.{gone}@elsewhere.part",  # nobody knows
+        f".p.{gone}.part",  # another one's
+        ".o.part", "o.1.part", f".o.{gone}.doc",
+    ]  # fmt: skip
+    for name in left + kept:
+        Path("d", name).mkdir(parents=True)
+    assert since is not None
+    # Another process has got its number since.
+    os.utime(Path("d", left[-1]), (since - 3600.0, since - 3600.0))
+    remove_abandoned(Path("d"), "o")
+    assert names(Path("d")) == sorted(kept)
+    assert not is_unfinished(Path("a/.b.stl"))
+    for kind in ("part", "old", "frames"):
+        assert is_unfinished(name_unfinished(Path("a/b c.stl"), kind))
+
+
+def test_a_process_is_known_by_the_time_it_was_started() -> None:
+    before = time.time()
+    process = start("import time; time.sleep(1000)")
+    try:
+        since = find_start(process.pid)
+        assert since is not None
+        # The system counts in hundredths of a second from when it was booted, which it knows to a second.
+        assert before - 2.0 <= since <= time.time() + 2.0
+        assert may_have_made(process.pid, since + 1.0)
+        assert not may_have_made(process.pid, since - 3600.0)
+    finally:
+        process.kill()
+        wait_until(lambda: find_start(process.pid) is None)  # although nobody has asked how it ended
+        finish(process)
+    assert not may_have_made(process.pid, time.time())
+
+
+def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None:
+    record = here / "record"
+    with (
+        hold_record(record, "It is held."),
+        pytest.raises(OutputError, match=r"^It is held\.$"),
+        hold_record(record, "It is held."),
+    ):
+        pass
+    assert not record.exists()
+    record.write_text(f"{find_host()} {dead()}\n", encoding="utf-8")  # left by a crash
+    with hold_record(record, "It is held."):
+        assert record.read_text(encoding="utf-8").split() == [find_host(), str(os.getpid())]
+    record.write_text("", encoding="utf-8")  # the disk was full, long ago
+    os.utime(record, (0.0, 0.0))
+    with hold_record(record, "It is held."):
+        pass
+    record.write_text("elsewhere 1\n", encoding="utf-8")
+    with (
+        pytest.raises(OutputError, match=r"begun on elsewhere; if nothing runs there, remove .*record"),
+        hold_record(record, "It is held."),
+    ):
+        pass
+
+
+def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
+    # Of hundreds of owners in three processes there is one at a time: a file tells who is inside.
+    script = (
+        "import os\n"
+        "from pathlib import Path\n"
+        "from digiclay.core.files.file_lock import hold_lock\n"
+        "for _ in range(60):\n"
+        "    with hold_lock(Path('d/lock'), 'no', 100.0):\n"
+        "        os.close(os.open('inside', os.O_CREAT | os.O_EXCL))\n"
+        "        os.unlink('inside')\n"
+    )
+    assert [finish(process)[0] for process in [start(script) for _ in range(3)]] == [0, 0, 0]
+    assert names(Path("d")) == []
