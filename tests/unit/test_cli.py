@@ -1,10 +1,11 @@
-"""The command line: what options reach; exit codes, one line for each mistake, and no folder left behind."""
+"""The command line: what options reach; exit codes, one line a mistake, no folder left behind; signals."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,12 @@ from digiclay.core.base.errors import BEGINNING, END, one_line
 
 from tests.other_process import PROGRAM, finish, start
 from tests.scene_files import left
+from tests.timeouts import wait_until
 
 pytestmark = pytest.mark.usefixtures("here")
+
+#: A session of hours: what is refused of it is refused before any work.
+LONG = ["run", "my.toml", "--set", "simulation.duration=1e4", "--set", "recorder.every=1000", "--quiet"]
 
 
 def test_a_run_is_written_to_a_folder_called_like_the_scene_and_says_so(
@@ -59,11 +64,14 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "surface": (["run", "my.toml", "--set", "layout.rows=1", "--export", "stl"], "at least 2 x 2 cells"),
     "no record": (["run", "my.toml", "--set", "recorder=absent", "--plots"], "--plots needs a recorder"),
     "folder": (["run", "my.toml", "--out", "my.toml"], "my.toml is a file"),
+    "full folder": ([*LONG, "--out", "d.png"], "d.png is not empty"),
+    "older form": (["form", "dome", "--out", "d.png", "--quiet"], "replace the run in it with --overwrite."),
     "no command": ([], "the following arguments are required: COMMAND"),
     "command": (["walk"], "invalid choice: 'walk'"),
     "no scene": (["run"], "the following arguments are required: SCENE"),
     "description": (["describe", "my.toml", "--set", "layout.rows=0"], "layout.rows must be at least 1"),
     "export of nothing": (["export", "nowhere"], "nowhere is no run's folder"),
+    "plot of nothing": (["plot", "nowhere"], "nowhere is no run's folder"),
     "render of nothing": (["render", "my.toml", "--size", "3"], "must be WIDTHxHEIGHT"),
     "picture": (["render", "my", "--out", "my.jpg"], "--out must end with .png (got my.jpg)."),
     "film": (["render", "my", "--film", "--out", "my.avi"], "--out must end with .mp4 (got my.avi)."),
@@ -82,6 +90,7 @@ def test_a_mistake_is_one_line_exit_code_2_and_no_folder(
     arguments: list[str], said: str, here: Path, refused: Any
 ) -> None:
     (here / "d.png").mkdir()
+    (here / "d.png" / "metrics.json").touch()
     refused(arguments, said)
     assert left(here) == ["d.png"]
 
@@ -263,3 +272,80 @@ def test_what_is_written_before_a_signal_is_not_denied(
     assert (code, capfd.readouterr()) == (
         130, (f"{Path('my', 'surface.obj')} (y up)\n", "Stopped; no file is half-written.\n"),
     )  # fmt: skip
+
+
+# Libraries that are missing, and signals, mostly in a process of its own
+
+
+@pytest.mark.parametrize(("said", "cores"), [("", "1"), ("3", "3")])
+def test_the_program_works_on_one_core_unless_told_otherwise(said: str, cores: str) -> None:
+    script = (
+        "import os, sys\n"
+        f"os.environ['OPENBLAS_NUM_THREADS'] = {said!r}\n"
+        "os.environ['OPENBLAS_NUM_THREADS'] or os.environ.pop('OPENBLAS_NUM_THREADS')\n"
+        "from digiclay import cli\n"
+        "cli.main = lambda: print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules) or 0\n"
+        "cli.console()\n"
+    )
+    # Numpy reads it when it is imported, so that must not have happened before.
+    assert finish(start(script))[1].split() == [cores, "False"]
+
+
+@pytest.mark.parametrize(
+    ("line", "missing", "install"),
+    [
+        ("run my.toml --render", "bpy", "digiclay[blender]"),
+        ("run my.toml --plots", "matplotlib", "pip install digiclay[plots]"),
+        ("sweep my.toml --vary seed=3,4 --out o --scheduler tcp://a:1", "distributed", "digiclay[cluster]"),
+    ],
+)  # fmt: skip
+def test_a_missing_library_is_told_before_any_work(
+    line: str, missing: str, install: str, here: Path, refused: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == missing]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(sys.modules, "digiclay.compat", raising=False)
+    monkeypatch.setitem(sys.modules, missing, None)  # as Python marks what cannot be imported
+    refused(line.split(), install)
+    assert left(here) == []
+
+
+def test_a_job_of_a_batch_exports_without_any_library(here: Path) -> None:
+    (here / "jobs.toml").write_text('scenes = ["my.toml"]\nexport = ["stl", "3mf"]\nerrors = false\n')
+    assert main(["batch", "jobs.toml", "--prepare", "--quiet"]) == 0
+    missing = "import sys; sys.modules.update(dict.fromkeys(['trimesh', 'scipy', 'matplotlib']))\n"
+    code, _, err = finish(start(missing + PROGRAM, "job", "jobs/jobs/my"))
+    assert code == 0, err
+    assert {"surface.stl", "surface.3mf"} <= {path.name for path in (here / "jobs/runs/my").iterdir()}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_a_signal_keeps_an_incomplete_run_that_can_be_exported_and_exits_with_130(here: Path) -> None:
+    # SIGTERM as farms send it; Ctrl-C is that of test_extras.
+    ready = here / "ready"
+    script = (
+        "import itertools, pathlib\n"
+        "from digiclay.commands import run\n"
+        "begin, period = run.run, itertools.count()\n"
+        "def told(*given, stopped, **more):\n"
+        "    def asked():\n"
+        "        if next(period) == 20:\n"
+        f"            pathlib.Path({str(ready)!r}).touch()\n"
+        "        return stopped()\n"
+        "    return begin(*given, stopped=asked, **more)\n"
+        "run.run = told\n"
+    )
+    started = start(script + PROGRAM, *LONG)
+    wait_until(lambda: ready.exists() or started.poll() is not None)
+    ready.unlink()
+    started.send_signal(signal.SIGTERM)
+    code, _, err = finish(started)
+    metrics = json.loads((here / "my" / "metrics.json").read_text(encoding="utf-8"))
+    assert (code, err, metrics["incomplete"], left(here)) == (130, "", True, ["my"])
+    assert main(["export", "my", "--quiet"]) == 0
+
+
+def test_a_warning_of_numpy_is_an_error_in_the_processes_that_tests_start() -> None:
+    code, _, err = finish(start("import numpy; numpy.exp(numpy.array([1000.0]))"))
+    assert code == 1
+    assert "RuntimeWarning: overflow encountered in exp" in err

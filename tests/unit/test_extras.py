@@ -14,7 +14,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
-from digiclay.commands.extras import format_command, plan_meshes
+from digiclay.commands.extras import plan_meshes
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session.finished_run import find_row
 
@@ -132,7 +132,6 @@ def test_form_that_is_stopped_before_its_session_writes_nothing(
 @pytest.mark.parametrize(
     ("settings", "arguments", "said"),
     [
-        ([], ["plot", "nowhere"], "nowhere is no run's folder"),
         (["--set", "layout.rows=1"], ["plot", "o"], "plot needs at least 2 x 2 cells"),
         (["--set", "recorder=absent"], ["plot", "o"], "o has no history.npz"),
         ([], ["plot", "o", "--out", "my.toml/x"], "my.toml/x cannot be a folder: my.toml is a file."),
@@ -143,12 +142,6 @@ def test_what_cannot_be_plotted_is_told_in_a_line(
 ) -> None:
     assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors", *settings]) == 0
     refused(arguments, said)
-
-
-def test_a_command_is_written_as_a_shell_takes_it() -> None:
-    assert format_command(["export", "it's mine", "--format", "stl,obj"]) == (
-        "digiclay export 'it'\"'\"'s mine' --format stl,obj"
-    )
 
 
 def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) -> None:
