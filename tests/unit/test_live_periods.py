@@ -1,19 +1,25 @@
-"""The wall's clock, the finger's way, the trace and the error monitor of a live session."""
+"""The wall's clock, the finger's way, the trace, the error monitor and the ticks of a live session."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from dataclasses import replace
+from functools import partial
+from itertools import cycle, islice, pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import State
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.trajectory import interpolate_poses
 from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import recent_trace, snapshot
+from digiclay.core.session import accuracy, recent_trace, snapshot
+from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
     Clock,
     clamp_pose,
@@ -23,8 +29,13 @@ from digiclay.core.session.live_session import (
     update_cost,
 )
 from digiclay.core.session.recent_trace import ROWS
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.strokes.stroke import draw
 from numpy.typing import NDArray
 
+from tests import hand
 from tests.assemble import path
 
 Floats = NDArray[np.float64]
@@ -167,3 +178,167 @@ def test_a_pin_that_stays_picked_keeps_its_past() -> None:
     assert other.pins == (9, 4)
     assert np.isnan(other.heights[0, 0])
     assert other.heights[0, 1] == trace.heights[0, 1]
+
+
+# The reference solution beside a session
+
+
+def watched(scene: Scene, finger: Floats) -> tuple[State, list[Errors]]:
+    """Follow a path with a monitor; return the last state and the errors it finds."""
+    system, monitor, found = assemble(scene), accuracy.start(scene), []
+    assert monitor is not None
+    start = begin(system)
+    monitor = accuracy.begin_stretch(monitor, start)
+    for index, state in enumerate(simulate_path(system, start, finger)):
+        monitor = accuracy.note(monitor, state, finger[index : index + 2])
+        monitor, errors = accuracy.catch_up(monitor, state, 1)
+        found += [errors] if errors else []
+    return state, found
+
+
+def stepped(step: str) -> Scene:
+    """Return the scene with a physics step."""
+    return resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}})
+
+
+def go_on(finger: Floats) -> Floats:
+    """Return a finger's path that moves on, quite differently, while the reference lags behind."""
+    return np.concatenate([finger, interpolate_path(pose(z=0.039), pose(z=0.05), STRETCH * (SPREAD - 1) - 1)])
+
+
+@pytest.mark.parametrize("ticks", [(3, 3, 4), (1,), (2, 1), (9,)])
+def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(
+    ticks: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[int] = []
+    repeat = accuracy.repeat_period
+
+    def counted(*arguments: Any) -> State:
+        done.append(tick)
+        return repeat(*arguments)
+
+    monkeypatch.setattr(accuracy, "repeat_period", counted)
+    monitor, start = accuracy.start(SCENE), begin(SYSTEM)
+    assert monitor is not None
+    finger = interpolate_path(pose(), pose(z=0.038), STRETCH + PAUSE)
+    monitor, counts = accuracy.begin_stretch(monitor, start), cycle(ticks)
+    states = enumerate(simulate_path(SYSTEM, start, finger))
+    sizes: list[int] = []
+    while (period := sum(sizes)) < STRETCH + PAUSE - max(ticks):
+        tick = len(sizes)
+        sizes.append(next(counts))
+        for period, state in islice(states, sizes[-1]):
+            monitor = accuracy.note(monitor, state, finger[period : period + 2])
+        monitor, _ = accuracy.catch_up(monitor, state, sizes[-1])
+    assert len(done) == STRETCH
+    for tick, size in enumerate(sizes):
+        assert done.count(tick) <= max(1, size // SPREAD)
+        # A tick of more periods than the one before takes the longest already.
+        assert not (tick and size > sizes[tick - 1] and done.count(tick))
+        assert SPREAD * sum(number <= tick for number in done) <= sum(sizes[: tick + 1])
+
+
+def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_ones() -> None:
+    # The truth: the same periods at a twentieth of the step. The commands differ by what the errors
+    # before them changed, so it is no more than the right size that is asked for.
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    (_, (found,)), (_, (fine, *_)) = (watched(stepped(step), go_on(finger)) for step in ("1 ms", "0.25 ms"))
+    ends = []
+    for step in ("0.05 ms", "1 ms"):
+        system = assemble(stepped(step))
+        *_, state = simulate_path(system, begin(system), finger)
+        ends.append(state.row(0))
+    error = np.abs(ends[0] - ends[1]).max()
+    assert 0.3 * error < found.height < 3.0 * error
+    assert error > 1e-9
+    # Second order: a quarter of the step has a sixteenth of the error, contact events aside.
+    assert fine.height < found.height / 8
+    assert fine.force < found.force / 8
+
+
+def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alone() -> None:
+    count = 2 * (STRETCH + PAUSE) + STRETCH * SPREAD
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), count)
+    *_, alone = simulate_path(SYSTEM, begin(SYSTEM), finger)
+    state, found = watched(SCENE, finger)
+    assert len(found) == 3
+    assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, alone)
+    assert recent_trace.measure_total_force(SYSTEM, state) > 0.0
+    # A step that cannot be halved has no monitor.
+    table = {"simulation": {"control_period": "1 s", "physics_step": "1 ms"}, "control": "absent"}
+    assert accuracy.start(resolve(table)) is None
+
+
+# An input reaches the commanded pins in the next tick
+
+#: A finger in the pins, mm, and how long it has pressed, ticks.
+PRESSED, TICKS = 37.0, 20
+
+
+def pressed() -> tuple[Running, hand.Hand]:
+    """Return a session whose finger presses, and the hand that holds it."""
+    mover = hand.Hand()
+    return mover.move(hand.started(), [(0.0, z) for z in np.linspace(46.0, PRESSED, TICKS)]), mover
+
+
+def commands(session: Running) -> np.ndarray:
+    """Return the commanded heights."""
+    return session.state.row(session.system.rows.target)
+
+
+def forked(session: Running) -> Running:
+    """Return the same session with a state of its own: a tick uses it up."""
+    return replace(session, state=session.state.copy())
+
+
+@pytest.mark.usefixtures("quick_machine")
+def test_a_move_between_two_ticks_changes_the_commands_of_the_next() -> None:
+    session, mover = pressed()
+    now = mover.now + hand.TICK
+    still = sculpting.advance(forked(session), hand.pose(0.0, PRESSED), now, 100)
+    moved = sculpting.advance(forked(session), hand.pose(2.0, PRESSED), now, 100)
+    assert still.state.period == moved.state.period > session.state.period
+    assert not np.array_equal(commands(still), commands(moved))
+
+
+@pytest.mark.usefixtures("quick_machine")
+def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next() -> None:
+    session, number = queue_stroke(hand.started(), 0.0, 0.0, 4e-3)
+    now = 0.0
+    while session.strokes[0].reached == 0 and now < 3.0:
+        now += hand.TICK
+        # The hand goes along x; Blender has told all of it by each tick.
+        drawn = partial(draw, time=now, x=0.01 * now, y=0.0, depth=4e-3)
+        session = change_stroke(session, number, drawn)
+        session = change_stroke(session, number, partial(replace, known=now))
+        session = sculpting.advance(session, hand.pose(), now, 100)
+    assert session.strokes[0].reached
+    now += hand.TICK
+    ways = []
+    for y in (0.0, 4e-3):
+        drawn = partial(draw, time=now, x=0.01 * now, y=y, depth=4e-3)
+        other = change_stroke(forked(session), number, drawn)
+        other = change_stroke(other, number, partial(replace, known=now))
+        ways.append(sculpting.advance(other, hand.pose(), now, 100))
+    straight, aside = ways
+    assert aside.pose[1] > straight.pose[1] == 0.0
+    assert not np.array_equal(commands(straight), commands(aside))
+
+
+@pytest.mark.usefixtures("quick_machine")
+def test_a_tick_packs_the_state_once_however_many_periods_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    packed: list[int] = []
+    dump = snapshot.dump
+
+    def counted(*arguments: Any) -> bytes:
+        packed.append(1)
+        return dump(*arguments)
+
+    session, mover = pressed()
+    monkeypatch.setattr(snapshot, "dump", counted)
+    later = sculpting.advance(session, hand.pose(1.0, PRESSED), mover.now + 0.5, 100)
+    assert later.state.period - session.state.period == 100
+    assert len(packed) == 1
+    paused = replace(later, paused=True)
+    assert hand.heights(sculpting.advance(paused, hand.pose(2.0, PRESSED), mover.now + 1.0, 100)).size
+    assert len(packed) == 1
