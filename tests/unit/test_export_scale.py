@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.surface.formed import PIECE
 
 from benchmarks.__main__ import main
-from benchmarks.bed_size import export, formed
+from benchmarks.bed_size import export
 
 
 @pytest.mark.parametrize("file", ["stl", "ply"])
@@ -19,13 +18,6 @@ def test_a_solid_takes_no_more_memory_than_its_own_arrays_and_a_few_megabytes(fi
     assert PIECE <= 65536
     assert exported["triangles"] == 4 * (side - 1) ** 2 + 8 * (side - 1)
     assert exported["peak"] <= 250 * side * side / 1e6 + 10.0
-
-
-def test_the_benchmarks_bed_has_bosses_and_creases_to_be_found():
-    from digiclay.core.surface.features import Finding
-
-    names = {body.name.split("_")[0] for body in make_bodies(formed(60), Model(kind="features"), Finding())}
-    assert names == {"boss", "crease"}
 
 
 def test_the_benchmark_prints_a_line_a_case_and_keeps_its_figures(tmp_path, capsys, monkeypatch):
