@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, apply_map, count_true, per_row
+from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, apply_map, count_true
 from digiclay.core.base.arrays import prepare_map as prepare
 
 CASES = {
@@ -21,13 +21,6 @@ CASES = {
 def test_it_holds_somewhere_and_as_often_as_numpy_says(test: np.ndarray) -> None:
     assert any_true(test) is bool(test.any())
     assert count_true(test) == np.count_nonzero(test, axis=0).tolist()
-
-
-@pytest.mark.parametrize("shape", [(4,), (4, 3)])
-def test_constants_of_one_run_and_of_many_calculate_alike(shape: tuple[int, ...]) -> None:
-    values = np.arange(float(np.prod(shape))).reshape(shape)
-    two, minus_one = Constants((2.0, -1.0))[shape]
-    np.testing.assert_array_equal(values * two + minus_one, 2.0 * values - 1.0)
 
 
 def test_constants_of_one_run_are_shared_and_cannot_be_written_to() -> None:
@@ -72,9 +65,3 @@ def test_a_prepared_map_takes_the_rows_as_they_are_when_it_is_called() -> None:
     rows[:] = [[1.0], [2.0]]
     product()
     np.testing.assert_array_equal(made, [[21.0, 21.0, 21.0]])
-
-
-def test_numbers_of_each_row_stand_against_rows_of_one_run_and_of_many() -> None:
-    assert per_row(np.ones(2), 2).shape == (2, 1)
-    assert per_row(np.ones(2), 3).shape == (2, 1, 1)
-    assert per_row(np.ones((2, 4)), 3).shape == (2, 1, 4)
