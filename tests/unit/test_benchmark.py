@@ -135,9 +135,7 @@ def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(
     out = capsys.readouterr().out
     costs = {part: re.search(rf"^  {part} +([\d.]+) ", out, re.MULTILINE) for part in PARTS}
     assert [part for part, cost in costs.items() if not cost or not float(cost[1]) > 0.0] == []
-    elapsed, spent = (
-        float(re.search(told, out)[1]) for told in (r"in ([\d.e-]+) s \(", r"time ([\d.e-]+) s \(")
-    )
+    elapsed, spent = (float(re.search(rf"{word} ([\d.e-]+) s \(", out)[1]) for word in ("in", "time"))
     # One process, one thread: it uses no more than passes, but for the grain of the two clocks.
     assert 0.0 < spent <= 1.1 * elapsed
     assert re.search(r"^  multiply +[\d.]+$", out, re.MULTILINE)
@@ -194,11 +192,9 @@ def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys: pytest.Captu
     assert less.simulation.physics_step == less.simulation.control_period
     assert without(less, LONGER) is None
     assert main(["terms", "tap", "--quick", "--quiet"]) == 0
-    named, out = (
-        ("the full scene", "without conduit", "without relaxation", "all of these"),
-        capsys.readouterr().out,
-    )
-    assert [name for name in named if name not in out] == []
+    out = capsys.readouterr().out
+    for name in ("the full scene", "without conduit", "without relaxation", "all of these"):
+        assert name in out
 
 
 def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
@@ -207,9 +203,7 @@ def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
     assert len(times) == len(processes.CASES)
     assert all(0.0 < time < 1.0 for time in times)
     (tree / "digiclay" / "core" / "engine" / "simulation.py").write_text("1 / 0\n", encoding="utf-8")
-    with pytest.raises(
-        DigiclayError, match=r"^commits: HEAD cannot be timed: ZeroDivisionError: division by"
-    ):
+    with pytest.raises(DigiclayError, match=r"^commits: HEAD cannot be timed: ZeroDivisionError: division"):
         processes.run_commit(tree, "HEAD", 2)
 
 
@@ -243,12 +237,12 @@ def test_a_benchmark_prints_and_writes_a_table_and_a_picture(
 
 
 def press(**control: float) -> Scene:
-    """Return a press, a lift and a drag of 9 mm in 0.2 s on a small bed with Method III."""
+    """Return a press, half a lift and a drag of 9 mm in 0.2 s on a small bed with Method III."""
     scene = resolve({
         "layout": {"rows": 11, "columns": 11}, "control": {"method": "hybrid", **control},
         "sensors": {"force_noise": 2e-3},
     })  # fmt: skip
-    drag = (0.0, -4.5, 40.5), (0.15, -4.5, 38.0), (0.8, -4.5, 46.0), (1.0, 4.5, 46.0)
+    drag = (0.0, -4.5, 40.5), (0.15, -4.5, 38.0), (0.5, -4.5, 42.3), (0.7, 4.5, 42.3)
     points = tuple(Waypoint(time=t, position=(1e-3 * x, 0.0, 1e-3 * z)) for t, x, z in drag)
     simulation = replace(scene.simulation, duration=drag[-1][0])
     return scene.with_sections(trajectory=FingerPath("linear", points), simulation=simulation)

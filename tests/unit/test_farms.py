@@ -36,6 +36,8 @@ FILMS = "[film]\nrate = 10\n[turntable]\nframes = 4\n"
 #: What a film of 1.21 s at 10 frames a second has: one every 0.1 s, and the last instant.
 COUNT = 13
 WINDOWS = r"C:\Program Files\Blender Foundation\Blender 4.5\blender.exe"
+#: How Blender is asked for the command line.
+BLENDER = ["--background", "--addons", "bl_ext.user_default.digiclay", "--command", "digiclay"]
 
 
 @pytest.fixture(autouse=True)
@@ -67,10 +69,8 @@ def test_the_tasks_of_a_job_are_its_run_then_frames_then_films_and_the_page_is_l
     assert found["tap-b: run"] == (["job", "S/jobs/tap-b", "--only", "run"], set())
     ranges = [name for name in found if name.startswith("tap-b: frames of film")]
     assert [name.split()[-1] for name in ranges] == ["0-4", "5-9", "10-12"]
-    assert found[ranges[2]] == (
-        ["job", "S/jobs/tap-b", "--only", "film", "--frames", "10-12"],
-        {"tap-b: run"},
-    )
+    drawn = ["job", "S/jobs/tap-b", "--only", "film", "--frames", "10-12"]
+    assert found[ranges[2]] == (drawn, {"tap-b: run"})
     assert found["tap-b: film"] == (["job", "S/jobs/tap-b", "--only", "film"], set(ranges))
     films = {f"tap-{job}: {kind}" for job in "ab" for kind in ("film", "turntable")}
     assert found["page"] == (["page", "S"], films)
@@ -96,10 +96,7 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
         job_template_dir=here / "out", current_working_dir=here,
     )  # fmt: skip
     job = create_job(job_template=template, job_parameter_values=values)
-    assert {name: value.value for name, value in values.items()} == {
-        "Series": str(here / "out"),
-        "Blender": "/p",
-    }
+    assert {name: one.value for name, one in values.items()} == {"Series": str(here / "out"), "Blender": "/p"}
     wanted, seen = planned(), []
     for name in [step.name for step in StepDependencyGraph(job=job).topo_sorted()]:
         (step,) = (one for one in job.steps if one.name == name)
@@ -107,13 +104,7 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
         assert str(action.command) == "{{Param.Blender}}"
         given = [str(one).replace("{{Param.Series}}", "S") for one in action.args]
         blender, given = given[:5], given[5:]
-        assert blender == [
-            "--background",
-            "--addons",
-            "bl_ext.user_default.digiclay",
-            "--command",
-            "digiclay",
-        ]
+        assert blender == BLENDER
         assert {need.dependsOn for need in step.dependencies or ()} <= set(seen)
         seen.append(name)
         if step.parameterSpace is None:
@@ -174,8 +165,7 @@ def test_the_flamenco_script_makes_these_tasks_with_these_dependencies(program: 
     assert Path("out/flamenco/digiclay_series.js").read_bytes() == SCRIPT.read_bytes()
     tasks, wanted, before = compiled(text), planned(), set[str]()
     assert [task["name"] for task in tasks] == list(wanted)
-    leading = {"": ["-m", "digiclay"], WINDOWS: ["--background", "--addons", "bl_ext.user_default.digiclay",
-               "--command", "digiclay"]}.get(program, [])  # fmt: skip
+    leading = {"": ["-m", "digiclay"], WINDOWS: BLENDER}.get(program, [])
     series = str(here / "out")
     for task in tasks:
         arguments, needs = wanted[task["name"]]
@@ -193,10 +183,9 @@ def test_the_flamenco_script_has_the_settings_its_jobs_give_and_is_plain_javascr
     context = quickjs.Context()
     context.eval(SCRIPT.read_text(encoding="utf-8"))
     known = json.loads(context.eval("JSON.stringify(JOB_TYPE.settings)"))
+    kinds = {one["key"]: (one["type"], one["required"]) for one in known}
     given = json.loads(Path("out/flamenco/job.json").read_text(encoding="utf-8"))["settings"]
-    assert {one["key"]: (one["type"], one["required"]) for one in known} == dict.fromkeys(
-        given, ("string", True)
-    )
+    assert kinds == dict.fromkeys(given, ("string", True))
     assert {type(value) for value in given.values()} == {str}
     # goja knows ECMAScript 5.1 and a part of the later ones.
     code = re.sub(r'//[^\n]*|"[^"\n]*"', "", SCRIPT.read_text(encoding="utf-8"))

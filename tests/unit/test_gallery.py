@@ -70,9 +70,7 @@ def test_a_png_is_read_back_by_another_program_as_it_was(shape: tuple[int, int])
     np.testing.assert_array_equal(np.round(back[..., :3] * 255.0).astype(np.uint8), pixels)
 
 
-def test_a_map_of_heights_has_about_the_width_asked_for_with_the_far_side_above_and_high_pins_bright() -> (
-    None
-):
+def test_a_map_of_heights_has_about_the_width_asked_for_and_shows_high_pins_bright_far_ones_above() -> None:
     for shape in ((1, 1), (25, 25), (3, 40), (1000, 700)):
         rows, columns, channels = height_map(np.zeros(shape), 320).shape
         assert (channels, 160 < max(rows, columns) <= 320) == (3, True)
