@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ..core.base.errors import MethodError, OutputError, ParameterError
@@ -17,6 +18,18 @@ from ..plugins.method_loader import load_method
 
 #: The key of the control method in scene files.
 METHOD = "control.method"
+#: Options by ``"--name METAVAR"``: the help, or type or choices, help, and perhaps the default.
+Options = Mapping[str, str | tuple[Any, ...]]
+#: Options that change a scene.
+SCENE_OPTIONS = {
+    "--method M": "control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
+    "--stepper S": "stepper: the same as --set simulation.stepper=S",
+    "--tolerance T": 'largest error of the heights, such as "1 um": chooses the adaptive stepper',
+}
+#: Arguments of a command on a finished run.
+RUN = {"run RUN": (Path, "run folder of 'digiclay run'"), "--quiet": "print errors only"}
+#: Help of --quiet where there is a progress line.
+QUIET = "print errors only, without progress"
 
 
 class Help(argparse.RawDescriptionHelpFormatter):
@@ -27,6 +40,18 @@ class Help(argparse.RawDescriptionHelpFormatter):
         self._action_max_length = 14
 
 
+def add_options(parser: Any, options: Options) -> None:
+    """Add a table of options; one without metavar and type is a switch."""
+    for words, row in options.items():
+        name, _, metavar = words.partition(" ")
+        kind, help, default = (None, row, None) if isinstance(row, str) else (*row, None)[:3]
+        if not metavar and isinstance(row, str):
+            parser.add_argument(name, action="store_true", help=help)
+            continue
+        read = {"type": kind} if kind is None or callable(kind) else {"choices": kind}
+        parser.add_argument(name, metavar=metavar or None, default=default, help=help, **read)
+
+
 def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
     """Add SCENE, or --scene where there is a default, and the options that change it."""
     scene = "a .toml file, a sample's name, or the folder of a run"
@@ -34,25 +59,11 @@ def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: b
         parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{scene}; default {default}")
     else:
         parser.add_argument("scene", metavar="SCENE", nargs="?" if optional else None, help=scene)
+    add_options(parser, SCENE_OPTIONS)
     parser.add_argument(
-        "--method", metavar="M",
-        help="control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
-    )  # fmt: skip
-    parser.add_argument("--stepper", metavar="S", help="stepper: the same as --set simulation.stepper=S")
-    parser.add_argument(
-        "--tolerance",
-        metavar="T",
-        help='largest error of the heights, such as "1 um": chooses the adaptive stepper',
-    )
-    parser.add_argument(
-        "--set",
-        dest="settings",
-        metavar="KEY=VALUE",
-        type=_setting,
-        action="append",
-        default=[],
+        "--set", dest="settings", metavar="KEY=VALUE", type=_setting, action="append", default=[],
         help='override a parameter, such as layout.pitch="4 mm" or conduit=absent; may be repeated',
-    )
+    )  # fmt: skip
 
 
 def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
@@ -96,21 +107,23 @@ def load_by_option(word: str, option: str) -> str:
 
 
 def add_command(
-    commands: Any, name: str, help: str, epilog: str, description: str = "", *, listed: bool = True
+    commands: Any,
+    name: str,
+    help: str,
+    epilog: str,
+    description: str = "",
+    *,
+    carry_out: Callable[[argparse.Namespace], int] | None = None,
+    options: Options = MappingProxyType({}),
+    listed: bool = True,
 ) -> argparse.ArgumentParser:
     """Add a command; its own help begins with `description`, by default `help` as a sentence."""
     parser: argparse.ArgumentParser = commands.add_parser(
         name, description=description or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
         formatter_class=Help, allow_abbrev=False, **({"help": help} if listed else {}),
     )  # fmt: skip
-    return parser
-
-
-def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.ArgumentParser:
-    """Add a command that works on a finished run, see `add_command`."""
-    parser = add_command(commands, name, help, epilog)
-    parser.add_argument("run", metavar="RUN", type=Path, help="run folder of 'digiclay run'")
-    parser.add_argument("--quiet", action="store_true", help="print errors only")
+    add_options(parser, options)
+    parser.set_defaults(carry_out=carry_out)
     return parser
 
 

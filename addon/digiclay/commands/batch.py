@@ -13,13 +13,13 @@ from typing import Any
 from ..core.base.errors import one_line
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
 from ..plugins.method_loader import find_word
-from .arguments import add_command, load_by_option, say
+from .arguments import QUIET, add_command, add_options, load_by_option, say
 from .batch_folder import Folder, open_batch
 from .evaluation_pool import read_count
 from .job_steps import PROGRESS, check_outputs, find_error, read_fraction, read_tail
 from .progress import Counted, format_duration
 from .stop import FAILED, STOPPED, Stop
-from .submit import add_options, refuse_alone, write_farm_files
+from .submit import FARM_OPTIONS, SUBMIT, refuse_alone, write_farm_files
 from .worker import Process, Processes, count_cores
 
 EXAMPLES = """\
@@ -33,6 +33,12 @@ examples:
 After Ctrl-C or a kill, the same command continues: finished jobs are kept, and repeated only after a change
 in the JOBS file. Exit code 1: some jobs failed, the others are complete.
 """
+OPTIONS = {
+    "file JOBS": "a .toml file, or a sample's name",
+    "--out DIR": (Path, "folder; default: the file's name in the working folder"),
+}
+#: Options of which one may be given.
+INSTEAD = {"--prepare": "write the files of the jobs, run none", **SUBMIT}
 #: Seconds between two pages that are written while jobs run, at least, and times that a page's writing takes.
 PAUSE, REST = 2.0, 10.0
 
@@ -62,23 +68,14 @@ class JobProcess(Process):
 def add(commands: Any) -> None:
     """Add the command."""
     purpose = "run a job series in the background: scenes, exports, pictures and films"
-    parser = add_command(commands, "batch", purpose, EXAMPLES)
-    parser.add_argument("file", metavar="JOBS", help="a .toml file, or a sample's name")
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, help="folder; default: the file's name in the working folder"
-    )
+    parser = add_command(commands, "batch", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
     parser.add_argument(
         "--method", metavar="M", action="append", default=[],
         help="one more method for all scenes, also one of your own, mine.py:Mine; may be repeated",
     )  # fmt: skip
-    parser.add_argument(
-        "--jobs", metavar="N", type=read_count, help="number of processes; default: one a core"
-    )
-    instead = parser.add_mutually_exclusive_group()
-    instead.add_argument("--prepare", action="store_true", help="write the files of the jobs, run none")
-    add_options(parser, instead)
-    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
-    parser.set_defaults(carry_out=carry_out)
+    add_options(parser, {"--jobs N": (read_count, "number of processes; default: one a core")})
+    add_options(parser.add_mutually_exclusive_group(), INSTEAD)
+    add_options(parser, {**FARM_OPTIONS, "--quiet": QUIET})
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

@@ -23,7 +23,7 @@ from ..core.scene.schema import Scene
 from ..core.session.run_scene import RUN_METRICS, Result, run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
 from ..plugins.method_loader import find_installed, is_file_word
-from .arguments import METHOD, add_command, add_scene, load_by_option, say, settings_of
+from .arguments import METHOD, QUIET, add_command, add_options, add_scene, load_by_option, say, settings_of
 from .outside import SUITE, find_beside, refuse_absent
 from .progress import Bar
 from .progress import table as aligned
@@ -56,24 +56,15 @@ SUITE_ONLY = (
 def add(commands: Any) -> None:
     """Add the command."""
     purpose = "Run control methods on the same input, and compare their metrics."
-    parser = add_command(commands, "compare", "compare control methods on the same input", EXAMPLES, purpose)
+    listed = "compare control methods on the same input"
+    parser = add_command(commands, "compare", listed, EXAMPLES, purpose, carry_out=carry_out)
     add_scene(parser, optional=True)
-    parser.add_argument(
-        "--methods", metavar="M,...", type=_methods,
-        help="default virtual_master,cell_states; with --suite all that carry a blister",
-    )  # fmt: skip
-    parser.add_argument("--speed", action="store_true", help="also the largest tracking speeds")
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, help="folder; default: SCENE_compare in the working folder"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace an older folder at the end")
-    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
+    add_options(parser, OPTIONS)
     if suite := find_beside(*SUITE):
         suite.add_suite(parser)
     else:
         parser.add_argument("--suite", nargs=0, action=_AbsentSuite, help="(not part of the extension)")
         parser.set_defaults(suite=None, **dict.fromkeys(SUITE_ONLY))
-    parser.set_defaults(carry_out=carry_out)
 
 
 class _AbsentSuite(argparse.Action):
@@ -95,6 +86,17 @@ def _methods(text: str) -> tuple[str, ...]:
             asked = f"; did you mean {close}" if close else ""
             raise argparse.ArgumentTypeError(f"must be among {', '.join(methods)} (got {name!r}{asked})")
     return names
+
+
+OPTIONS = {
+    "--methods M,...": (
+        _methods, "default virtual_master,cell_states; with --suite all that carry a blister",
+    ),
+    "--speed": "also the largest tracking speeds",
+    "--out DIR": (Path, "folder; default: SCENE_compare in the working folder"),
+    "--overwrite": "replace an older folder at the end",
+    "--quiet": QUIET,
+}  # fmt: skip
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ from ..core.scene.assembly import assemble
 from ..core.scene.schema import SECTIONS, Scene
 from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
 from ..core.shapes.source_file import fit_shape
-from .arguments import add_command, add_scene, scene_of
+from .arguments import add_command, add_options, add_scene, scene_of
 
 EXAMPLES = """\
 examples:
@@ -36,12 +36,10 @@ READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(commands, "describe", "list the parts of a scene and their parameters", EXAMPLES)
+    purpose = "list the parts of a scene and their parameters"
+    parser = add_command(commands, "describe", purpose, EXAMPLES, carry_out=carry_out)
     add_scene(parser)
-    parser.add_argument(
-        "--parameters", action="store_true", help="each key with its value, range, meaning and source instead"
-    )
-    parser.set_defaults(carry_out=carry_out)
+    add_options(parser, {"--parameters": "each key with its value, range, meaning and source instead"})
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ from ..core.studies.axes import Point, Record
 from ..core.studies.evaluation import Pool, evaluate_bundle
 from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder
-from .arguments import add_scene, say, whole_number
+from .arguments import QUIET, add_options, add_scene, say, whole_number
 from .progress import Counted
 from .stop import STOPPED, Stop, refuse_without
 from .worker import count_cores, in_blender
@@ -28,14 +28,7 @@ read_count = whole_number(1, MOST)
 
 def add_pool(parser: argparse.ArgumentParser) -> None:
     """Add the options that say where bundles are evaluated."""
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers", metavar="N", type=read_count, help="number of processes; default: one a core"
-    )
-    where.add_argument(
-        "--scheduler", metavar="ADDRESS", type=_read_address,
-        help="a Dask cluster instead, such as tcp://127.0.0.1:8786",
-    )  # fmt: skip
+    add_options(parser.add_mutually_exclusive_group(), PLACES)
 
 
 def _read_address(text: str) -> str:
@@ -46,18 +39,24 @@ def _read_address(text: str) -> str:
     return text
 
 
+#: Options of which one says where bundles are evaluated.
+PLACES = {
+    "--workers N": (read_count, "number of processes; default: one a core"),
+    "--scheduler ADDRESS": (_read_address, "a Dask cluster instead, such as tcp://127.0.0.1:8786"),
+}
+
+
 def add_series(parser: argparse.ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:
     """Add SCENE and the options of what varies, by its `syntax`, what is measured, where, and how."""
     add_scene(parser)
     parser.add_argument(
         "--vary", metavar=f"KEY={varied}", action="append", required=True, help=f"{syntax}; may be repeated"
     )
-    parser.add_argument(
-        "--metric", metavar="M,...", default=metrics, help=f"metrics of tables and plots; default: {metrics}"
-    )
+    shown = f"metrics of tables and plots; default: {metrics}"
+    add_options(parser, {"--metric M,...": (None, shown, metrics)})
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder")
     add_pool(parser)
-    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
+    add_options(parser, {"--quiet": QUIET})
 
 
 @contextmanager

@@ -20,36 +20,31 @@ from ..core.session.finished_run import Run, find_row, read_run
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, make_formed
 from ..core.surface.skins import SKINS
-from .arguments import add_run, millimeters, say, seconds, told_as_options, whole_number
+from .arguments import RUN, add_command, millimeters, say, seconds, told_as_options, whole_number
 from .progress import table as aligned
 from .stop import require_surface
 
 
-def add_surface(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    shown = "; ".join(f"{name}: {said}" for name, said in SKINS.items())
-    parser.add_argument("--skin", choices=tuple(SKINS), default="bilinear", help=f"{shown}; default bilinear")
-    parser.add_argument(
-        "--resolution",
-        metavar="N",
-        type=whole_number(1, 64),  # 0 stands for the default in files alone
-        default=0,
-        help="points a pitch; default: 1, or 4 for curved skins",
-    )
-    known = Finding()
-    parser.add_argument(
-        "--threshold", metavar="L", type=millimeters, default=known.threshold,
-        help="least distance of a feature from the former surface, mm, or with a unit; "
-        f"default {known.threshold * 1e3:g} mm",
-    )  # fmt: skip
-    parser.add_argument(
-        "--smallest", metavar="N", type=int, default=known.smallest,
-        help=f"least number of pins of a feature; default {known.smallest}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--former", metavar="T", default="0",
-        help="instant of the former surface, s, or 'rest'; default: the start",
-    )  # fmt: skip
+def list_choices(choices: Mapping[str, str], form: str = "{}: {}", separator: str = "; ") -> str:
+    """Write choices with their meanings."""
+    return separator.join(form.format(*choice) for choice in choices.items())
+
+
+#: What counts as a feature unless told otherwise.
+USUAL = Finding()
+#: Options of the surface of a run, and of its features.
+SURFACE = {
+    "--skin": (SKINS, f"{list_choices(SKINS)}; default bilinear", "bilinear"),
+    # 0 stands for the default in files alone.
+    "--resolution N": (whole_number(1, 64), "points a pitch; default: 1, or 4 for curved skins", 0),
+    "--threshold L": (
+        millimeters, "least distance of a feature from the former surface, mm, or with a unit; "
+        f"default {USUAL.threshold * 1e3:g} mm", USUAL.threshold,
+    ),
+    "--smallest N": (int, f"least number of pins of a feature; default {USUAL.smallest}", USUAL.smallest),
+    "--former T": (None, "instant of the former surface, s, or 'rest'; default: the start", "0"),
+}  # fmt: skip
+TIME = {"--time T": (seconds, "instant, s; default: the end")}
 
 
 def finding_of(arguments: argparse.Namespace) -> Finding:
@@ -96,34 +91,8 @@ STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "fea
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = add_run(commands, "export", "write the formed surface of a run as mesh files", EXAMPLES)
-    shown = ", ".join(f"{name} ({said})" for name, said in FORMATS.items())
-    parser.add_argument(
-        "--format", metavar="F,...", type=formats, default=["stl"], help=f"{shown}; default stl"
-    )
-    shown = "; ".join(f"{name}: {said}" for name, said in KINDS.items())
-    parser.add_argument("--kind", choices=tuple(KINDS), default="solid", help=f"{shown}; default solid")
-    add_surface(parser)
-    parser.add_argument(
-        "--base-thickness", metavar="L", type=millimeters,
-        help="base under the lowest point, mm, or with a unit; default: 3 mm",
-    )  # fmt: skip
-    parser.add_argument("--separate", action="store_true", help="one file a feature")
-    parser.add_argument(
-        "--unit", choices=tuple(UNITS), default="mm", help="unit of all formats but glb; default: mm"
-    )
-    parser.add_argument(
-        "--up", choices=AXES, default=UP, help="upward axis of an obj; default y, as Blender's"
-    )
-    parser.add_argument(
-        "--forward",
-        choices=AXES,
-        default="",
-        help="forward axis of an obj, as --forward=-z; default: to --up",
-    )
-    parser.add_argument("--time", metavar="T", type=seconds, help="instant, s; default: the end")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")
-    parser.set_defaults(carry_out=carry_out)
+    purpose = "write the formed surface of a run as mesh files"
+    add_command(commands, "export", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
 
 
 def formats(text: str) -> list[str]:
@@ -132,6 +101,23 @@ def formats(text: str) -> list[str]:
         return list(dict.fromkeys(find_format(name.strip()) for name in text.split(",")))
     except OutputError as error:
         raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+
+
+OPTIONS = {
+    **RUN,
+    "--format F,...": (formats, f"{list_choices(FORMATS, '{} ({})', ', ')}; default stl", ["stl"]),
+    "--kind": (KINDS, f"{list_choices(KINDS)}; default solid", "solid"),
+    **SURFACE,
+    "--base-thickness L": (
+        millimeters, "base under the lowest point, mm, or with a unit; default: 3 mm",
+    ),
+    "--separate": "one file a feature",
+    "--unit": (UNITS, "unit of all formats but glb; default: mm", "mm"),
+    "--up": (AXES, "upward axis of an obj; default y, as Blender's", UP),
+    "--forward": (AXES, "forward axis of an obj, as --forward=-z; default: to --up", ""),
+    **TIME,
+    "--out DIR": (Path, "output folder; default: the run folder"),
+}  # fmt: skip
 
 
 def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
@@ -195,11 +181,9 @@ points of its crests.
 
 def add_features(commands: Any) -> None:
     """Add the command."""
-    parser = add_run(commands, "features", "list the bosses and creases of a run", FEATURE_EXAMPLES)
-    add_surface(parser)
-    parser.add_argument("--time", metavar="T", type=seconds, help="instant, s; default: the end")
-    parser.add_argument("--json", action="store_true", help="write JSON")
-    parser.set_defaults(carry_out=list_features)
+    purpose = "list the bosses and creases of a run"
+    options = {**RUN, **SURFACE, **TIME, "--json": "write JSON"}
+    add_command(commands, "features", purpose, FEATURE_EXAMPLES, carry_out=list_features, options=options)
 
 
 def list_features(arguments: argparse.Namespace) -> int:

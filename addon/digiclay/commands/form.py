@@ -23,7 +23,7 @@ from ..core.scene.schema import Scene
 from ..core.session.run_scene import Result, run, save
 from ..core.shapes.fitting import Fitted, pack
 from ..core.shapes.source_file import find_shape, fit_shape, import_reader, list_shapes
-from .arguments import add_command, add_scene, say, scene_of
+from .arguments import QUIET, add_command, add_options, add_scene, say, scene_of
 from .export import formats
 from .extras import Extra, make_extras, plan_meshes, print_skipped
 from .progress import Bar
@@ -43,30 +43,28 @@ formed surface, and the displayed one in the folder 'displayed'.
 """
 #: Bed, method and finger unless --scene names others.
 SCENE = "dome_peaked"
+OPTIONS = {
+    "--finger": (
+        (*GESTURES, "scene"),
+        "press: into the highest part; pull: press, and draw a peak out of it (default); "
+        "away: no touch; scene: as the scene says", "pull",
+    ),
+    "--out DIR": (Path, "folder; default: the shape's name in the working folder"),
+    "--overwrite": "replace an older run at the end",
+    "--export F,...": (formats, "mesh formats; default stl", ["stl"]),
+    "--quiet": QUIET,
+}  # fmt: skip
 
 
 def add(commands: Any) -> None:
     """Add the command."""
     purpose = "Display a mesh, a picture or an array of heights, form it with the fingertip, export it."
     parser = add_command(
-        commands, "form", "display a shape, form it with the fingertip, export it", EXAMPLES, purpose
-    )
-    parser.add_argument("shape", metavar="SHAPE", help="a sample shape's name, or a file")
-    add_scene(parser, SCENE)
-    parser.add_argument(
-        "--finger", choices=(*GESTURES, "scene"), default="pull",
-        help="press: into the highest part; pull: press, and draw a peak out of it (default); away: "
-        "no touch; scene: as the scene says",
+        commands, "form", "display a shape, form it with the fingertip, export it", EXAMPLES, purpose,
+        carry_out=carry_out, options={"shape SHAPE": "a sample shape's name, or a file"},
     )  # fmt: skip
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, help="folder; default: the shape's name in the working folder"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace an older run at the end")
-    parser.add_argument(
-        "--export", metavar="F,...", type=formats, default=["stl"], help="mesh formats; default stl"
-    )
-    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
-    parser.set_defaults(carry_out=carry_out)
+    add_scene(parser, SCENE)
+    add_options(parser, OPTIONS)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

@@ -56,6 +56,18 @@ On several machines, a long film in parts:
   digiclay job JOB --only film --frames 0-49      some frames; on any machine, in any order
   digiclay job JOB --only film                    the film of these frames; draws those that are missing
 """
+OPTIONS = {
+    "job JOB": (Path, "the folder of the job"),
+    "--out DIR": (Path, "default: ../../runs/JOB, as in a series"),
+    "--only": (("run", *MOVING), "a part: all but the films, or one film"),
+    "--frames A-B": "with --only: these frames of the film, from 0",
+    "--method M": "a control method of your own, from the job's folder (method.py:Mine) or elsewhere",
+    "--overwrite": "replace a run, a finished one too",
+    "--quiet": "print errors only",
+    # How a batch starts it: at what time, and that it is to stop when its standard input ends.
+    "--since": (float, argparse.SUPPRESS),
+    "--follow": argparse.SUPPRESS,
+}
 #: Seconds that the process of a batch that was killed gets to end.
 GRACE = 20.0
 
@@ -63,21 +75,7 @@ GRACE = 20.0
 def add(commands: Any) -> None:
     """Add the command."""
     purpose = "run one job of a series from its files alone; for render farms"
-    parser = add_command(commands, "job", purpose, EXAMPLES, listed=False)
-    parser.add_argument("job", metavar="JOB", type=Path, help="the folder of the job")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="default: ../../runs/JOB, as in a series")
-    parser.add_argument("--only", choices=("run", *MOVING), help="a part: all but the films, or one film")
-    parser.add_argument("--frames", metavar="A-B", help="with --only: these frames of the film, from 0")
-    parser.add_argument(
-        "--method", metavar="M",
-        help="a control method of your own, from the job's folder (method.py:Mine) or elsewhere",
-    )  # fmt: skip
-    parser.add_argument("--overwrite", action="store_true", help="replace a run, a finished one too")
-    parser.add_argument("--quiet", action="store_true", help="print errors only")
-    # How a batch starts it: at what time, and that it is to stop when its standard input ends.
-    parser.add_argument("--since", type=float, help=argparse.SUPPRESS)
-    parser.add_argument("--follow", action="store_true", help=argparse.SUPPRESS)
-    parser.set_defaults(carry_out=carry_out)
+    add_command(commands, "job", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS, listed=False)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
@@ -207,10 +205,8 @@ It needs neither the JOBS file nor Blender. Exit code 0 also while jobs are miss
 def add_page(commands: Any) -> None:
     """Add the command."""
     purpose = "write the page of a job series from the runs that are done"
-    parser = add_command(commands, "page", purpose, PAGE_EXAMPLES, listed=False)
-    parser.add_argument("series", metavar="DIR", type=Path, help="the folder of the series")
-    parser.add_argument("--quiet", action="store_true", help="print errors only")
-    parser.set_defaults(carry_out=write_page)
+    options = {"series DIR": (Path, "the folder of the series"), "--quiet": "print errors only"}
+    add_command(commands, "page", purpose, PAGE_EXAMPLES, carry_out=write_page, options=options, listed=False)
 
 
 def write_page(arguments: argparse.Namespace) -> int:

@@ -30,12 +30,7 @@ TEMPLATE = Path(__file__).parents[1] / "sample_shapes" / "methods" / "template.t
 def add(commands: Any) -> None:
     """Add the command."""
     purpose = "write the file of a control method of your own, which runs as it is"
-    parser = add_command(commands, "new-method", purpose, EXAMPLES)
-    parser.add_argument("name", metavar="NAME", type=_name, help="such as mine or soft_pad")
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="default: the working folder")
-    parser.add_argument("--overwrite", action="store_true", help="replace an older file")
-    parser.add_argument("--quiet", action="store_true", help="print errors only")
-    parser.set_defaults(carry_out=carry_out)
+    add_command(commands, "new-method", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
 
 
 def _name(text: str) -> str:
@@ -48,6 +43,14 @@ def _name(text: str) -> str:
     if name_method(name_class(text)) != text:
         raise argparse.ArgumentTypeError(f"must have no digit behind a _ (got {text!r})")
     return text
+
+
+OPTIONS = {
+    "name NAME": (_name, "such as mine or soft_pad"),
+    "--out DIR": (Path, "default: the working folder", Path()),
+    "--overwrite": "replace an older file",
+    "--quiet": "print errors only",
+}
 
 
 def name_class(name: str) -> str:

@@ -18,7 +18,7 @@ from ..core.metrics.summary import compute_metrics
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
-from .arguments import add_run, say, seconds, size, told_as_options
+from .arguments import RUN, add_command, add_options, say, seconds, size, told_as_options
 from .progress import Counted
 from .stop import (
     STOPPED,
@@ -41,6 +41,24 @@ examples:
   digiclay render ridge_mound_valley --film --speed 2 --color force
   digiclay render ridge_mound_valley --turntable --frames 48 --engine cycles
 """
+KINDS = {
+    "--film": "session as film.mp4, with a plot of the force",
+    "--turntable": "one rotation at an instant, as turntable.mp4",
+}
+OPTIONS = {
+    "--time T": (seconds, "instant, s; default: the last touch, or the end for a turntable"),
+    "--out FILE": (Path, "output file; default: in the run folder"),
+    "--size WxH": (size, "default 1600x1000; 960x600 for films"),
+    "--engine": (ENGINES, "default cycles; workbench for films"),
+    "--color": (COLORS, "quantity shown by the colors of the pins; default: mode"),
+}
+MOVING = {
+    "--rate N": (int, "frames a second of film; default 25"),
+    "--frames N": (int, "frames of a rotation; default: 75"),
+    "--speed X": (float, "simulated seconds a second of film; default 1"),
+    "--start T": (seconds, "first instant of the film, s"),
+    "--stop T": (seconds, "last instant of the film, s"),
+}
 #: What a picture is called unless told otherwise.
 PICTURE = "pins.png"
 #: How a picture looks unless told otherwise.
@@ -55,38 +73,20 @@ OF_TURNTABLES = ("rate", "frames")
 def add(commands: Any) -> None:
     """Add the command."""
     purpose = "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy"
-    parser = add_run(commands, "render", purpose, EXAMPLES)
+    parser = add_command(commands, "render", purpose, EXAMPLES, carry_out=carry_out, options=RUN)
     kind = parser.add_mutually_exclusive_group()
-    kind.add_argument("--film", action="store_true", help="session as film.mp4, with a plot of the force")
-    kind.add_argument("--turntable", action="store_true", help="one rotation at an instant, as turntable.mp4")
-    parser.add_argument(
-        "--time", metavar="T", type=seconds,
-        help="instant, s; default: the last touch, or the end for a turntable",
-    )  # fmt: skip
-    parser.add_argument("--out", metavar="FILE", type=Path, help="output file; default: in the run folder")
-    parser.add_argument("--size", metavar="WxH", type=size, help="default 1600x1000; 960x600 for films")
-    parser.add_argument("--engine", choices=ENGINES, help="default cycles; workbench for films")
-    parser.add_argument(
-        "--color", choices=COLORS, help="quantity shown by the colors of the pins; default: mode"
-    )
+    add_options(kind, KINDS)
+    add_options(parser, OPTIONS)
     # Scripts written for older versions have it so.
     parser.add_argument("--colour", dest="color", choices=COLORS, help=argparse.SUPPRESS)
     parser.add_argument(
         "--arrows", action=argparse.BooleanOptionalAction, help="forces as arrows; default: in films only"
     )
-    parser.add_argument("--rate", metavar="N", type=int, help="frames a second of film; default 25")
-    parser.add_argument("--frames", metavar="N", type=int, help="frames of a rotation; default: 75")
+    add_options(parser, MOVING)
     parser.add_argument(
-        "--speed", metavar="X", type=float, help="simulated seconds a second of film; default 1"
-    )
-    parser.add_argument("--start", metavar="T", type=seconds, help="first instant of the film, s")
-    parser.add_argument("--stop", metavar="T", type=seconds, help="last instant of the film, s")
-    parser.add_argument(
-        "--strip",
-        action=argparse.BooleanOptionalAction,
+        "--strip", action=argparse.BooleanOptionalAction,
         help="plot of the total force over time; default: in films",
-    )
-    parser.set_defaults(carry_out=carry_out)
+    )  # fmt: skip
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
@@ -205,9 +205,8 @@ PLOTS = ("session.png", "surface.png")
 def add_plot(commands: Any) -> None:
     """Add the command."""
     purpose = "draw heights and force of a run over time, and its final surface"
-    parser = add_run(commands, "plot", purpose, PLOT_EXAMPLES)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")
-    parser.set_defaults(carry_out=plot)
+    options = {**RUN, "--out DIR": (Path, "output folder; default: the run folder")}
+    add_command(commands, "plot", purpose, PLOT_EXAMPLES, carry_out=plot, options=options)
 
 
 def plotted(scene: Scene, history: Mapping[str, NDArray[Any]], folder: Path) -> list[Path]:

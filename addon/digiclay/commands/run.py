@@ -18,7 +18,7 @@ from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import Result, run, save
 from ..core.studies.omissions import Fitted, find_omissions
 from ..plugins.method_loader import describe_origin, write_code
-from .arguments import add_command, add_scene, length, say, scene_of, told_as_options
+from .arguments import QUIET, add_command, add_options, add_scene, length, say, scene_of, told_as_options
 from .export import formats
 from .extras import (
     Extra,
@@ -86,35 +86,27 @@ examples:
 The run folder holds scene.toml (every parameter), history.npz, metrics.json, the files of the options,
 and method.py, the code of a method of your own. Ctrl-C keeps the computed rows, marked as incomplete.
 """
+OPTIONS = {
+    "--out DIR": (Path, "folder; default: the scene's name in the working folder"),
+    "--overwrite": "replace an older run at the end",
+    "--export F,...": (formats, "also meshes: stl,obj,ply,glb,3mf", []),
+    "--budget E": (
+        length,
+        "omit parts of the model that change no height by more than this, such as 20um, and report them",
+    ),
+    "--plots": "also plots, session.png and surface.png",
+    "--render": "also a picture, pins.png (needs bpy)",
+    "--no-errors": "without error estimates, which take about one and a half times the run's time",
+    "--quiet": QUIET,
+}  # fmt: skip
 
 
 def add(commands: Any) -> None:
     """Add the command."""
     purpose = "Simulate a scene and write its folder."
-    parser = add_command(commands, "run", "simulate a scene", EXAMPLES, purpose)
+    parser = add_command(commands, "run", "simulate a scene", EXAMPLES, purpose, carry_out=carry_out)
     add_scene(parser)
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, help="folder; default: the scene's name in the working folder"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace an older run at the end")
-    parser.add_argument(
-        "--export", metavar="F,...", type=formats, default=[], help="also meshes: stl,obj,ply,glb,3mf"
-    )
-    parser.add_argument(
-        "--budget",
-        metavar="E",
-        type=length,
-        help="omit parts of the model that change no height by more than this, such as 20um, and report them",
-    )
-    parser.add_argument("--plots", action="store_true", help="also plots, session.png and surface.png")
-    parser.add_argument("--render", action="store_true", help="also a picture, pins.png (needs bpy)")
-    parser.add_argument(
-        "--no-errors",
-        action="store_true",
-        help="without error estimates, which take about one and a half times the run's time",
-    )
-    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
-    parser.set_defaults(carry_out=carry_out)
+    add_options(parser, OPTIONS)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

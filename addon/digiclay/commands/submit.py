@@ -18,22 +18,17 @@ from .worker import find_program, start_blender
 
 #: Frames of a film that a task draws unless told otherwise.
 CHUNK = 50
-
-
-def add_options(parser: argparse.ArgumentParser, exclusive: argparse._MutuallyExclusiveGroup) -> None:
-    """Add the options of a submission. `exclusive`: of options of which one may be given."""
-    exclusive.add_argument(
-        "--submit", metavar="FORMAT", choices=FORMATS,
-        help=f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
-    )  # fmt: skip
-    parser.add_argument(
-        "--program", metavar="PATH",
-        help="with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
-    )  # fmt: skip
-    parser.add_argument(
-        "--chunk", metavar="N", type=read_count,
-        help=f"with --submit: frames of a film that a task draws; default {CHUNK}",
-    )  # fmt: skip
+#: The option that asks for a submission, and those that need it.
+SUBMIT = {
+    "--submit FORMAT": (
+        FORMATS, f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
+    ),
+}  # fmt: skip
+FARM_OPTIONS = {
+    "--program PATH":
+        "with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
+    "--chunk N": (read_count, f"with --submit: frames of a film that a task draws; default {CHUNK}"),
+}  # fmt: skip
 
 
 def refuse_alone(arguments: argparse.Namespace) -> None:

@@ -40,9 +40,8 @@ def add(commands: Any) -> None:
         "run a scene over a grid of parameter values",
         "Run a scene at many points of its parameters.",
     )
-    parser = add_command(commands, "sweep", listed, EXAMPLES, purpose)
+    parser = add_command(commands, "sweep", listed, EXAMPLES, purpose, carry_out=carry_out)
     add_series(parser, "START:STOP:COUNT, START:STOP:COUNT:log or A,B,C", "rfd,lag", "VALUES")
-    parser.set_defaults(carry_out=carry_out)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
