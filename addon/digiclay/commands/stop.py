@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -26,10 +26,10 @@ ASKING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if h
 
 
 class Stop:
-    """Block in which a first signal is noted and a second one interrupts."""
+    """Block in which a first signal is noted and a second one interrupts; the first if `requested`."""
 
-    def __init__(self) -> None:
-        self.requested = False
+    def __init__(self, *, requested: bool = False) -> None:
+        self.requested = requested
         self._former: dict[int, Any] = {}
 
     def __call__(self) -> bool:
@@ -37,7 +37,12 @@ class Stop:
         return self.requested
 
     def __enter__(self) -> Stop:
-        self._former = _handle(self._note)
+        # Python takes signals in its main thread only; elsewhere nobody can ask.
+        with suppress(ValueError):
+            for number in ASKING:
+                # A closed terminal does not end what nohup has begun.
+                if number in ASKING[:2] or signal.getsignal(number) != signal.SIG_IGN:
+                    self._former[number] = signal.signal(number, self._note)
         return self
 
     def _note(self, number: int, frame: FrameType | None) -> None:
@@ -46,40 +51,14 @@ class Stop:
         self.requested = True
 
     def __exit__(self, *raised: object) -> None:
-        _restore(self._former)
+        for number, handler in self._former.items():
+            # Python does not know a handler that Blender itself has set, and cannot set it again.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
-def _handle(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
-    """Handle what asks to stop; return the former handlers, none where signals cannot be handled."""
-    former: dict[int, Any] = {}
-    # Python takes signals in its main thread only; elsewhere nobody can ask.
-    with suppress(ValueError):
-        for number in ASKING:
-            # A closed terminal does not end what nohup has begun.
-            if number in ASKING[:2] or signal.getsignal(number) != signal.SIG_IGN:
-                former[number] = signal.signal(number, handler)
-    return former
-
-
-def _restore(former: dict[int, Any]) -> None:
-    """Handle signals again as before."""
-    for number, handler in former.items():
-        # Python does not know a handler that Blender itself has set, and cannot set it again.
-        signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-
-@contextmanager
-def allow_interrupt() -> Iterator[None]:
+def allow_interrupt() -> Stop:
     """Let a first signal interrupt at once, SIGTERM as Ctrl-C does: where there is nothing to be kept."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    former = _handle(interrupt)
-    try:
-        yield
-    finally:
-        _restore(former)
+    return Stop(requested=True)
 
 
 @contextmanager
