@@ -79,7 +79,7 @@ guide-pictures: ## follow the guide in a window, and retake its pictures
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -rf .reports/guide; DIGICLAY_SCREENSHOTS=$(CURDIR)/.reports/guide .venv/bin/python -m pytest tests/window/test_first_minute.py tests/window/test_press_tool.py
-	@.venv/bin/python tools/guide_pictures.py .reports/guide
+	@.venv/bin/python tools/doc_pictures.py --guide .reports/guide
 
 test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids; reproduce the paper
 	@tools/programs .reports/proof.log "admesh assimp prusa-slicer" "admesh assimp-utils prusa-slicer"

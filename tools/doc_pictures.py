@@ -1,4 +1,7 @@
-"""Pictures of the docs that are drawn without a window: `python tools/doc_pictures.py NAME ...`.
+"""Pictures of the docs: `python tools/doc_pictures.py NAME ...` draws those that need no window.
+
+`python tools/doc_pictures.py --guide FOLDER` takes those of the guide from the screenshots of window
+tests in a folder.
 
 CONTRIBUTING.md has the command of every picture.
 """
@@ -17,6 +20,10 @@ from digiclay.cli import main as digiclay
 from PIL import Image
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+#: Left, top, right and bottom, pixels.
+Area = tuple[int, int, int, int]
+#: The area of the 3D view in a window of 1100 x 720.
+VIEW = (0, 28, 910, 646)
 #: Size of the picture of a series' page, pixels.
 SERIES = (1300, 1080)
 #: Series of which a frame of a film is shown, and the frame: the ridge under way.
@@ -45,10 +52,19 @@ def carry_out(*words: str | Path) -> None:
         sys.exit(code)
 
 
-def save_jpeg(picture: Path, name: str) -> None:
-    """Write a picture into the docs as a JPEG. `name`: its name there."""
+def save_jpeg(picture: Path, name: str, quality: int = 88, area: Area | None = None) -> None:
+    """Write a picture, or an area of it, into the docs as a JPEG. `name`: its name there."""
     with Image.open(picture) as opened:
-        opened.convert("RGB").save(PICTURES / name, quality=88, optimize=True)
+        opened.convert("RGB").crop(area).save(PICTURES / name, quality=quality, optimize=True)
+
+
+def cut_guide(folder: Path) -> None:
+    """Write the 3D view in each screenshot of the guide that a folder has as a JPEG."""
+    shots = sorted(folder.glob("guide_*.png"))
+    if not shots:
+        sys.exit(f"{folder} must have screenshots named guide_*.png (got none): run tests/window first")
+    for shot in shots:
+        save_jpeg(shot, f"{shot.stem}.jpg", 85, VIEW)
 
 
 def draw_pins(folder: Path) -> None:
@@ -151,7 +167,9 @@ DRAWN: dict[str, Callable[[Path], None]] = {
 
 
 def main(names: list[str]) -> None:
-    """Draw the named pictures."""
+    """Draw the named pictures, or take those of the guide."""
+    if names[:1] == ["--guide"]:
+        return cut_guide(Path(names[1]))
     if not names or set(names) - set(DRAWN):
         sys.exit(
             f"The arguments must be names of pictures: {', '.join(DRAWN)} (got {' '.join(names) or 'none'})"

@@ -1,6 +1,6 @@
-"""Pages of the site that are made at each build: command line, parameters, Python, files from elsewhere.
+"""Hook of MkDocs (`mkdocs.yml`): pages made at each build, anchors and links as in the repository.
 
-Each function returns the Markdown of a page; `tools/site_hook.py` hands them to MkDocs.
+The pages are the command line, the parameters, Python, and files from elsewhere.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ import os
 import posixpath
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "tools")]
@@ -22,6 +24,8 @@ from digiclay.commands.parser import parser  # noqa: E402
 from digiclay.core.base.quantity import EXTENTS, Parameters, list_quantities  # noqa: E402
 from digiclay.core.control.methods import METHODS  # noqa: E402
 from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
+from manual import make_anchor  # noqa: E402
+from mkdocs.structure.files import File  # noqa: E402
 
 from benchmarks.kinds import parser as benchmarks_parser  # noqa: E402
 
@@ -65,6 +69,8 @@ together; [tasks](../tasks.md#python) has a first program.
 | package | content |
 |---|---|
 """
+#: Page that lists the packages of the code; the pages of the packages follow it in the navigation.
+PACKAGES_PAGE = "reference/python.md"
 #: Head of a page whose results of a search come after those of the pages for readers.
 BEHIND = "---\nsearch:\n  boost: 0.0005\n---\n"
 #: Head of a page whose results come before those of the others.
@@ -179,3 +185,53 @@ def relink(text: str, source: str, page: str) -> str:
         return f"{picture}[{label}]({posixpath.relpath(there, posixpath.dirname(page) or '.')}{mark}{anchor})"
 
     return LINK.sub(place, text)
+
+
+def _lists(nav: list[Any]) -> Iterator[list[Any]]:
+    """Yield the lists of a navigation, from the outside inwards."""
+    yield nav
+    for entry in nav:
+        for inside in entry.values() if isinstance(entry, dict) else ():
+            if isinstance(inside, list):
+                yield from _lists(inside)
+
+
+def on_config(config: Any) -> None:
+    """Set the form of the anchors, and add the packages to the navigation."""
+    config.mdx_configs.setdefault("toc", {})["slugify"] = make_anchor
+    pages = [{name: f"reference/python/{name}.md"} for name in list_packages()]
+    places = [one for one in _lists(config.nav) if PACKAGES_PAGE in one]
+    if len(places) != 1:
+        raise ValueError(
+            f"mkdocs.yml: nav must have {PACKAGES_PAGE} once, got {len(places)}: packages are added there"
+        )
+    places[0].extend(pages)
+
+
+def on_files(files: Any, config: Any) -> None:
+    """Add the pages that are made from the code, those from outside docs/, and the measured results."""
+    packages = list_packages()
+    made: dict[str, str | bytes] = {
+        "reference/commands.md": make_commands_page(),
+        "reference/parameters.md": make_parameters_page(),
+        PACKAGES_PAGE: make_packages_page(packages),
+    }
+    for name, modules in packages.items():
+        made[f"reference/python/{name}.md"] = make_package_page(name, modules)
+    for page, source in ELSEWHERE.items():
+        made[page] = (ROOT / source).read_text(encoding="utf-8")
+    for path in (ROOT / "benchmarks" / "results").iterdir():
+        place = find_place(path.relative_to(ROOT).as_posix())
+        if place:
+            made[place] = path.read_bytes()
+    for place, content in made.items():
+        files.append(File.generated(config, place, content=content))
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
+    """Return the text of a page with the links of the site."""
+    place = page.file.src_uri
+    if place.startswith("reference/"):
+        return markdown
+    source = ELSEWHERE.get(place, f"docs/{place}")
+    return relink(markdown, source, place)
