@@ -12,14 +12,16 @@ import argparse
 import collections
 import copy
 import io
+import itertools
 import json
 import sys
 import tempfile
 import warnings
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path as FolderPath
+from traceback import extract_tb
 from typing import Any
 
 import numpy as np
@@ -68,6 +70,11 @@ CELLS, PERIODS, RECORDED = 200, 3, 1_000_000
 WAYS = (*METHODS, ABSENT)
 
 
+def pick(chance: np.random.Generator, values: Sequence[Any]) -> Any:
+    """Return one of some values."""
+    return values[chance.integers(len(values))]
+
+
 def odd(chance: np.random.Generator, usual: Any) -> Any:
     """Return something in place of a usual value: mostly numbers, some of them near the usual one."""
     draw = chance.random()
@@ -76,17 +83,17 @@ def odd(chance: np.random.Generator, usual: Any) -> Any:
     if draw < 0.4 and isinstance(usual, tuple):
         return [odd(chance, one) for one in usual]
     if draw < 0.85:
-        return NUMBERS[chance.integers(len(NUMBERS))]
-    return copy.deepcopy(OTHERS[chance.integers(len(OTHERS))])  # lists among them are changed later
+        return pick(chance, NUMBERS)
+    return copy.deepcopy(pick(chance, OTHERS))  # lists among them are changed later
 
 
 def table(chance: np.random.Generator) -> dict[str, Any]:
     """Return the tables of a scene in which some values are odd."""
-    method = WAYS[chance.integers(len(WAYS))]
+    method = pick(chance, WAYS)
     made: dict[str, Any] = {
-        "preset": list(PRESETS)[chance.integers(len(PRESETS))],
+        "preset": pick(chance, list(PRESETS)),
         "layout": {"rows": int(chance.integers(1, 6)), "columns": int(chance.integers(1, 6))},
-        "simulation": {"stepper": list(STEPPERS)[chance.integers(len(STEPPERS))]},
+        "simulation": {"stepper": pick(chance, list(STEPPERS))},
         "control": method if method == ABSENT else {"method": method},
     }
     if METHODS.get(method) and METHODS[method].blister is not None:
@@ -98,22 +105,20 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
         if chance.random() < 0.05:
             made[section] = ABSENT
     for _ in range(chance.integers(1, 4)):
-        section = SECTIONS[chance.integers(len(SECTIONS))]
+        section = pick(chance, SECTIONS)
         if made.get(section) == ABSENT or (section == "blister" and "blister" not in made):
             continue
         known = import_parameters(section, method if method != ABSENT else "virtual_master")
         fields = list(list_quantities(known))
-        field = fields[chance.integers(len(fields))]
+        field = pick(chance, fields)
         made.setdefault(section, {})[field] = odd(chance, getattr(known(), field))
     if chance.random() < 0.2:
-        points = [
-            {"time": 0.1 * number, "position": [0.0, 0.0, 0.046 - 0.003 * number]} for number in range(4)
-        ]
-        point = points[chance.integers(4)]
-        field = ("time", "position", "orientation")[chance.integers(3)]
+        points = [{"time": 0.1 * i, "position": [0.0, 0.0, 0.046 - 0.003 * i]} for i in range(4)]
+        point = pick(chance, points)
+        field = pick(chance, ("time", "position", "orientation"))
         usual = {"orientation": (1.0, 0.0, 0.0, 0.0)}.get(field) or point.get(field)
         point[field] = odd(chance, tuple(usual) if isinstance(usual, list) else usual)
-        made["trajectory"] = {"waypoints": points, "interpolation": ("smooth", "linear")[chance.integers(2)]}
+        made["trajectory"] = {"waypoints": points, "interpolation": pick(chance, ("smooth", "linear"))}
     if chance.random() < 0.2:
         # The same finger as one or two in a list; the physics refuses two.
         own = {section: made.pop(section) for section in FINGER_SECTIONS if section in made}
@@ -137,7 +142,7 @@ def spoilt(chance: np.random.Generator) -> str:
         at = int(chance.integers(len(lines)))
         key, equals, _ = lines[at].partition(" = ")
         if equals and chance.random() < 0.7:
-            value = NUMBERS[chance.integers(len(NUMBERS))]
+            value = pick(chance, NUMBERS)
             lines[at] = f"{key} = {str(value).lower() if isinstance(value, bool) else value}"
         else:
             place = int(chance.integers(len(lines[at]) + 1))
@@ -158,13 +163,8 @@ def scene(chance: np.random.Generator) -> None:
     assert resolve(parse_tables(format_scene(found))) == found
     if found.cells > CELLS or found.cells * found.periods > RECORDED:
         return
-    seen: list[int] = []
-
-    def stopped() -> bool:
-        seen.append(0)
-        return len(seen) >= PERIODS
-
-    json.dumps(run(found, stopped=stopped).metrics, allow_nan=False)
+    asked = itertools.count(1)
+    json.dumps(run(found, stopped=lambda: next(asked) >= PERIODS).metrics, allow_nan=False)
 
 
 @cache
@@ -186,20 +186,16 @@ def crafted(chance: np.random.Generator, data: bytes) -> bytes:
         draw = chance.random()
         if draw < 0.6:
             where: Any = header
-            while True:
-                places = list(where) if isinstance(where, dict) else list(range(len(where)))
-                if not places:
+            while places := list(where) if isinstance(where, dict) else list(range(len(where))):
+                place = pick(chance, places)
+                if not isinstance(where[place], (dict, list)) or chance.random() >= 0.8:
+                    where[place] = odd(chance, where[place])
                     break
-                place = places[chance.integers(len(places))]
-                if isinstance(where[place], (dict, list)) and chance.random() < 0.8:
-                    where = where[place]
-                    continue
-                where[place] = odd(chance, where[place])
-                break
+                where = where[place]
         elif draw < 0.9:
             at = int(chance.integers(len(arrays) // 8)) * 8
-            value = NUMBERS[chance.integers(len(NUMBERS))]
-            kind = ("<f8", "<i8")[chance.integers(2)]
+            value = pick(chance, NUMBERS)
+            kind = pick(chance, ("<f8", "<i8"))
             with np.errstate(all="ignore"):
                 number = np.float64(float(value) if abs(value) < 10**308 else np.inf)
                 arrays[at : at + 8] = number.astype(kind).tobytes()
@@ -215,7 +211,7 @@ def crafted(chance: np.random.Generator, data: bytes) -> bytes:
 
 def state(chance: np.random.Generator) -> None:
     """Take up a crafted state and go on from it, or have it refused."""
-    system, data = kept(list(METHODS)[chance.integers(len(METHODS))])
+    system, data = kept(pick(chance, list(METHODS)))
     finger = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1, 1))
     for take_up in (snapshot.load, snapshot.transfer_heights):
         found = take_up(system, crafted(chance, data))
@@ -230,14 +226,14 @@ def odd_array(chance: np.random.Generator, usual: NDArray[Any]) -> NDArray[Any]:
     draw = chance.random()
     with np.errstate(all="ignore"):
         if draw < 0.4:
-            kind = np.dtype(KINDS[chance.integers(len(KINDS))])
+            kind = np.dtype(pick(chance, KINDS))
             return usual.astype(kind) if kind.names is None else np.zeros(usual.shape, kind)
         if draw < 0.6:
             flat = usual.ravel()
             shapes = flat, usual[None], flat[:0], flat[:1], usual.T, np.array(3.0), flat[:-1]
-            return shapes[chance.integers(len(shapes))]
+            return pick(chance, shapes)
         made = usual.copy()
-        number = NUMBERS[chance.integers(len(NUMBERS))]
+        number = pick(chance, NUMBERS)
         number = float(number) if abs(number) < 10**309 else float("inf")
         made.reshape(-1)[chance.integers(made.size)] = np.float64(number).astype(made.dtype)
         return made
@@ -253,7 +249,7 @@ def pack(chance: np.random.Generator, arrays: dict[str, NDArray[Any]]) -> bytes:
         for name, array in arrays.items():
             part = io.BytesIO()
             np.lib.format.write_array(part, np.asarray(array), allow_pickle=False)
-            data, (old, new) = part.getvalue(), words[chance.integers(4)]
+            data, (old, new) = part.getvalue(), pick(chance, words)
             archive.writestr(f"{name}.npy", data.replace(old, new, 1) if chance.random() < 0.05 else data)
     return file.getvalue()
 
@@ -304,10 +300,8 @@ def failure(kind: str, seed: int, number: int) -> str | None:
     except DigiclayError as error:
         return f"two lines: {error}" if "\n" in str(error) else None
     except Exception as error:
-        place = error.__traceback__
-        while place and place.tb_next:
-            place = place.tb_next
-        where = f"{place.tb_frame.f_code.co_filename.rpartition('/')[2]}:{place.tb_lineno}" if place else ""
+        place = extract_tb(error.__traceback__)[-1]
+        where = f"{place.filename.rpartition('/')[2]}:{place.lineno}"
         return f"{type(error).__name__} in {where}: {' '.join(str(error).split())[:80]}"
     return ""
 
