@@ -101,8 +101,8 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
     for section in UNASKED:
         if chance.random() < 0.2:
             made[section] = {}
-    for section in set(OPTIONAL) - {"control"}:
-        if chance.random() < 0.05:
+    for section in OPTIONAL:
+        if section != "control" and chance.random() < 0.05:
             made[section] = ABSENT
     for _ in range(chance.integers(1, 4)):
         section = pick(chance, SECTIONS)
