@@ -1,17 +1,23 @@
-"""``digiclay batch``: a job series in the background, on several processes."""
+"""``digiclay batch``: a job series in the background, on several processes, or as files for a render farm.
+
+No network is contacted: what --submit prints in the end is how the files are handed to the farm.
+"""
 
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
-from ..core.base.errors import one_line
+from ..core.base.errors import OutputError, one_line
+from ..core.files.run_folder import make_safe_name, resolve_inside, write_whole
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
+from ..farms.series_plan import FORMATS, Submission, plan_series, split_frames
 from ..plugins.method_loader import find_word
 from .arguments import QUIET, add_command, add_options, load_by_option, say
 from .batch_folder import Folder, open_batch
@@ -19,8 +25,7 @@ from .evaluation_pool import read_count
 from .job_steps import PROGRESS, check_outputs, find_error, read_fraction, read_tail
 from .progress import Counted, format_duration
 from .stop import FAILED, STOPPED, Stop
-from .submit import FARM_OPTIONS, SUBMIT, refuse_alone, write_farm_files
-from .worker import Process, Processes, count_cores
+from .worker import Process, Processes, count_cores, find_program, start_blender
 
 EXAMPLES = """\
 examples:
@@ -33,6 +38,19 @@ examples:
 After Ctrl-C or a kill, the same command continues: finished jobs are kept, and repeated only after a change
 in the JOBS file. Exit code 1: some jobs failed, the others are complete.
 """
+#: Frames of a film that a task draws unless told otherwise.
+CHUNK = 50
+#: The option that asks for a submission, and those that need it.
+SUBMIT = {
+    "--submit FORMAT": (
+        FORMATS, f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
+    ),
+}  # fmt: skip
+FARM_OPTIONS = {
+    "--program PATH":
+        "with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
+    "--chunk N": (read_count, f"with --submit: frames of a film that a task draws; default {CHUNK}"),
+}  # fmt: skip
 OPTIONS = {
     "file JOBS": "a .toml file, or a sample's name",
     "--out DIR": (Path, "folder; default: the file's name in the working folder"),
@@ -190,3 +208,51 @@ def _start_job(folder: Folder, job: Job) -> JobProcess:
     if job.scene is not None and (word := find_word(job.scene)):
         arguments += ["--method", word]
     return JobProcess(arguments, folder.find_log(job))
+
+
+def refuse_alone(arguments: argparse.Namespace) -> None:
+    """Refuse the options of a submission without one."""
+    for name in ("program", "chunk"):
+        if getattr(arguments, name) is not None and arguments.submit is None:
+            raise OutputError(f"--{name} must be given with --submit only.")
+
+
+def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int | None) -> list[str]:
+    """Write the files of a farm, or none in case of an error; return the lines to print."""
+    tasks = plan_series(folder.batch, chunk or CHUNK)
+    made = Submission(make_safe_name(folder.batch.name), find_full(folder.path), tasks, find_start(program))
+    files, lines = FORMATS[form](made)
+    for word in (made.series, *made.program):
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            raise OutputError(f"{word!r} is no valid text: choose another folder with --out.") from None
+    if form == "cuecmd":  # an earlier submission may have had more lists
+        for path in folder.path.glob("cuecmd/[0-9]-*.txt"):
+            if f"cuecmd/{path.name}" not in files:
+                path.unlink()
+    for name, text in files.items():
+        path = resolve_inside(folder.path, *name.split("/"))
+        path.parent.mkdir(exist_ok=True)
+        write_whole(path, text.encode())
+    count = len(split_frames(tasks))
+    return [f"{count} tasks written to {', '.join(str(folder.path / name) for name in files)}", *lines]
+
+
+def find_full(path: Path) -> str:
+    """Return a full path without ``..``, through the links by which the user named it where that is right."""
+    full = os.path.abspath(path)
+    return full if os.path.exists(full) and os.path.samefile(full, path) else os.path.realpath(path)
+
+
+def find_start(program: str | None) -> list[str]:
+    """Return a program of the farm, or this process's, and its arguments before those of digiclay."""
+    if program is None:
+        return find_program()[0]
+    if not program.strip():
+        raise OutputError("--program must be the path of digiclay or Blender (got an empty one).")
+    # The paths of the farm need not be those of this system; this kind knows both separators.
+    kind = PureWindowsPath(program).stem.lower()
+    if kind.startswith("blender"):
+        return start_blender(program)
+    return [program, "-m", "digiclay"] if kind.startswith("python") else [program]

@@ -20,7 +20,7 @@ from ..core.model.control_interface import find_set_point
 from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
-from ..core.session.run_scene import RUN_METRICS, Result, run
+from ..core.session.run_scene import RUN_METRICS, run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
 from ..plugins.method_loader import find_installed, is_file_word
 from .arguments import METHOD, QUIET, add_command, add_options, add_scene, load_by_option, say, settings_of
@@ -120,7 +120,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
     beyond: dict[str, str] = {}
     with allow_interrupt(), write_folder(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
-            done = _run(scene, method, quiet=arguments.quiet)
+            with Bar(sys.stderr, method, scene.simulation.control_period) as bar:
+                progress = None if arguments.quiet else bar
+                done = run(replace(scene, recorder=Recorder()), progress=progress)
             measured[method] = done.figures | (_speeds(scene) if arguments.speed else {})
             wanted = find_set_point(scene.set_point, sum_cells(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
@@ -154,12 +156,6 @@ def _refuse_options_of_suite(arguments: argparse.Namespace) -> None:
             raise OutputError(f"--{name.replace('_', '-')} is for --suite.")
     if arguments.scene is None:
         raise OutputError("The following arguments are required: SCENE, or --suite.")
-
-
-def _run(scene: Scene, method: str, *, quiet: bool) -> Result:
-    """Run one method under a progress bar."""
-    with Bar(sys.stderr, method, scene.simulation.control_period) as bar:
-        return run(replace(scene, recorder=Recorder()), progress=None if quiet else bar)
 
 
 def _speeds(scene: Scene) -> Metrics:

@@ -11,19 +11,7 @@ from typing import Any, NoReturn
 from .. import __version__
 from ..core.base.errors import one_line
 from ..core.base.quantity import find_nearest_name
-from . import (
-    batch,
-    compare,
-    describe,
-    export,
-    form,
-    job,
-    new_method,
-    outside,
-    render,
-    run,
-    sweep,
-)
+from . import batch, compare, describe, export, form, job, new_method, outside, render, run, sweep
 from .arguments import Help
 from .stop import WRONG
 
