@@ -100,9 +100,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
     refuse_too_many("--samples", total)
     orders = "first, second" if second else "first"
     plan = {"samples": arguments.samples, "seed": arguments.seed, "orders": orders}
-    with Counted(sys.stderr, "study", "points read") as bar:
+    with Counted(sys.stderr, "study", "points read", quiet=arguments.quiet) as bar:
         shares = sample_shares(arguments.samples, count, arguments.seed, second=second)
-        points = make_points(subject, shares, 1, None if arguments.quiet else bar)
+        points = make_points(subject, shares, 1, bar)
         bundles = make_bundles(points, errors=subject.errors)
 
     def evaluate(evaluation: Evaluation) -> None:

@@ -40,12 +40,7 @@ in the JOBS file. Exit code 1: some jobs failed, the others are complete.
 """
 #: Frames of a film that a task draws unless told otherwise.
 CHUNK = 50
-#: The option that asks for a submission, and those that need it.
-SUBMIT = {
-    "--submit FORMAT": (
-        FORMATS, f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
-    ),
-}  # fmt: skip
+#: Options that need --submit.
 FARM_OPTIONS = {
     "--program PATH":
         "with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
@@ -56,7 +51,12 @@ OPTIONS = {
     "--out DIR": (Path, "folder; default: the file's name in the working folder"),
 }
 #: Options of which one may be given.
-INSTEAD = {"--prepare": "write the files of the jobs, run none", **SUBMIT}
+INSTEAD = {
+    "--prepare": "write the files of the jobs, run none",
+    "--submit FORMAT": (
+        FORMATS, f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
+    ),
+}  # fmt: skip
 #: Seconds between two pages that are written while jobs run, at least, and times that a page's writing takes.
 PAUSE, REST = 2.0, 10.0
 
@@ -165,7 +165,7 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
                 refresh()
 
         def draw() -> None:
-            if not arguments.quiet:
+            if not arguments.quiet:  # each reads its log
                 done = before + len(ended) + sum(process.read_fraction() for process in running.values())
                 bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
 

@@ -120,9 +120,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     beyond: dict[str, str] = {}
     with allow_interrupt(), write_folder(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
-            with Bar(sys.stderr, method, scene.simulation.control_period) as bar:
-                progress = None if arguments.quiet else bar
-                done = run(replace(scene, recorder=Recorder()), progress=progress)
+            with Bar(sys.stderr, method, scene.simulation.control_period, quiet=arguments.quiet) as bar:
+                done = run(replace(scene, recorder=Recorder()), progress=bar)
             measured[method] = done.figures | (_speeds(scene) if arguments.speed else {})
             wanted = find_set_point(scene.set_point, sum_cells(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted

@@ -117,17 +117,17 @@ class Evaluation(ExitStack):
         pieces: int = 0,
     ) -> None:
         super().__init__()
-        self.folder, self.total, self.stop, self._quiet = folder, total, stop, arguments.quiet
+        self.folder, self.total, self.stop = folder, total, stop
         self.records = folder.read_records(errors=errors)
         self.failed: dict[int, Record] = {}
-        self._bar = self.enter_context(Counted(sys.stderr, label, "points", len(self.records)))
+        bar = Counted(sys.stderr, label, "points", len(self.records), quiet=arguments.quiet)
+        self._bar = self.enter_context(bar)
         self._open = partial(open_pool, arguments, stop=stop, draw=self._draw, errors=errors)
         self._pieces = pieces
         self._pool: Pool | None = None
 
     def _draw(self, note: str) -> None:
-        if not self._quiet:
-            self._bar(min(len(self.records) + len(self.failed), self.total), self.total, note)
+        self._bar(min(len(self.records) + len(self.failed), self.total), self.total, note)
 
     def collect(self) -> dict[int, Record]:
         """Return the records of all points of the series, those that failed included."""

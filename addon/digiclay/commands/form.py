@@ -82,10 +82,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
         if arguments.finger != "scene":
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
-        with Bar(sys.stderr, scene.name, scene.simulation.control_period) as bar:
-            versions = {"digiclay": __version__}
-            progress = None if arguments.quiet else bar
-            result = run(scene, progress=progress, stopped=stop, versions=versions)
+        with Bar(sys.stderr, scene.name, scene.simulation.control_period, quiet=arguments.quiet) as bar:
+            result = run(scene, progress=bar, stopped=stop, versions={"digiclay": __version__})
         result, lines = _evaluate(result, laid)
         with claim.write() as folder:
             save(result, folder)
@@ -128,10 +126,7 @@ def _evaluate(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
     stands = next(i for i in range(row + 1) if np.abs(height[i] - laid.heights).max() <= error + 1e-9)
     change = height[-1] - height[row]
     area = layout.pitch * layout.row_spacing
-    raised, lowered = (
-        float(np.maximum(change, 0.0).sum() * area),
-        float(np.maximum(-change, 0.0).sum() * area),
-    )
+    raised, lowered = (float(np.maximum(way, 0.0).sum() * area) for way in (change, -change))
     known = {"display_error": error, "raised_volume": raised, "lowered_volume": lowered}
     counts = {
         "shape_covered": laid.covered, "shape_clipped": laid.too_low + laid.too_high,

@@ -23,10 +23,10 @@ WIDTH, PAUSE = 28, 0.1
 
 
 class Line:
-    """Line of a terminal, removed at the end of its block; a stream that is no terminal gets none."""
+    """Line of a terminal, removed at the end of its block; none if `quiet` or on another stream."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream, self._shown = stream, False
+    def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
+        self._stream, self._quiet, self._shown = stream, quiet, False
         self._started = self._drawn = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -39,7 +39,7 @@ class Line:
     def draw(self, said: str) -> None:
         """Draw a text in place of what stood there, as much of it as the terminal is wide."""
         self._drawn = time.monotonic()
-        if not self._stream.isatty():
+        if self._quiet or not self._stream.isatty():
             return
         width = shutil.get_terminal_size().columns - 1  # a longer one goes on below, and would stay there
         self._stream.write(f"\r{said[:width]}\033[K")
@@ -67,8 +67,8 @@ class Line:
 class Bar(Line):
     """Progress of a session, updated after each control period, of `period` s."""
 
-    def __init__(self, stream: TextIO, label: str, period: float) -> None:
-        super().__init__(stream)
+    def __init__(self, stream: TextIO, label: str, period: float, *, quiet: bool = False) -> None:
+        super().__init__(stream, quiet=quiet)
         self._label, self._period = label, period
 
     def __call__(self, done: int, total: int) -> None:
@@ -85,8 +85,10 @@ class Counted(Line):
     `before` were done beforehand: they say nothing about the time the others take.
     """
 
-    def __init__(self, stream: TextIO, label: str, unit: str, before: int = 0) -> None:
-        super().__init__(stream)
+    def __init__(
+        self, stream: TextIO, label: str, unit: str, before: int = 0, *, quiet: bool = False
+    ) -> None:
+        super().__init__(stream, quiet=quiet)
         self._label, self._unit, self._before = label, unit, before
 
     def __call__(self, done: float, total: int, note: str = "") -> None:

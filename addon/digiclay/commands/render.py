@@ -99,18 +99,17 @@ def _draw(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int
     """Draw, and print the path."""
     default = Path(PICTURE if isinstance(looks, Still) else f"{type(looks).__name__.lower()}.mp4")
     out: Path = arguments.out or arguments.run / default
-    name = default.stem
     refuse_file(out, default.suffix)
     refuse_without_blender()
     run = read_run(arguments.run, *ARRAYS)
     row = None if arguments.time is None else find_row(run.history, arguments.time, "--time")
     path: Path | None
-    with claim_files([out]), Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
-        told = None if arguments.quiet else bar
+    bar = Counted(sys.stderr, default.stem, "frames", quiet=arguments.quiet)
+    with claim_files([out]), Stop() as stop, bar:
         if isinstance(looks, Still):  # Blender does not stop within a picture
             path = draw_still(run.scene, run.history, looks, out, row)
         else:
-            path = draw_moving(run.scene, run.history, looks, out, told, stop, row)
+            path = draw_moving(run.scene, run.history, looks, out, bar, stop, row)
     if path is None:
         print("Stopped; nothing was written.", file=sys.stderr)
         return STOPPED

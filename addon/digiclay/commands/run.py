@@ -35,10 +35,8 @@ from .stop import STOPPED, Stop, refuse_without, refuse_without_blender, require
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is."""
-    with Line(sys.stderr) as line:
-        show = None if quiet else lambda text: line.draw(f"trying: {text}")
-        with told_as_options("run"):
-            fit = find_omissions(scene, budget, show=show)
+    with Line(sys.stderr, quiet=quiet) as line, told_as_options("run"):
+        fit = find_omissions(scene, budget, show=lambda text: line.draw(f"trying: {text}"))
     if not quiet:
         print("\n".join(report(fit)))
     return fit
@@ -162,15 +160,10 @@ def _find_error_origin(arguments: argparse.Namespace, path: Path) -> str:
 
 def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
     """Run the session under a progress bar."""
-    period = scene.simulation.control_period
+    versions = {"digiclay": __version__, **describe_origin(scene)}
     try:
-        with Bar(sys.stderr, scene.name, period) as bar:
-            return run(
-                scene,
-                progress=None if quiet else bar,
-                stopped=stop,
-                versions={"digiclay": __version__, **describe_origin(scene)},
-            )
+        with Bar(sys.stderr, scene.name, scene.simulation.control_period, quiet=quiet) as bar:
+            return run(scene, progress=bar, stopped=stop, versions=versions)
     except ParameterError as error:
         raise SceneError(f"{origin}: {error}") from None
 
@@ -179,8 +172,8 @@ def _evaluate(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]
     """Return the result with its errors, where they can be estimated, and whether a stop left them out."""
     if result.incomplete or not has_every_command(result.scene):
         return result, False
-    with Bar(sys.stderr, "errors", result.scene.simulation.control_period) as bar:
-        errors = estimate_errors(result.scene, result.history, progress=None if quiet else bar, stopped=stop)
+    with Bar(sys.stderr, "errors", result.scene.simulation.control_period, quiet=quiet) as bar:
+        errors = estimate_errors(result.scene, result.history, progress=bar, stopped=stop)
     return (result.with_errors(errors), False) if errors else (result, True)
 
 

@@ -48,9 +48,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Run what is not done yet, and write the table and the pictures."""
     names = read_metrics(arguments.metric)
     axes = [read_axis(name_methods(varied)) for varied in arguments.vary]
-    with Counted(sys.stderr, "sweep", "points read") as bar:
-        progress = None if arguments.quiet else bar
-        points = make_points(find(arguments.scene), settings_of(arguments), axes, progress)
+    with Counted(sys.stderr, "sweep", "points read", quiet=arguments.quiet) as bar:
+        points = make_points(find(arguments.scene), settings_of(arguments), axes, bar)
         if not any(point.scene and point.scene.recorder for point in points):
             raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
         errors = any(name in ERRORS for name in names)
