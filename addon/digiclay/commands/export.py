@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_files
@@ -17,6 +15,7 @@ from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix,
 from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import Run, find_row, read_run
+from ..core.session.run_scene import History
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, make_formed
 from ..core.surface.skins import SKINS
@@ -126,19 +125,13 @@ def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
 
 
 def exported(
-    scene: Scene,
-    history: Mapping[str, NDArray[Any]],
-    row: int,
-    kinds: Iterable[str],
-    folder: Path,
-    model: Model | None = None,
+    scene: Scene, history: History, row: int, kinds: Sequence[str], folder: Path, model: Model | None = None
 ) -> list[Path]:
     """Write one row of a history in several formats, by default as the solid; return the files."""
     made = model or Model(cap=scene.actuator.bore / 2.0)
     parts = make_bodies(make_formed(history, row), made, Finding())
-    known = list(kinds)
-    names = file_names(known, made.kind)
-    return [write(parts, folder / name, "mm", kind) for name, kind in zip(names, known, strict=True)]
+    names = file_names(kinds, made.kind)
+    return [write(parts, folder / name, "mm", kind) for name, kind in zip(names, kinds, strict=True)]
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

@@ -6,19 +6,15 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from ..core.base.errors import DigiclayError
 from ..core.scene.schema import Scene
+from ..core.session.run_scene import History
 from .export import exported, file_names
 from .render import PICTURE, PLOTS, STILL, draw_still, plotted
-
-History = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)

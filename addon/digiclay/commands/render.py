@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from numpy.typing import NDArray
 
 from ..core.base.errors import DigiclayError
 from ..core.files.run_folder import claim_files
@@ -18,6 +16,7 @@ from ..core.metrics.summary import compute_metrics
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
+from ..core.session.run_scene import History
 from .arguments import RUN, add_command, add_options, say, seconds, size, told_as_options
 from .progress import Counted
 from .stop import (
@@ -145,9 +144,7 @@ def sizes(scene: Scene) -> dict[str, Any]:
     return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoid(scene)}
 
 
-def draw_still(
-    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Still, out: Path, row: int | None = None
-) -> Path:
+def draw_still(scene: Scene, history: History, looks: Still, out: Path, row: int | None = None) -> Path:
     """Draw the instant of `looks`, or one row of a history; Blender is imported only now."""
     from ..pictures.still import render_still
 
@@ -156,11 +153,11 @@ def draw_still(
 
 def draw_moving(
     scene: Scene,
-    history: Mapping[str, NDArray[Any]],
+    history: History,
     looks: Film | Turntable,
     out: Path,
-    progress: Callable[[int, int], None] | None = None,
-    stopped: Callable[[], bool] | None = None,
+    progress: Callable[[int, int], None],
+    stopped: Callable[[], bool],
     row: int | None = None,
 ) -> Path | None:
     """Draw a session, or one rotation at the instant of `looks` or at a row; None when it was stopped."""
@@ -170,7 +167,7 @@ def draw_moving(
 
 
 def stage_moving(
-    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Film | Turntable, row: int | None = None
+    scene: Scene, history: History, looks: Film | Turntable, row: int | None = None
 ) -> AbstractContextManager[Shots]:
     """Set the stage for the frames of the film that `draw_moving` draws."""
     from ..pictures.film import stage_film, stage_turntable
@@ -181,9 +178,7 @@ def stage_moving(
     return stage_turntable(_find_instant(scene, history, looks, row), looks)
 
 
-def _find_instant(
-    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Still | Turntable, row: int | None
-) -> Instant:
+def _find_instant(scene: Scene, history: History, looks: Still | Turntable, row: int | None) -> Instant:
     """Return a row of a history for drawing, by default the instant of `looks`."""
     from ..device.instant import Instant
 
@@ -208,7 +203,7 @@ def add_plot(commands: Any) -> None:
     add_command(commands, "plot", purpose, PLOT_EXAMPLES, carry_out=plot, options=options)
 
 
-def plotted(scene: Scene, history: Mapping[str, NDArray[Any]], folder: Path) -> list[Path]:
+def plotted(scene: Scene, history: History, folder: Path) -> list[Path]:
     """Draw a history into a folder; return the files."""
     from ..plots.figure import save
     from ..plots.run import session_figure, surface_figure
