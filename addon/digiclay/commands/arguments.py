@@ -19,13 +19,15 @@ from ..plugins.method_loader import load_method
 #: The key of the control method in scene files.
 METHOD = "control.method"
 #: Options by ``"--name METAVAR"``: the help, or type or choices, help, and perhaps the default.
-Options = Mapping[str, str | tuple[Any, ...]]
+Options = Mapping[str, Any]
 #: Options that change a scene.
 SCENE_OPTIONS = {
     "--method M": "control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
     "--stepper S": "stepper: the same as --set simulation.stepper=S",
     "--tolerance T": 'largest error of the heights, such as "1 um": chooses the adaptive stepper',
 }
+#: Their keys in scene files.
+SET_BY = {"method": METHOD, "stepper": "simulation.stepper", "tolerance": "simulation.tolerance"}
 #: Arguments of a command on a finished run.
 RUN = {"run RUN": (Path, "run folder of 'digiclay run'"), "--quiet": "print errors only"}
 #: Help of --quiet where there is a progress line.
@@ -44,10 +46,10 @@ def add_options(parser: Any, options: Options) -> None:
     """Add a table of options; one without metavar and type is a switch."""
     for words, row in options.items():
         name, _, metavar = words.partition(" ")
-        kind, help, default = (None, row, None) if isinstance(row, str) else (*row, None)[:3]
-        if not metavar and isinstance(row, str):
-            parser.add_argument(name, action="store_true", help=help)
+        if isinstance(row, str) and not metavar:
+            parser.add_argument(name, action="store_true", help=row)
             continue
+        kind, help, default = (None, row, None) if isinstance(row, str) else (*row, None)[:3]
         read = {"type": kind} if kind is None or callable(kind) else {"choices": kind}
         parser.add_argument(name, metavar=metavar or None, default=default, help=help, **read)
 
@@ -75,13 +77,11 @@ def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
 def settings_of(arguments: argparse.Namespace) -> list[Setting]:
     """Return what the options of `add_scene` change of a scene file."""
     settings = list(arguments.settings)
-    for option, key in (("method", METHOD), ("stepper", "simulation.stepper")):
+    for option, key in SET_BY.items():
         if getattr(arguments, option) is not None:
             settings.append(Setting(key, getattr(arguments, option), f"--{option}"))
-    if arguments.tolerance is not None:
-        settings.append(Setting("simulation.tolerance", arguments.tolerance, "--tolerance"))
-        if arguments.stepper is None:
-            settings.append(Setting("simulation.stepper", "adaptive", "--tolerance"))
+    if arguments.tolerance is not None and arguments.stepper is None:
+        settings.append(Setting("simulation.stepper", "adaptive", "--tolerance"))
     return [_with_method(setting) if setting.key == METHOD else setting for setting in settings]
 
 

@@ -84,7 +84,7 @@ examples:
 The run folder holds scene.toml (every parameter), history.npz, metrics.json, the files of the options,
 and method.py, the code of a method of your own. Ctrl-C keeps the computed rows, marked as incomplete.
 """
-OPTIONS = {
+OPTIONS: dict[str, Any] = {
     "--out DIR": (Path, "folder; default: the scene's name in the working folder"),
     "--overwrite": "replace an older run at the end",
     "--export F,...": (formats, "also meshes: stl,obj,ply,glb,3mf", []),
