@@ -64,15 +64,15 @@ def blender_scripts() -> Path:
     return scripts[0]
 
 
-def wheels(listed: Path = PINS) -> list[Path]:
-    """Return the wheels of the pins in a file; what is not there yet is fetched."""
-    pins = re.findall(r"^([\w.-]+)==([\w.]+)$", listed.read_text(encoding="utf-8"), re.MULTILINE)
+def wheels() -> list[Path]:
+    """Return the wheels of the pins; what is not there yet is fetched."""
+    pins = re.findall(r"^([\w.-]+)==([\w.]+)$", PINS.read_text(encoding="utf-8"), re.MULTILINE)
     names = {f"{name.replace('-', '_')}-{version}-py3-none-any.whl" for name, version in pins}
     FETCHED.mkdir(parents=True, exist_ok=True)
     if any(not (FETCHED / name).is_file() for name in names):
         with tempfile.TemporaryDirectory(dir=FETCHED.parent) as folder:
             pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet"]
-            what = ["--no-deps", "--only-binary=:all:", "--dest", folder, "-r", listed]
+            what = ["--no-deps", "--only-binary=:all:", "--dest", folder, "-r", PINS]
             carry_out([*pip, "--retries", "5", *what], "Fetching the wheels")
             for wheel in Path(folder).glob("*.whl"):
                 wheel.replace(FETCHED / wheel.name)

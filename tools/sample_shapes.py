@@ -208,11 +208,8 @@ def grip() -> Solid:
         dents = 2.6 * math.cos(2.0 * math.pi * x / 23.0 + math.pi) * (abs(x) < 46.0)
         y = half * np.cos(around)
         top = (15.0 - dents) * end * np.sin(around)
-        rings.append(
-            np.column_stack(
-                [np.full(28, x), y, np.where(np.sin(around) > 0.0, top, -9.0 * end * np.abs(np.sin(around)))]
-            )
-        )
+        z = np.where(np.sin(around) > 0.0, top, -9.0 * end * np.abs(np.sin(around)))
+        rings.append(np.column_stack([np.full(28, x), y, z]))
     return woven(np.array(rings), closed=False)
 
 
