@@ -1,7 +1,8 @@
-"""The operators of a session, and when they decline."""
+"""The operators of a session, when they decline, and what is selected and modal meanwhile."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -10,7 +11,8 @@ import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.device import view
-from digiclay.live import tick
+from digiclay.live import beds, tick
+from digiclay.operators.session_loop import LoopMixin
 from digiclay.sessions import running
 
 from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
@@ -77,3 +79,51 @@ def test_a_session_does_not_start_on_settings_that_do_not_fit(bed: Any) -> None:
     with pytest.raises(DigiclayError, match="169 pins"):
         tick.start(bpy.context, bed)
     assert running.list_sessions() == ()
+
+
+def test_a_bed_of_another_view_layer_is_left_alone(bed: Any) -> None:
+    for collection in bed.users_collection:
+        collection.objects.unlink(bed)
+    beds.deselect(bed)  # Blender raises an error for an object the view layer does not have
+    assert bed.name in bpy.data.objects
+
+
+@pytest.mark.parametrize(
+    ("case", "wanted"),
+    [("selected before", ["Digital Clay"]), ("not selected before", []), ("another is active", []),
+     ("another was selected meanwhile", ["Cube"])],
+)  # fmt: skip
+def test_after_the_session_the_active_bed_is_selected_as_before(
+    bed: Any, case: str, wanted: list[str]
+) -> None:
+    cube = bpy.data.objects["Cube"]
+    bed.select_set(case != "not selected before")
+    beds.deselect(bed)
+    assert (bed.select_get(), bpy.context.object) == (False, bed)
+    if case == "another is active":
+        bpy.context.view_layer.objects.active = cube
+    cube.select_set(case == "another was selected meanwhile")
+    beds.select_active(frozenset({bed.session_uid}))
+    assert [thing.name for thing in bpy.context.selected_objects] == wanted
+
+
+def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed: Any, monkeypatch: Any) -> None:
+    class Drive(LoopMixin):
+        token, newer, report = 0, frozenset(), staticmethod(lambda level, words: said.append(words))
+
+    said: list[str] = []
+    started(bed)
+    monkeypatch.setattr(tick, "tick", lambda context, now: {}["now"])
+    assert Drive().modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
+    assert running.list_sessions() == ()
+    assert said == ["Fault of the extension: KeyError: 'now'"]
+    assert running.last_message() == f"The session of Digital Clay ended: {said[0]}"
+
+
+def test_without_a_session_there_is_nothing_to_go_on_with() -> None:
+    assert not bpy.ops.digiclay.session_go_on.poll()
+
+
+def test_blender_lists_the_modal_operators_of_a_window() -> None:
+    # The session looks them up in every version that is supported.
+    assert "modal_operators" in bpy.types.Window.bl_rna.properties
