@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.fingertip import LEVEL, Fingertip
-from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
@@ -131,18 +129,13 @@ def test_every_frame_shows_heights_modes_forces_and_fingertip_of_its_moment(bed:
     assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - take.poses[60, 0, :3]).max() < 1e-7
 
 
-def test_baking_again_replaces_the_bake(bed: Any) -> None:
-    take, _ = taken()
-    for _ in range(2):
-        baked(bed, take)
-    assert len(bed.modifiers) == 2
-    assert len([one for one in bpy.data.objects if one.get(view.ROLE) == bake.BAKE]) == 1
-
-
-def test_freeing_a_bake_leaves_nothing_of_it(bed: Any) -> None:
+def test_a_bake_replaces_the_former_and_freed_leaves_nothing(bed: Any) -> None:
     meshes, trees = len(bpy.data.meshes), len(bpy.data.node_groups)
-    take, _ = taken()
-    baked(bed, take)
+    for count in (2, COUNT):  # baked again, the former bake is replaced
+        moments = baked(bed, taken(count)[0])
+        assert len(moments.height) == 1 + count // 5
+        assert len(bed.modifiers) == 2
+        assert len([one for one in bpy.data.objects if one.get(view.ROLE) == bake.BAKE]) == 1
     assert bake.is_baked(bed)
     assert bake.free(bed)
     assert (len(bpy.data.meshes), len(bpy.data.node_groups)) == (meshes, trees)
@@ -219,13 +212,6 @@ def test_a_range_of_frames_that_cannot_be_is_refused(bed: Any, first: int, last:
         next(bake.sample_path(bpy.context.scene, bed, first, last, 5e-3))
 
 
-def test_a_take_shorter_than_a_frame_bakes_to_its_first_moment(bed: Any) -> None:
-    take, _ = taken(2)
-    moments = baked(bed, replace(take))
-    assert len(moments.height) == 1
-
-
 def test_each_frame_shows_the_nearest_period() -> None:
     take, _ = taken()
     assert bake.frame_periods(take, 24.0).tolist() == [0, 8, 17, 25, 33, 42, 50, 58, 67, 75, 83, 92, 100]
-    assert Layout(rows=12, columns=12) == take.scene.layout
