@@ -69,14 +69,6 @@ def test_undo_to_before_the_bed_was_there_ends_the_session_with_a_message(clock:
     assert running.list_sessions() == ()
 
 
-def reloaded(tmp_path: Path) -> Any:
-    """Save the file and open it again; return the bed."""
-    path = str(tmp_path / "session.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    return only_bed()
-
-
 def test_a_message_is_of_its_bed_and_not_of_a_copy_or_of_a_new_one(bed: Any) -> None:
     started(bed)
     copy = bed.copy()
@@ -88,31 +80,26 @@ def test_a_message_is_of_its_bed_and_not_of_a_copy_or_of_a_new_one(bed: Any) -> 
     assert running.last_message(bpy.context.object) == ""
 
 
-def test_a_file_saved_in_mid_session_goes_on_bit_for_bit(bed: Any, clock: Clock, tmp_path: Path) -> None:
+@pytest.mark.parametrize("recovered", [False, True], ids=["saved", "after a crash"])
+def test_a_file_of_a_session_goes_on_bit_for_bit(
+    bed: Any, clock: Clock, tmp_path: Path, recovered: bool
+) -> None:
+    # What Blender saves by itself is a copy of the open file as it stands in the last tick.
     started(bed)
     move(bed, clock, [(0.0, 38.0)] * 10)
     kept, periods = bed_state.read_snapshot(bed), running.find(bed).state.period
-    bed = reloaded(tmp_path)
+    path = str(tmp_path / "session.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=recovered)
+    if recovered:
+        move(bed, clock, [(0.0, 46.0)] * 10)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bed = only_bed()
     assert running.list_sessions() == ()
     assert "another file was loaded" in running.last_message()
     started(bed)
     session = running.find(bed)
     assert snapshot.dump(session.system, session.state) == kept
     assert session.state.period == periods
-
-
-def test_a_crash_recovered_file_has_the_state_of_the_last_tick(
-    bed: Any, clock: Clock, tmp_path: Path
-) -> None:
-    # What Blender saves by itself is the open file as it stands, without asking anybody.
-    started(bed)
-    move(bed, clock, [(0.0, 38.0)] * 10)
-    kept = bed_state.read_snapshot(bed)
-    path = str(tmp_path / "recovery.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
-    move(bed, clock, [(0.0, 46.0)] * 10)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    assert bed_state.read_snapshot(only_bed()) == kept
 
 
 @pytest.mark.parametrize("linked", [False, True])
