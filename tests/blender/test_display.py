@@ -96,7 +96,9 @@ def test_arrows_after_a_session_show_the_forces_it_ended_with(bed: Any, session:
     np.testing.assert_allclose(forces(bed), session.state.row(session.system.rows.force), rtol=2.0**-23)
 
 
-def test_the_overlay_and_its_timer_are_there_only_while_wanted(bed: Any, session: running.Running) -> None:
+def test_the_overlay_and_its_timer_are_there_only_while_wanted_and_go_with_the_extension(
+    bed: Any, session: running.Running
+) -> None:
     def is_there() -> bool:
         assert bpy.app.timers.is_registered(views._again) is views.shown()
         return views.shown()
@@ -107,18 +109,16 @@ def test_the_overlay_and_its_timer_are_there_only_while_wanted(bed: Any, session
     for wanted in (False, True):
         bed.digiclay_display.overlay = wanted
         assert is_there() is wanted
-    running.drop(session.uid)
-    views.follow()
-    assert not is_there()
-
-
-def test_disabling_the_extension_takes_the_overlay_away(bed: Any, session: running.Running) -> None:
-    views.follow()
     display.unregister()
     try:
         assert not views.shown()
     finally:
         display.register()
+    views.follow()
+    assert is_there()
+    running.drop(session.uid)
+    views.follow()
+    assert not is_there()
 
 
 def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Running) -> None:

@@ -87,9 +87,14 @@ def test_stopping_one_of_two_sessions_keeps_its_recording_alone(recording: Any, 
 def test_a_saved_file_has_the_take_so_far_and_recording_goes_on(
     recording: Any, clock: Clock, tmp_path: Path
 ) -> None:
+    with pytest.raises(RuntimeError):
+        save(tmp_path / "nowhere" / "saved.blend")
+    assert (seconds(recording), handlers.has_unsaved()) == ([], True)
     save(tmp_path / "saved.blend")
-    assert seconds(recording) == []
+    assert (seconds(recording), handlers.has_unsaved()) == ([], False)
     recorded_on(recording, clock)
+    save(tmp_path / "copy.blend", copy=True)  # does not count as the file
+    assert handlers.has_unsaved()
     bpy.ops.digiclay.session_stop()
     assert seconds(recording) == [2 * SECONDS]
     bed = load(tmp_path / "saved.blend")
@@ -97,11 +102,11 @@ def test_a_saved_file_has_the_take_so_far_and_recording_goes_on(
     assert bpy.ops.digiclay.take_replay() == {"FINISHED"}
 
 
-def test_a_file_that_cannot_be_saved_leaves_the_recording_as_it_was(recording: Any, tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError):
-        save(tmp_path / "nowhere" / "saved.blend")
-    assert seconds(recording) == []
-    assert handlers.has_unsaved()
+def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, tmp_path: Path) -> None:
+    save(tmp_path / "saved.blend")
+    started(load(tmp_path / "saved.blend"))  # and nothing where nothing is recorded
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not handlers.file_path().exists()
 
 
 @pytest.mark.parametrize(
@@ -137,23 +142,6 @@ def test_the_former_file_can_be_recovered_with_its_take(recording: Any, clock: C
     assert handlers.file_path().parent == tmp_path / "temporary"
     bpy.ops.wm.recover_auto_save(filepath=str(handlers.file_path()))
     assert seconds(only_bed()) == [2 * SECONDS]
-
-
-def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, tmp_path: Path) -> None:
-    save(tmp_path / "saved.blend")
-    bed = load(tmp_path / "saved.blend")
-    assert seconds(bed) == [SECONDS]
-    started(bed)  # and nothing where nothing is recorded
-    bpy.ops.wm.read_homefile(use_empty=True)
-    assert not handlers.file_path().exists()
-
-
-def test_a_saved_copy_does_not_count_as_the_file(recording: Any, clock: Clock, tmp_path: Path) -> None:
-    save(tmp_path / "saved.blend")
-    assert not handlers.has_unsaved()
-    recorded_on(recording, clock)
-    save(tmp_path / "copy.blend", copy=True)
-    assert handlers.has_unsaved()
 
 
 def test_what_is_recorded_anew_after_undo_is_not_what_was_saved() -> None:
