@@ -16,7 +16,7 @@ from digiclay.roles import ROLE
 from digiclay.sessions import running
 from mathutils import Vector
 
-from tests.blender.at_hand import in_the_view, new_bed
+from tests.blender.at_hand import beds, in_the_view, new_bed
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
 LARGER = 8.0
@@ -42,21 +42,16 @@ def context(extension: None) -> Iterator[Any]:
         yield bpy.context
 
 
-def bed() -> Any:
-    """Return the bed of the file."""
-    return next(thing for thing in bpy.context.scene.objects if view.is_bed(thing))
-
-
 def points_at(context: Any, place: np.ndarray) -> bool:
     """Return whether the pixel of a place of the bed points at the bed."""
     context.view_layer.update()
-    (xy,) = bridge.project(context, bed(), place)
+    (xy,) = bridge.project(context, beds()[0], place)
     return aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
 
 
 def cover(context: Any, distance: float = 4.0) -> Any:
     """Add a cube on the ray of the covered place, at a distance from it towards the eye, Blender units."""
-    place = bed().matrix_world @ Vector(COVERED[0] * SCALE)
+    place = beds()[0].matrix_world @ Vector(COVERED[0] * SCALE)
     way = (_eye(context) - place).normalized()
     bpy.ops.mesh.primitive_cube_add(size=0.5, location=place + distance * way)
     return bpy.context.object
@@ -79,12 +74,12 @@ def test_an_object_in_front_hides_the_pins_behind_it_and_no_others(context: Any)
         assert points_at(context, COVERED)
     # What a user has parented to the bed is no part of it.
     cube.display_type = "SOLID"
-    cube.parent, cube.matrix_parent_inverse = bed(), bed().matrix_world.inverted()
+    cube.parent, cube.matrix_parent_inverse = beds()[0], beds()[0].matrix_world.inverted()
     assert not points_at(context, COVERED)
 
 
 def test_the_bed_does_not_hide_itself_with_its_fingertip(context: Any) -> None:
-    tip = view.fingertip_of(bed())
+    tip = view.fingertip_of(beds()[0])
     tip.location = Vector(COVERED[0] * SCALE) + Vector((0.0, 0.0, 0.02))
     assert points_at(context, COVERED)
     for part in tip.children:
@@ -109,7 +104,7 @@ def test_what_the_view_does_not_show_hides_nothing(context: Any) -> None:
 def test_outside_a_local_view_with_the_bed_an_object_hides_nothing(context: Any) -> None:
     cover(context)
     bpy.ops.object.select_all(action="DESELECT")
-    for part in (bed(), *bed().children_recursive):
+    for part in (beds()[0], *beds()[0].children_recursive):
         part.select_set(True)
     bpy.ops.view3d.localview(frame_selected=False)
     assert points_at(context, COVERED)
@@ -136,7 +131,7 @@ def test_xray_shows_the_pins_through_an_object(context: Any, kind: str, xray: st
 
 
 def test_behind_the_eye_and_nearer_than_the_view_is_drawn_an_object_hides_nothing(context: Any) -> None:
-    far = (_eye(context) - bed().matrix_world @ Vector(COVERED[0] * SCALE)).length
+    far = (_eye(context) - beds()[0].matrix_world @ Vector(COVERED[0] * SCALE)).length
     cube = cover(context, distance=far + 2.0)
     assert points_at(context, COVERED)
     bpy.data.objects.remove(cube)
@@ -146,12 +141,12 @@ def test_behind_the_eye_and_nearer_than_the_view_is_drawn_an_object_hides_nothin
 
 def test_in_front_of_all_others_a_bed_is_seen_and_so_is_an_object(context: Any) -> None:
     cube = cover(context)
-    bed().show_in_front = True
+    beds()[0].show_in_front = True
     assert points_at(context, COVERED)
     cube.show_in_front = True
     assert not points_at(context, COVERED)
     bpy.data.objects.remove(cube)
-    bed().show_in_front = False
+    beds()[0].show_in_front = False
     cover(context, distance=-4.0).show_in_front = True
     assert not points_at(context, COVERED)
 
@@ -159,7 +154,7 @@ def test_in_front_of_all_others_a_bed_is_seen_and_so_is_an_object(context: Any) 
 def test_a_clipping_region_takes_away_what_is_outside_it(context: Any) -> None:
     looking = context.region_data
     cover(context)
-    (xy,) = bridge.project(context, bed(), BARE)
+    (xy,) = bridge.project(context, beds()[0], BARE)
     x, y = int(xy[0]), int(xy[1])
     bpy.ops.view3d.clip_border(xmin=x - 20, xmax=x + 20, ymin=y - 20, ymax=y + 20, wait_for_input=False)
     assert looking.use_clip_planes
@@ -170,7 +165,7 @@ def test_a_clipping_region_takes_away_what_is_outside_it(context: Any) -> None:
     assert points_at(context, COVERED)
     # Cut off between the object and the bed, the object is gone and the pins are there.
     cover(context)
-    place = bed().matrix_world @ Vector(COVERED[0] * SCALE)
+    place = beds()[0].matrix_world @ Vector(COVERED[0] * SCALE)
     normal = (place - _eye(context)).normalized()
     beyond = place - 1.0 * normal
     looking.clip_planes = [(*normal, -normal.dot(beyond)), *[(0.0, 0.0, 0.0, 0.0)] * 5]

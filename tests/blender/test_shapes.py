@@ -19,7 +19,7 @@ from digiclay.exchange import image_reader
 from digiclay.live import bed_state
 from digiclay.settings import properties
 
-from tests.blender.at_hand import new_bed
+from tests.blender.at_hand import beds, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -69,6 +69,8 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
     assert raised.sum() in (36, 49)
     assert wanted.max() == pytest.approx(52e-3, abs=4e-9)
     assert np.abs(heights(made) - wanted).max() <= SHOWN
+    bpy.context.view_layer.update()
+    assert bridge.pose(view.fingertip_of(made))[2] > wanted.max()  # the finger is lifted out of it
     # A session goes on from there: its state is in the bed, and the method has taken over.
     system = assemble(scene)
     state = snapshot.load(system, bed_state.read_snapshot(made))
@@ -110,21 +112,13 @@ def test_a_text_object_has_a_surface_too() -> None:
     assert np.ptp(heights(made)) > 10e-3
 
 
-def test_the_finger_is_lifted_out_of_the_shape() -> None:
-    made = bed()
-    tip = view.fingertip_of(made)
-    assert bpy.ops.digiclay.shape_sample(sample="dome", rise=40.0) == {"FINISHED"}
-    bpy.context.view_layer.update()
-    assert bridge.pose(tip)[2] > heights(made).max()
-
-
 def test_a_shape_is_taken_back_by_undo() -> None:
     bed()
     bpy.ops.ed.undo_push(message="Before")
     assert bpy.ops.digiclay.shape_sample(sample="dome") == {"FINISHED"}
     bpy.ops.ed.undo_push(message="After")
     bpy.ops.ed.undo()
-    made = next(thing for thing in bpy.data.objects if view.is_bed(thing))
+    made = beds()[0]
     assert np.ptp(heights(made)) == 0.0
     assert not made.digiclay.use_shape
     assert bed_state.read_snapshot(made) is None
@@ -174,7 +168,7 @@ def refused(words: str, operator: Any = None, **options: Any) -> None:
     """Call an operator, and find the bed as it was."""
     with pytest.raises(RuntimeError, match=words):
         (operator or bpy.ops.digiclay.shape_from_object)(**options)
-    made = next(thing for thing in bpy.data.objects if view.is_bed(thing))
+    made = beds()[0]
     assert np.ptp(heights(made)) == 0.0
     assert not made.digiclay.use_shape
 
@@ -240,14 +234,9 @@ def test_blender_reads_a_picture_as_it_is(tmp_path: Path, kind: str, depth: str,
     assert read.shape == (7, 5)
     assert np.abs(read - values).max() <= step
     assert len(bpy.data.images) == before
-
-
-def test_an_exr_is_displayed(tmp_path: Path) -> None:
     made = bed()
-    image(tmp_path / "ramp.exr", np.tile(np.linspace(0, 3, 13), (13, 1)), "OPEN_EXR", "32")
-    assert bpy.ops.digiclay.shape_from_file(filepath=str(tmp_path / "ramp.exr")) == {"FINISHED"}
-    table = heights(made).reshape(13, 13)
-    assert np.all(np.diff(table, axis=1) > 0.5e-3)
+    assert bpy.ops.digiclay.shape_from_file(filepath=str(path)) == {"FINISHED"}
+    assert np.ptp(heights(made)) > 10e-3
 
 
 def test_a_large_picture_is_scaled_down_by_blender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
