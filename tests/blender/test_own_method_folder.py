@@ -47,11 +47,6 @@ def chosen(tmp_path: Path) -> Iterator[Any]:
     bpy.context.preferences.addons.remove(entry)
 
 
-def add_bed() -> Any:
-    """Return a small bed, active."""
-    return new_bed(rows=9, columns=9)
-
-
 def choose(bed: Any, name: str) -> Any:
     """Choose a method as the panel does, and return the properties of its parameters."""
     bed.digiclay.chosen_method = name
@@ -101,7 +96,7 @@ def test_a_folder_beside_the_file_is_stored_as_a_full_path_or_refused(chosen: An
 
 def test_its_parameters_are_properties_with_units_and_bounds(chosen: Any) -> None:
     chosen.run_own_methods = True
-    bed = add_bed()
+    bed = new_bed(rows=9, columns=9)
     group = choose(bed, "soft_pad")
     shown = group.bl_rna.properties["yield_force"]
     assert shown.name == "Yield Force (N)"
@@ -122,7 +117,7 @@ def test_its_parameters_are_properties_with_units_and_bounds(chosen: Any) -> Non
 
 def test_a_session_forms_with_it_and_one_mistake_pauses_the_session(chosen: Any) -> None:
     chosen.run_own_methods = True
-    bed = add_bed()
+    bed = new_bed(rows=9, columns=9)
     choose(bed, "soft_pad")
     clock = Clock()
     assert tick.start(bpy.context, bed) == []
@@ -141,7 +136,7 @@ def test_a_session_forms_with_it_and_one_mistake_pauses_the_session(chosen: Any)
 
 def test_a_file_without_its_method_says_so_and_uses_no_other(chosen: Any, tmp_path: Path) -> None:
     chosen.run_own_methods = True
-    bed = add_bed()
+    bed = new_bed(rows=9, columns=9)
     group = choose(bed, "soft_pad")
     group.step = 0.07
     scene = properties.scene_of(bed)

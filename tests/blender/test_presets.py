@@ -39,6 +39,10 @@ def test_a_saved_preset_is_a_scene_file_of_all_parameters(bed: Any) -> None:
     assert bpy.ops.digiclay.preset_save(name="Stiff clay") == {"FINISHED"}
     scene = load(own_presets.path("Stiff clay"))
     assert scene == dataclasses.replace(properties.scene_of(bed), name="Stiff clay")
+    bed.digiclay.valve.stroke = 0.05
+    bpy.ops.digiclay.preset_save(name="Stiff clay")  # replaces the former
+    assert load(own_presets.path("Stiff clay")).valve.stroke == 50e-6
+    assert [file.name for file in own_presets.folder().iterdir()] == ["Stiff clay.toml"]
     for name in ("Ärger über Öl", "a b", "v1.2"):
         bpy.ops.digiclay.preset_save(name=name)
         assert bpy.ops.digiclay.preset_apply(preset=name) == {"FINISHED"}
@@ -58,14 +62,6 @@ def test_applying_a_preset_sets_everything_but_the_layout(bed: Any) -> None:
 def test_applying_one_of_the_core_s_presets_changes_what_a_scene_file_would(name: str, bed: Any) -> None:
     assert bpy.ops.digiclay.preset_apply(preset=name) == {"FINISHED"}
     assert properties.scene_of(bed) == resolve({"preset": name, "control": {"ground": "cell"}}, bed.name)
-
-
-def test_a_preset_saved_under_the_same_name_replaces_the_former(bed: Any) -> None:
-    bpy.ops.digiclay.preset_save(name="Mine")
-    bed.digiclay.valve.stroke = 0.05
-    bpy.ops.digiclay.preset_save(name="Mine")
-    assert load(own_presets.path("Mine")).valve.stroke == 50e-6
-    assert [file.name for file in own_presets.folder().iterdir()] == ["Mine.toml"]
 
 
 @pytest.mark.parametrize(
