@@ -48,23 +48,16 @@ def footprint() -> set[str]:
 def test_the_extension_registers_unregisters_and_registers_again_without_a_trace() -> None:
     assert footprint() == set()
     digiclay.register()
-    first = footprint()
+    first, command = footprint(), command_line.COMMAND.handle
     assert {"MESH_OT_digital_clay_add", "IMPORT_SCENE_OT_digital_clay_run", "Object.digiclay"} <= first
     digiclay.unregister()
-    assert footprint() == set()
+    assert (footprint(), command_line.COMMAND.handle) == (set(), None)
+    with pytest.raises(ValueError, match="already been removed"):
+        bpy.utils.unregister_cli_command(command)
     digiclay.register()
     assert footprint() == first
     digiclay.unregister()
     assert footprint() == set()
-
-
-def test_the_command_of_blender_s_command_line_is_taken_back() -> None:
-    digiclay.register()
-    handle = command_line.COMMAND.handle
-    digiclay.unregister()
-    assert command_line.COMMAND.handle is None
-    with pytest.raises(ValueError, match="already been removed"):
-        bpy.utils.unregister_cli_command(handle)
 
 
 def test_importing_the_package_imports_nothing_heavy_and_registers_nothing() -> None:

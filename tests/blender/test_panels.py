@@ -27,12 +27,6 @@ def bed() -> Any:
     return new_bed(rows=6, columns=6)
 
 
-def in_the_tab() -> list[Any]:
-    """Return the panels but for those that open from the header of the tool."""
-    drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
-    return [kind for kind in drawn if kind.bl_region_type != "HEADER"]
-
-
 def panel(name: str) -> Any:
     """Return a panel by the end of its idname."""
     return getattr(bpy.types, f"DIGICLAY_PT_{name}")
@@ -65,17 +59,13 @@ def test_every_part_of_a_scene_has_a_panel() -> None:
     assert [name for name in names if not hasattr(bpy.types, f"DIGICLAY_PT_part_{name}")] == []
 
 
-def test_every_panel_stands_in_the_tab_in_an_order_of_its_own() -> None:
-    drawn = in_the_tab()
-    assert {(kind.bl_space_type, kind.bl_region_type, kind.bl_category) for kind in drawn} == {
-        ("VIEW_3D", "UI", CATEGORY)
-    }
+def test_the_tab_begins_with_what_is_used_first_and_the_technical_panels_are_closed_at_its_end() -> None:
+    drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
+    drawn = [kind for kind in drawn if kind.bl_region_type != "HEADER"]  # opens from the header of the tool
+    places = {(kind.bl_space_type, kind.bl_region_type, kind.bl_category) for kind in drawn}
+    assert places == {("VIEW_3D", "UI", CATEGORY)}
     orders = [(getattr(kind, "bl_parent_id", ""), kind.bl_order) for kind in drawn]
     assert len(set(orders)) == len(orders)
-
-
-def test_the_tab_begins_with_what_is_used_first_and_the_technical_panels_are_closed_at_its_end() -> None:
-    drawn = in_the_tab()
     roots = sorted((kind for kind in drawn if not hasattr(kind, "bl_parent_id")), key=lambda k: k.bl_order)
     names = "Digital Clay,Session,Finger,Display,Shapes,Takes,Export,Device,Control"
     assert [kind.bl_label for kind in roots] == names.split(",")
