@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
+from digiclay.compat import strips
 from digiclay.device import unit, view
 from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE
 
@@ -30,6 +32,20 @@ def new_bed(**options: Any) -> Any:
     """Open the factory file with a bed of the Add menu in it, active."""
     name = "-".join(f"{value}" for value in ("bed", *options.values()))
     return open_bed(name, lambda: bpy.ops.mesh.digital_clay_add(**options))
+
+
+def read_picture(path: Path) -> np.ndarray:
+    """Read a picture with Blender itself, (height, width, 3) sRGB in [0, 1], the lower row first."""
+    image = bpy.data.images.load(str(path.resolve()))
+    pixels = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], image.channels)
+    bpy.data.images.remove(image)
+    return pixels[:, :, :3]
+
+
+def film_strip(scene: Any, path: Path) -> tuple[Any, int]:
+    """Put a film into the sequencer of a scene; return its strip and how many frames it has."""
+    strip = strips(scene).new_movie("film", str(path), channel=1, frame_start=1)
+    return strip, int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)  # 5.2 on
 
 
 def in_the_view() -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.compat import scratch, strips
+from digiclay.compat import scratch
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.files.formats import is_whole_picture
@@ -20,7 +20,7 @@ from digiclay.core.session.render_settings import Film, Still, Turntable
 from digiclay.device.instant import Instant
 from digiclay.pictures import film, still
 
-from tests.blender.at_hand import inventory
+from tests.blender.at_hand import film_strip, inventory, read_picture
 
 WIDTH, HEIGHT = 160, 100
 SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 4}
@@ -46,19 +46,14 @@ def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:
     folder.mkdir()
     with scratch():
         scene = bpy.data.scenes.new("reading")
-        strip = strips(scene).new_movie("film", str(path), channel=1, frame_start=1)
+        strip, scene.frame_end = film_strip(scene, path)
         shown = strip.elements[0]
         scene.render.resolution_x, scene.render.resolution_y = shown.orig_width, shown.orig_height
-        lasts = "duration" if hasattr(strip, "duration") else "frame_final_duration"  # from 5.2 on
-        scene.frame_end, rate = getattr(strip, lasts), shown.orig_fps
+        rate = shown.orig_fps
         scene.view_settings.view_transform = "Standard"
         scene.render.filepath = str(folder / "f")
         bpy.ops.render.render(animation=True, scene=scene.name)
-        pictures = []
-        for file in sorted(folder.glob("f*.png")):
-            image = bpy.data.images.load(str(file))
-            pixels = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], image.channels)
-            pictures.append(pixels[:, :, :3])
+        pictures = [read_picture(file) for file in sorted(folder.glob("f*.png"))]
     return rate, pictures
 
 

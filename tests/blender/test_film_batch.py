@@ -12,12 +12,14 @@ from digiclay.cli import main
 from digiclay.commands.gallery import WIDTH
 from digiclay.commands.job_steps import Work, find_frames, is_done, make_frames
 from digiclay.commands.render import ARRAYS, stage_moving
-from digiclay.compat import scratch, strips
+from digiclay.compat import scratch
 from digiclay.core.files.run_folder import lock_name
 from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.render_settings import list_missing, name_frame
 from digiclay.core.studies.job_table import read_outputs
 from digiclay.pictures.film import draw_frames
+
+from tests.blender.at_hand import film_strip, read_picture
 
 JOBS = """
 scenes = ["tap"]
@@ -125,20 +127,6 @@ def job(here: Path) -> Path:
     return here
 
 
-def pixels(folder: Path, frame: int) -> np.ndarray:
-    """Read a frame."""
-    with scratch():
-        image = bpy.data.images.load(str(name_frame(folder, frame).resolve()))
-        return np.array(image.pixels[:])
-
-
-def count_frames(film: Path) -> int:
-    """Return how many frames a film has."""
-    with scratch():
-        strip = strips(bpy.data.scenes.new("reading")).new_movie("film", str(film), channel=1, frame_start=1)
-        return int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)
-
-
 def test_frames_drawn_in_ranges_are_those_of_the_film(job: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder, whole = find_frames(RUN, "film"), job / "whole"
     whole.mkdir()
@@ -149,8 +137,10 @@ def test_frames_drawn_in_ranges_are_those_of_the_film(job: Path, capsys: pytest.
         assert shots.count == COUNT
         assert draw_frames(shots, range(COUNT), whole, job / "film.mp4")
     for frame in (2, 3):
-        np.testing.assert_array_equal(pixels(folder, frame), pixels(whole, frame))
-        assert (pixels(whole, frame) != pixels(whole, frame - 1)).any()
+        np.testing.assert_array_equal(
+            read_picture(name_frame(folder, frame)), read_picture(name_frame(whole, frame))
+        )
+        assert (read_picture(name_frame(whole, frame)) != read_picture(name_frame(whole, frame - 1))).any()
     # Another range draws no frame that is there, and again one that a copy cut off; a stop keeps those drawn.
     kept = name_frame(folder, 3).stat().st_mtime_ns
     name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
@@ -159,7 +149,7 @@ def test_frames_drawn_in_ranges_are_those_of_the_film(job: Path, capsys: pytest.
         make_frames(Work(JOB, RUN, outputs, lambda: next(asked), lambda step, share: None), "film", "2-4")
     assert list_missing(folder, range(COUNT)) == [0, 1, 4]
     assert name_frame(folder, 3).stat().st_mtime_ns == kept
-    np.testing.assert_array_equal(pixels(folder, 2), pixels(whole, 2))
+    np.testing.assert_array_equal(read_picture(name_frame(folder, 2)), read_picture(name_frame(whole, 2)))
     # A second process on the same frames is refused, and frames that the film does not have.
     with lock_name(folder / "3-4"):
         assert main(["job", str(JOB), "--only", "film", "--frames", "3-4", "--quiet"]) == 2
@@ -170,7 +160,9 @@ def test_frames_drawn_in_ranges_are_those_of_the_film(job: Path, capsys: pytest.
     assert not is_done(JOB, RUN)
     before = (RUN / "history.npz").stat().st_mtime_ns
     assert main(["job", str(JOB), "--quiet"]) == 0
-    assert (count_frames(RUN / "film.mp4"), folder.exists(), is_done(JOB, RUN)) == (COUNT, False, True)
+    with scratch():
+        _, count = film_strip(bpy.data.scenes.new("reading"), RUN / "film.mp4")
+    assert (count, folder.exists(), is_done(JOB, RUN)) == (COUNT, False, True)
     assert (RUN / "history.npz").stat().st_mtime_ns == before
     timing = json.loads((RUN / "timing.json").read_text(encoding="utf-8"))
     assert timing["files"]["film.mp4"] == (RUN / "film.mp4").stat().st_size

@@ -32,18 +32,10 @@ from digiclay.pictures.legend import (
 )
 from digiclay.pictures.stage import MARGINS, half_frame
 
-from tests.blender.at_hand import inventory
+from tests.blender.at_hand import inventory, read_picture
 from tests.timeouts import TIMEOUT
 
 WIDTH, HEIGHT = 240, 150
-
-
-def picture(path: Path) -> np.ndarray:
-    """Read a PNG with Blender itself, (height, width, 3) sRGB in [0, 1], the lower row first."""
-    image = bpy.data.images.load(str(path))
-    pixels = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], image.channels)
-    bpy.data.images.remove(image)
-    return pixels[:, :, :3]
 
 
 def of_the_hue(pixels: np.ndarray, color: tuple[float, float, float]) -> int:
@@ -69,7 +61,7 @@ def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(
         bed_in(mode), tmp_path / "pins.png", Still(width=WIDTH, height=HEIGHT, samples=2)
     )
     assert out.read_bytes().startswith(b"\x89PNG")
-    pixels = picture(out)
+    pixels = read_picture(out)
     assert pixels.shape == (HEIGHT, WIDTH, 3)
     # The pins stand in the middle of what the legend leaves free; 8 x 8 of them cover far more than this.
     pins = pixels[:, int(stage.MARGINS[0] * WIDTH) :]
@@ -82,7 +74,9 @@ def test_the_legend_names_the_modes_present_in_the_palette_that_the_open_file_we
     other = palettes.PALETTES["tol_muted"][Mode.HOLD]
     for seen, unseen in ((COLORS[Mode.HOLD], other), (other, COLORS[Mode.HOLD])):
         look = Still(width=WIDTH, height=HEIGHT, samples=2)
-        legend = picture(still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", look))[:, : WIDTH // 5]
+        legend = read_picture(still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", look))[
+            :, : WIDTH // 5
+        ]
         assert of_the_hue(legend, seen) > 20
         assert of_the_hue(legend, unseen) < 20
         view.build(bed_in(Mode.HOLD), bpy.context.collection)

@@ -19,7 +19,7 @@ from digiclay.device.skin_lattice import KINDS, choose_parts, interpolate, make_
 from digiclay.settings import properties
 from mathutils import Matrix, Vector
 
-from tests.blender.at_hand import done, instances, new_bed
+from tests.blender.at_hand import done, instances, new_bed, read_picture
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -117,8 +117,7 @@ def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Pa
         bed.digiclay_display.form = shown
         scene.render.filepath = str(tmp_path / f"{shown}.png")
         bpy.ops.render.render(write_still=True)
-        image = bpy.data.images.load(scene.render.filepath)
-        pictures[shown] = np.array(image.pixels[:])
+        pictures[shown] = read_picture(Path(scene.render.filepath))
     np.testing.assert_array_equal(pictures["automatic"], pictures["pins"])
     # The bed is seen: pins and skin differ in some of the pixels by more than rounding.
     assert (np.abs(pictures["skin"] - pictures["pins"]) > 0.02).sum() > 100
