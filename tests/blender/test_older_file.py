@@ -86,33 +86,26 @@ def test_the_take_replays_to_the_stored_heights() -> None:
     np.testing.assert_allclose(exact(found), HEIGHTS["take_end"], rtol=0, atol=ROUNDING)
 
 
-def test_a_session_resets_and_goes_back_from_the_older_state() -> None:
+def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip() -> None:
     found = bed("Session")
+    pose = bridge.pose(view.fingertip_of(found))
+    np.testing.assert_allclose(pose, bed_state.read_pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
     assert bed_state.read_snapshot(found) is None
     assert (exact(found) == 40e-3).all()
     assert running.list_sessions() == ()
 
 
-def test_settings_of_the_user_s_own_are_those_of_the_scene_file() -> None:
+def test_settings_and_features_of_the_user_s_own_are_those_of_the_scene_file() -> None:
     found = bed("Settings")
     assert properties.scene_of(found) == load(SAMPLES / "settings.toml")
     display = found.digiclay_display
     assert (display.color, display.arrows) == ("force", True)
     assert tuple(display.picked) == (40, 41, -1, -1, -1, -1)
     assert view.color_source(found) == "force"
-
-
-def test_features_are_measured_from_the_surface_that_was_kept() -> None:
-    found = bed("Settings")
+    # Features are measured from the surface that was kept.
     assert formed_bed.has_reference(found)
     listed = found["digiclay_features"]
     assert listed.startswith("0 bosses and 1 crease")
     assert bpy.ops.digiclay.find_features() == {"FINISHED"}
     assert found["digiclay_features"] == listed
-
-
-def test_the_fingertip_stands_where_the_session_was_left() -> None:
-    found = bed("Session")
-    pose = bridge.pose(view.fingertip_of(found))
-    np.testing.assert_allclose(pose, bed_state.read_pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits

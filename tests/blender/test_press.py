@@ -103,12 +103,9 @@ def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, conte
     theirs = location_3d_to_region_2d(context.region, context.region_data, world)
     # A thousandth of a pixel: theirs is reckoned in float32.
     np.testing.assert_allclose(bridge.project(context, bed, place)[0], theirs, rtol=0, atol=1e-2)
-
-
-def test_what_lies_behind_the_eye_is_nowhere_on_the_screen(bed: Any, context: Any) -> None:
+    # What lies behind the eye is nowhere on the screen.
     eye = np.array(bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation)
-    behind = 1.5 * eye[None] / bridge.SCALE
-    assert np.isnan(bridge.project(context, bed, behind)).all()
+    assert np.isnan(bridge.project(context, bed, 1.5 * eye[None] / bridge.SCALE)).all()
 
 
 def test_a_hidden_or_unevenly_scaled_bed_is_looked_through_and_says_why(bed: Any, context: Any) -> None:
