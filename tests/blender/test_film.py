@@ -64,6 +64,12 @@ def render(shown: Any, out: Path, looks: Any, set_point: float | None = None, **
     return film.render_film(stage(shown, looks, **sizes), out, looks, **known)
 
 
+def filmed(shown: Any, path: Path, looks: Any) -> list[np.ndarray]:
+    """Draw a film of a history, or a turntable of an instant, and read its frames."""
+    assert render(shown, path, looks) == path
+    return frames_of(path, path.with_suffix(""))[1]
+
+
 def looks_like(pixels: np.ndarray, mode: Mode) -> int:
     """Count pixels of the bed, right of the legend and above the strip, in the direction of a color."""
     bed = pixels[HEIGHT // 3 :, WIDTH // 4 :].reshape(-1, 3)
@@ -102,10 +108,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
     counts = []
     for arrows in (False, True):
         looks = Film(**SMALL, start=0.4, stop=0.45, arrows=arrows, strip=False)
-        path = render(history, tmp_path / f"{arrows}.mp4", looks)
-        assert path is not None
-        _, pictures = frames_of(path, tmp_path / f"{arrows}")
-        red, green, blue = np.moveaxis(pictures[-1], -1, 0)
+        red, green, blue = np.moveaxis(filmed(history, tmp_path / f"{arrows}.mp4", looks)[-1], -1, 0)
         counts.append(int(((red > 0.4) & (green < 0.5 * red) & (blue < 0.5 * red)).sum()))
         assert not (blue[6] - red[6] > 0.25).any(), "without a strip there is none"
     assert counts[0] < 5 < counts[1]
@@ -113,9 +116,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
 
 def test_a_bed_colored_by_force_changes_its_colors_with_the_force(tmp_path: Path, history: Any) -> None:
     history["force"] = history["force"] * 10.0
-    path = render(history, tmp_path / "film.mp4", Film(**SMALL, color="force", arrows=False))
-    assert path is not None
-    _, pictures = frames_of(path, tmp_path / "frames")
+    pictures = filmed(history, tmp_path / "film.mp4", Film(**SMALL, color="force", arrows=False))
     middle = [picture[HEIGHT // 2 :, WIDTH // 3 :].reshape(-1, 3) for picture in pictures]
     yellow = [int(((p[:, 1] > 0.8 * p[:, 0]) & (p[:, 2] < 0.5 * p[:, 0])).sum()) for p in middle]
     assert yellow[0] < 5 < yellow[-1] / 10
@@ -125,9 +126,7 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: 
     # One half of the bed is blue: its middle goes round.
     history["mode"][-1] = np.where(history["position"][:, 0] > 0.0, Mode.HOLD, Mode.REST)
     instant = Instant.of(history, -1)
-    path = render(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
-    assert path is not None
-    _, pictures = frames_of(path, tmp_path / "frames")
+    pictures = filmed(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
     assert len(pictures) == 4
     across = []
     for picture in pictures:
