@@ -22,8 +22,3 @@ def test_every_mode_has_a_meaning_and_a_color_unlike_all_others() -> None:
     assert 0.0 <= colors.min() <= colors.max() <= 1.0
     # 0.15 apart in the unit cube: the two nearest, the blues, are 0.4 apart.
     assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(colors, 2)) > 0.15
-
-
-def test_cells_that_need_no_step_have_the_lowest_codes() -> None:
-    # The simulation takes modes above HOLD for busy ones.
-    assert sorted(Mode)[:2] == [Mode.REST, Mode.HOLD]
