@@ -12,26 +12,9 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.sessions import running, sculpting
 
-from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
+from tests.hand import SCENE, SIZES, Hand, heights, pose, started
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
-
-
-def test_a_press_forms_the_bed_as_it_goes_on() -> None:
-    hand, session = Hand(), started()
-    seen = []
-    for z in np.linspace(46, 37, 10):
-        session = hand.move(session, [(0.0, z)] * 3)
-        seen.append(heights(session).min())
-    assert seen[0] == 40e-3
-    assert (np.diff(seen)[-3:] < 0).all()
-
-
-def test_simulated_time_is_the_walls() -> None:
-    hand, session = Hand(), started()
-    session = hand.move(session, [(0.0, 46.0)] * 90)
-    assert session.state.period == pytest.approx(90 * TICK / 5e-3, abs=1)
-    assert session.factor == pytest.approx(1.0, abs=0.01)
 
 
 def test_a_paused_session_stands_still_and_goes_on_without_catching_up() -> None:
