@@ -34,16 +34,6 @@ def test_presses_in_quick_succession_all_form_and_count_one_gesture_each() -> No
     assert (done.finished_strokes, len(done.gestures), done.strokes) == (3, 3, ())
 
 
-def test_a_quick_stroke_forms_every_column_it_passes() -> None:
-    session, number = queue_stroke(started(), -15e-3, 0.0, DEPTH)
-    for part in np.arange(1, 21) / 20:
-        session = change_stroke(
-            session, number, lambda stroke, p=part: draw(stroke, 0.3 * p, (30 * p - 15) * 1e-3, 0.0, DEPTH)
-        )
-    session = finish(let_go(session, number))
-    assert max(risen(session, x, 0.0) for x in range(-15, 16, 3)) < FORMED
-
-
 def test_a_stroke_that_rests_and_goes_on_is_one_gesture() -> None:
     session, number = queue_stroke(started(), -9e-3, 0.0, DEPTH)
     session = change_stroke(session, number, lambda s: draw(s, 2.0, 9e-3, 0.0, DEPTH))
