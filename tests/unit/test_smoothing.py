@@ -198,18 +198,6 @@ def test_every_method_lets_its_pins_be_smoothed_and_keeps_them_if_it_keeps_heigh
         assert np.abs(state.row(0) - smoothed).max() <= 2.0 * BAND
 
 
-def test_a_session_kept_in_mid_stroke_goes_on_bit_for_bit() -> None:
-    system = bed()
-    state = heighten(system, make_spike_and_ridge(system.grid))
-    *_, state = simulate_path(system, state, stay_away(40), STROKE[:40])
-    back = snapshot.load(system, snapshot.dump(system, state))
-    ends = []
-    for one in (state, back):
-        *_, last = simulate_path(system, one, stay_away(30), STROKE[40:70])
-        ends.append(snapshot.dump(system, last))
-    assert ends[0] == ends[1]
-
-
 def test_pins_that_a_stroke_leaves_in_motion_are_driven_home_by_the_method() -> None:
     system = bed()
     state = heighten(system, make_spike_and_ridge(system.grid))
