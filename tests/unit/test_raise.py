@@ -24,7 +24,6 @@ from digiclay.strokes.stroke import Brush
 from digiclay.strokes.tracking import find_tracking
 from numpy.typing import NDArray
 
-from tests.hand import go_on, heights
 from tests.strokes import Places, begin_bed, finish, form, queue, relief
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
@@ -161,13 +160,6 @@ def test_half_the_strength_levels_half_the_way() -> None:
     session = form(begin(), [(0.0, -24.0), (0.0, 24.0)], Brush.RAISE, 10.0)
     half = form(session, ALONG, Brush.LEVEL, share=0.5)
     assert along(half)[len(along(half)) // 2] == pytest.approx(5.0, abs=1.5)
-
-
-def test_a_raise_taken_back_in_its_middle_leaves_the_bed_as_before() -> None:
-    session = queue(begin(), ALONG, Brush.RAISE)
-    before, session = heights(session).copy(), go_on(session, 60)
-    assert relief(session).max() > 5.0
-    np.testing.assert_array_equal(heights(sculpting.withdraw_stroke(session)), before)
 
 
 def test_a_method_without_a_blister_is_told_from_those_that_raise() -> None:
