@@ -101,16 +101,6 @@ def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(
     assert "chosen (lag_mean): rfd " in capsys.readouterr().out
 
 
-def test_a_tuning_of_which_points_are_missing_proposes_the_same_ones_again(whole: Path, here: Path) -> None:
-    shutil.copytree(whole, here / "out")
-    for name in ("points.csv", "front.csv", "chosen.toml", "front.png"):
-        (here / "out" / name).unlink()
-    for path in sorted((here / "out" / "points").iterdir())[20:]:  # within the third generation
-        path.unlink()
-    assert main([*TUNE, "--generations", "4"]) == 0
-    assert files(here / "out") == files(whole)
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(
     here: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
