@@ -158,6 +158,8 @@ SCENES: dict[str, dict[str, Any]] = {
             ],
         }
     },
+    "with every kind of sensor": {"sensors": {"force_noise": "0.5 mN", "height_noise": "5 um", "delay": 1}},
+    "with an observer": {"sensors": {"observer": "valve"}},
     "hexagonal and viscous": {"preset": "viscous", "layout": {"arrangement": "hexagonal", "rows": 3}},
 }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -10,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.arrays import Floats
-from digiclay.core.base.errors import SceneError
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
 from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, Sensing, draw_normals
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.run_scene import run
 
 from tests.assemble import record, sample
@@ -174,26 +171,3 @@ def test_only_a_delay_costs_state_rows() -> None:
     assert (plain.sensors, assemble(plain).rows.sensors) == (None, 0)
     sensed = (sample("slow_press", f"sensors.{one}") for one in ("seed=1", "force_noise=1 mN", "delay=2"))
     assert [assemble(one).sensors.rows for one in sensed] == [0, 0, 9]
-
-
-@pytest.mark.parametrize("settings", [(), ALL, ("sensors.observer=valve",)])
-def test_a_scene_with_sensors_reads_back_as_it_was_written(settings: tuple[str, ...]) -> None:
-    written = sample("slow_press", *settings)
-    assert resolve(tomllib.loads(format_scene(written))) == written
-
-
-@pytest.mark.parametrize(
-    ("setting", "said"),
-    [
-        ("force_noise=-1 mN", "--set: sensors.force_noise must be at least 0 N (got '-1 mN')."),
-        ("delay=1.5", "--set: sensors.delay must be a whole number (got 1.5)."),
-        ("observer=kalman", "--set: sensors.observer must be one of none, valve (got 'kalman')."),
-        ("force_nois=1", "--set: sensors.force_nois must be a known key (got 1). Did you mean"),
-        ("height_step=1e-15", "--set: sensors.height_step must be 0 m, or at least 1e-12 m (got 1e-15 m)."),
-    ],
-)
-def test_a_wrong_setting_is_told_in_one_line(setting: str, said: str) -> None:
-    with pytest.raises(SceneError) as error:
-        sample("slow_press", f"sensors.{setting}")
-    assert str(error.value).startswith(said)
-    assert "\n" not in str(error.value)
