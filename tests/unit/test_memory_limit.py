@@ -45,7 +45,6 @@ def measured_and_estimated(**changes: Any) -> tuple[float, float]:
         # All of it is arrays whose lengths are known; of what is taken once a little depends on the finger.
         pytest.param({"recorder": "absent"}, 0.95, 1.05, id="I"),
         pytest.param({"recorder": "absent", "control": {"method": "cell_states"}}, 0.95, 1.05, id="Method I"),
-        pytest.param({"simulation": {"duration": 0.25}}, 0.85, 1.0, id="a recorded session"),
         # Temporary arrays are as many as numpy happens to need.
         pytest.param({"recorder": "absent", "shape": {"file": "dome"}}, 0.95, 1.05, id="cells that all take"),
         pytest.param(
