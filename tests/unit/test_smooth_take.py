@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
 ORDERS = make_orders(30, -6e-3, 6e-3, 0.0, 10e-3, 10)
 
 
+@cache
 def smooth_take() -> Take:
     """Return the take of a stroke over a relief."""
     system = assemble(SCENE)
