@@ -1,9 +1,11 @@
-"""The recorder: which row holds what, how many there are, and what cannot be held at all."""
+"""The recorder: which row holds what, how many there are, and what memory a session needs or cannot have."""
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +14,14 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import Rows, State, make_initial_state
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording, write
+from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.memory_limit import (
+    count_busy_cells,
     count_bytes_needed,
     measure_available_memory,
     refuse_what_cannot_fit,
 )
+from digiclay.core.session.run_scene import run
 
 from tests.assemble import sample
 
@@ -128,3 +133,57 @@ def test_rows_written_together_are_those_of_the_states_one_by_one(every: int) ->
     rows = recording.finish(scene.periods)
     for name, wanted in told.items():
         assert np.array_equal(rows[name][: len(wanted)], wanted), name
+
+
+#: Two beds, of which the larger has so many more cells: what is taken once falls out of the difference.
+SIDES, MORE = (100, 150), 150**2 - 100**2
+
+
+def measured_and_estimated(**changes: Any) -> tuple[float, float]:
+    """Return bytes a cell at a session's peak: those numpy asks for, and those the estimate says."""
+    taken, told = [], []
+    for side in SIDES:
+        press = [{"time": 0.0, "position": [0, 0, 0.041]}, {"time": 0.05, "position": [0, 0, 0.038]}]
+        bed = {"layout": {"rows": side, "columns": side}, "trajectory": {"waypoints": press}}
+        scene = resolve({**bed, "simulation": {"duration": 0.05}, **changes})
+        system = assemble(scene)
+        told.append(
+            count_bytes_needed(
+                scene.recorder, system.rows, scene.cells, scene.periods, count_busy_cells(scene)
+            )
+        )
+        tracemalloc.start()
+        try:
+            run(scene)
+            taken.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    return (taken[1] - taken[0]) / MORE, (told[1] - told[0]) / MORE
+
+
+@pytest.mark.parametrize(
+    ("changes", "least", "most"),
+    [
+        # All of it is arrays whose lengths are known; of what is taken once a little depends on the finger.
+        pytest.param({"recorder": "absent"}, 0.95, 1.05, id="I"),
+        pytest.param({"recorder": "absent", "control": {"method": "cell_states"}}, 0.95, 1.05, id="Method I"),
+        # Temporary arrays are as many as numpy happens to need.
+        pytest.param({"recorder": "absent", "shape": {"file": "dome"}}, 0.95, 1.05, id="cells that all take"),
+        pytest.param(
+            {"shape": {"file": "dome"}, "simulation": {"duration": 0.5}}, 0.5, 1.0, id="rows that wait"
+        ),
+    ],
+)  # fmt: skip
+def test_a_cell_takes_as_many_bytes_as_is_said(changes: dict[str, Any], least: float, most: float) -> None:
+    taken, told = measured_and_estimated(**changes)
+    assert least * told <= taken <= most * told
+
+
+def test_a_row_of_a_cell_takes_as_many_bytes_as_is_said() -> None:
+    history = run(resolve({"simulation": {"duration": 0.05}})).history
+    assert history is not None
+    rows, cells = history["height"].shape
+    kept = sum(array.nbytes for array in history.values() if array.shape == (rows, cells)) / (rows * cells)
+    told = [count_bytes_needed(Recorder(), Rows(2, 2), 1000, periods) for periods in (500, 501)]
+    # One byte more stands for what the metrics need, which is a truth value.
+    assert (told[1] - told[0]) / 1000 == kept + 1
