@@ -1,10 +1,12 @@
-"""The rows of a state, states as values, and how long a set of active cells serves."""
+"""The rows of a state, states as values, stored modes, and how long a set of active cells serves."""
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
-from digiclay.core.base.modes import Mode
+from digiclay.core.base.modes import COLORS, MEANINGS, Mode
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.state import Rows
@@ -65,3 +67,19 @@ def test_an_active_set_serves_while_the_controlled_disc_is_within_a_pitch_around
     first = select.update(begin(system), None, (3e-3, -6e-3, 5e-3)).active
     assert first.cells.tolist() == np.flatnonzero(np.hypot(x - 3e-3, y + 6e-3) < 8e-3).tolist()
     assert select.serves(first, 0, None, tuple(1e-3 * one for one in disc)) == serves
+
+
+def test_the_stored_codes_never_change() -> None:
+    # Histories on disk hold them.
+    assert {mode.name: int(mode) for mode in Mode} == {
+        "REST": 0, "HOLD": 1, "EDGE": 2, "BLISTER": 3,
+        "SPRING": 4, "FORCE_FOLLOW": 5, "CRITICAL": 6, "FROZEN": 7,
+    }  # fmt: skip
+
+
+def test_every_mode_has_a_meaning_and_a_color_unlike_all_others() -> None:
+    assert MEANINGS.keys() == COLORS.keys() == set(Mode)
+    colors = np.array(list(COLORS.values()))
+    assert 0.0 <= colors.min() <= colors.max() <= 1.0
+    # 0.15 apart in the unit cube: the two nearest, the blues, are 0.4 apart.
+    assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(colors, 2)) > 0.15
