@@ -1,7 +1,8 @@
-"""Parts of the server without a process: deadlines, session, take, token, lease."""
+"""The server without a process: options, deadlines, session, take, token, lease."""
 
 from __future__ import annotations
 
+import socket
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, from_bytes, make_take, replay
 
+from benchmarks.processes import ENDS, sum_bins
 from digiclay_serve.doors import Order, make_slot, open_slot, pack_order, unpack_order
 from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token
 from digiclay_serve.real_time_loop import Schedule, TimeCounts
@@ -27,6 +29,7 @@ from digiclay_serve.served_session import (
     record,
     reset,
 )
+from tests.scene_files import left
 from tests.timeouts import wait_until
 
 PERIOD = 1e-3
@@ -244,3 +247,43 @@ def test_only_the_same_token_is_the_right_one_and_one_that_is_none_is_refused_an
         with pytest.raises(OutputError, match=r"--token must have 8 to 128") as caught:
             choose_token(token)
         assert not token or token not in str(caught.value)
+
+
+SMALL = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "control=absent"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--rate 0", "must be from 1 to 1000 Hz"),
+        ("--rate nan", "must be from 1 to 1000 Hz"),
+        ("--rate 1e9", "must be from 1 to 1000 Hz"),
+        ("--port 65536", "must be a port from 0 to 65535"),
+        ("--port -1", "must be a port from 0 to 65535"),
+        ("--osc-port x", "must be a port from 0 to 65535"),
+        ("--token short", "--token must have 8 to 128"),
+        ("--most-force 0", "must be from 0.001 to 1000 N"),
+        ("--most-speed inf", "must be from 1 to 10000 mm/s"),
+        ("--part 0", "must be from 0.1 to 600 s"),
+        ("--seconds inf", "must be from 0 to 1e+09 s"),
+        ("--tokn x", "Did you mean --token (not --tokn)?"),
+        ("--report missing/report.json --out .", "holds other things"),
+        ("missing.toml", "missing.toml"),
+    ],
+)
+def test_a_wrong_option_is_refused_in_one_line(words: str, message: str, here: Path, refused: Any) -> None:
+    refused(["serve", "--seconds", "0", *words.split()], message)
+    assert left(here) == []
+
+
+def test_what_cannot_be_opened_is_told_in_a_line(here: Path, refused: Any) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = str(other.getsockname()[1])
+        command = ["serve", *SMALL, "--osc-port", "0", "--port", port, "--out", "take"]
+        refused(command, f"Port {port} of 127.0.0.1 cannot be opened: ")
+    assert left(here) == []
+
+
+def test_the_times_of_the_benchmark_are_summed_below_each_end() -> None:
+    bins = [(0.0, 1), (0.00024, 2), (0.00025, 4), (0.00099, 8), (0.001, 16), (0.2, 32)]
+    assert sum_bins(bins, ENDS) == [3, 4, 0, 8, 16, 0, 0, 0, 0, 32]
