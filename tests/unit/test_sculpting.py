@@ -192,9 +192,6 @@ def test_a_session_is_found_by_its_bed_until_it_is_dropped() -> None:
     assert running.drop(7) is None
 
 
-pytestmark = pytest.mark.usefixtures("quick_machine")
-
-
 def plays(session: Running) -> bool:
     """Return whether the recording of a session gives its state again bit for bit."""
     keep = session.recording

@@ -38,7 +38,7 @@ SMALL = {
     "blister": {"radius": 5e-3, "edge_radius": 8e-3, "flat_radius": 2e-3},
 }
 WAIT = {"waypoints": [{"time": time, "position": [0, 0, 0.05]} for time in (0.0, 1.0)]}
-SCENE = resolve({**SMALL, "trajectory": WAIT})
+STILL = resolve({**SMALL, "trajectory": WAIT})
 DOWN = np.array([0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -82,7 +82,7 @@ def pressed(session: Session, count: int = 20) -> Session:
 
 
 def test_the_session_follows_a_pose_and_tells_its_number() -> None:
-    frame = make_frame(pressed(begin_session(SCENE)))
+    frame = make_frame(pressed(begin_session(STILL)))
     assert (frame.period, frame.number, frame.pose.tolist()) == (20, 3, DOWN.tolist())
     assert frame.total_force == pytest.approx(frame.forces.sum(), rel=1e-6)
     assert frame.total_force > 0.0
@@ -94,7 +94,7 @@ def test_the_session_follows_a_pose_and_tells_its_number() -> None:
     [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)],
 )
 def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, flags: int) -> None:
-    session, seen = begin_session(SCENE, replace(LIMITS, force=most)), 0
+    session, seen = begin_session(STILL, replace(LIMITS, force=most)), 0
     for _ in range(30):
         session = follow(session, np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]), 3, 1)
         frame = make_frame(session)
@@ -114,7 +114,7 @@ def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, fl
     ],
 )
 def test_the_fingertip_has_a_largest_speed(place: Any, turn: Any, way: float, count: int) -> None:
-    session, turns, each = begin_session(SCENE, Limits(speed=0.1)), 0, 0.1 * 5e-3 * count
+    session, turns, each = begin_session(STILL, Limits(speed=0.1)), 0, 0.1 * 5e-3 * count
     while turns == 0 or session.behind:
         before = session.pose[:3]
         session, turns = follow(session, np.array(place + turn), 3, count), turns + 1
@@ -123,7 +123,7 @@ def test_the_fingertip_has_a_largest_speed(place: Any, turn: Any, way: float, co
 
 
 def test_a_reset_session_is_the_one_that_began() -> None:
-    again, first = reset(pressed(begin_session(SCENE))), begin_session(SCENE)
+    again, first = reset(pressed(begin_session(STILL))), begin_session(STILL)
     assert snapshot.dump(again.system, again.state) == snapshot.dump(first.system, first.state)
     assert (again.pose.tolist(), again.state.period) == (first.pose.tolist(), 0)
 
@@ -157,7 +157,7 @@ def taken(session: Session) -> Take:
 
 
 def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path: Path) -> None:
-    session = record(begin_session(SCENE), 10)
+    session = record(begin_session(STILL), 10)
     with PartWriter(tmp_path / "out") as writer:
         for _ in range(3):
             session = pressed(session, 10)
@@ -179,7 +179,7 @@ def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path: Pa
 
 
 def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path: Path) -> None:
-    take, blocked = taken(pressed(record(begin_session(SCENE), 10), 3)), tmp_path / "take_001_part_00002.npz"
+    take, blocked = taken(pressed(record(begin_session(STILL), 10), 3)), tmp_path / "take_001_part_00002.npz"
     with PartWriter(tmp_path) as writer:
         writer.put(take)
         wait_until(lambda: list(tmp_path.glob("*_part_00001.npz")))
@@ -199,7 +199,7 @@ def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path
         (tmp_path / name).write_text("old", encoding="utf-8")
     with pytest.raises(OutputError, match="replace the take in it with --overwrite"), PartWriter(tmp_path):
         pass
-    for part in (None, taken(pressed(record(begin_session(SCENE), 10), 3))):
+    for part in (None, taken(pressed(record(begin_session(STILL), 10), 3))):
         assert sorted(path.name for path in tmp_path.iterdir()) == held
         with PartWriter(tmp_path, overwrite=True) as writer:
             if part:
@@ -249,7 +249,7 @@ def test_only_the_same_token_is_the_right_one_and_one_that_is_none_is_refused_an
         assert not token or token not in str(caught.value)
 
 
-SMALL = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "control=absent"]
+FEW_PINS = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "control=absent"]
 
 
 @pytest.mark.parametrize(
@@ -279,7 +279,7 @@ def test_a_wrong_option_is_refused_in_one_line(words: str, message: str, here: P
 def test_what_cannot_be_opened_is_told_in_a_line(here: Path, refused: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = str(other.getsockname()[1])
-        command = ["serve", *SMALL, "--osc-port", "0", "--port", port, "--out", "take"]
+        command = ["serve", *FEW_PINS, "--osc-port", "0", "--port", port, "--out", "take"]
         refused(command, f"Port {port} of 127.0.0.1 cannot be opened: ")
     assert left(here) == []
 

@@ -1,4 +1,4 @@
-"""A state or a controller's memory is kept as bytes and taken up again bit for bit, or refused in one line."""
+"""A state, a controller's memory in it, is kept as bytes and taken up bit for bit, or refused in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Strokes of the Press tool: path, orientation and motion of the fingertip; queued, they are formed in turn."""
+"""Strokes of the Press tool: path, orientation and motion of the fingertip; strokes in a queue."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ from digiclay.strokes.stroke import (
 from numpy.typing import NDArray
 
 from tests.hand import TICK, finish, go_on, heights, let_go, risen, started
+
+pytestmark = pytest.mark.usefixtures("quick_machine")
 
 CELLS = make_grid(Layout(rows=20, columns=20))
 PERIOD = 5e-3
@@ -311,8 +313,6 @@ def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean() -> None:
     assert abs(session.pose[3:] @ before) < 0.99
     np.testing.assert_array_equal(drop_strokes(session).pose[3:], before)
 
-
-pytestmark = pytest.mark.usefixtures("quick_machine")
 
 DEPTH = 4e-3
 #: A pin that a finger of 4 mm depth has pressed is lower than this, m.

@@ -1,4 +1,4 @@
-"""A take: replayed bit for bit, simulated more finely, with smooth strokes, written as a scene and as bytes."""
+"""A take, also of smooth strokes: replayed bit for bit, simulated more finely, written as scene and bytes."""
 
 from __future__ import annotations
 

@@ -149,9 +149,6 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(
     assert not (here / "out").exists()
 
 
-pytest.importorskip("optuna", reason="digiclay[study] is not installed")
-
-
 POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]])
 
 
