@@ -77,10 +77,9 @@ def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the
         track(device(columns=9), Drag(), 10e-3)
 
 
-@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
-def test_both_methods_follow_a_drag_at_15_mm_a_second_and_have_a_limit(method: str) -> None:
+def test_a_drag_is_followed_at_15_mm_a_second_and_has_a_limit() -> None:
     drag = Drag(height=6e-3, length=30e-3)
-    found = find_largest_speed(device(method), drag, Criterion(), low=15e-3, high=70e-3, resolution=60e-3)
+    found = find_largest_speed(device(), drag, Criterion(), low=15e-3, high=70e-3, resolution=60e-3)
     assert found == 15e-3
 
 
