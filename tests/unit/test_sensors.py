@@ -152,14 +152,6 @@ def test_the_seed_makes_the_session_also_one_taken_up_again_in_the_middle() -> N
     np.testing.assert_array_equal(rest.height, first.height[107:])
 
 
-@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
-def test_a_session_with_coarse_sensors_stays_finite_and_within_the_stroke(method: str) -> None:
-    rough = ("force_noise=5 mN", "height_noise=0.2 mm", "force_step=5 mN", "height_step=0.1 mm", "delay=3")
-    history = heights(f"control.method={method}", *(f"sensors.{setting}" for setting in rough))
-    assert np.isfinite(history).all()
-    assert 0.0 <= history.min() < history.max() <= 100e-3
-
-
 def test_coarse_height_sensors_change_the_session_and_perfect_ones_do_not() -> None:
     plain = heights()
     assert np.abs(heights("sensors.height_step=0.5 mm") - plain).max() > 1e-4
