@@ -8,6 +8,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError, one_line
+from ..settings.declared import number
 from ..ui_text import localize
 from . import status
 from .poll_messages import edited
@@ -148,4 +149,4 @@ class Drawing(Polled):
 def millimeters(name: str, default: float, words: str, **limits: Any) -> Any:
     """Declare a length with a default in m as a property in mm."""
     limits = {"precision": 2, "step": 10} | limits
-    return bpy.props.FloatProperty(name=f"{name} (mm)", description=words, default=1e3 * default, **limits)
+    return number(f"{name} (mm)", words, default=1e3 * default, **limits)

@@ -16,7 +16,7 @@ from ..press.occlusion import find_free_place
 from ..roles import BALL, FINGER, HOUSING, ROLE, bed_of, fingertip_of
 from ..sessions import running
 from ..settings import own_presets, properties
-from ..settings.declared import title
+from ..settings.declared import choice, integer, number, title
 from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import to_si
@@ -83,41 +83,25 @@ class AddBed(Placed, Action, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
     needs = (inside_edit,)
 
-    bed: bpy.props.EnumProperty(
-        name="Bed",
-        description="Number and distance of the pins, and size of fingertip and blister",
-        items=[(name, title(name), bed.use) for name, bed in BEDS.items()],
-        default=UNNAMED,
-        update=take_bed,
-    )
-    rows: bpy.props.IntProperty(
-        name="Rows", description="Number of rows of pins", default=DEFAULT.rows, min=1, max=MOST
-    )
-    columns: bpy.props.IntProperty(
-        name="Columns", description="Number of pins in a row", default=DEFAULT.columns, min=1, max=MOST
-    )
+    bed: choice(
+        "Bed", "Number and distance of the pins, and size of fingertip and blister",
+        items=[(name, title(name), bed.use) for name, bed in BEDS.items()], default=UNNAMED, update=take_bed,
+    )  # fmt: skip
+    rows: integer("Rows", "Number of rows of pins", default=DEFAULT.rows, min=1, max=MOST)
+    columns: integer("Columns", "Number of pins in a row", default=DEFAULT.columns, min=1, max=MOST)
     pitch: millimeters(
         "Pitch", DEFAULT.pitch, "Distance between neighboring pins in a row, in mm",
         min=0.5, soft_max=20.0, max=1000.0,
     )  # fmt: skip
-    arrangement: bpy.props.EnumProperty(
-        name="Arrangement",
-        description="Offset of neighboring rows",
+    arrangement: choice(
+        "Arrangement", "Offset of neighboring rows",
         items=[(name, title(name), kind.meaning) for name, kind in ARRANGEMENTS.items()],
         default=DEFAULT.arrangement,
-    )
-    method: bpy.props.EnumProperty(
-        name="Method",
-        description="Control method of the cells",
-        items=method_items(),
-        default=next(iter(METHODS)),
-    )
-    preset: bpy.props.EnumProperty(
-        name="Preset", description="Fluid, valves and all other parameters of a custom preset", items=offered
-    )
-    scale: bpy.props.FloatProperty(
-        name="Scale (cm/mm)",
-        description="Scale of the device: centimeters in Blender for a millimeter of the device",
+    )  # fmt: skip
+    method: choice("Method", "Control method of the cells", items=method_items(), default=next(iter(METHODS)))
+    preset: choice("Preset", "Fluid, valves and all other parameters of a custom preset", items=offered)
+    scale: number(
+        "Scale (cm/mm)", "Scale of the device: centimeters in Blender for a millimeter of the device",
         default=1.0, min=0.001, soft_min=0.1, soft_max=10.0, max=1000.0,
     )  # fmt: skip
 

@@ -15,6 +15,7 @@ from ..device.instant import find_ellipsoid
 from ..recorded import bake, takes
 from ..roles import bed_of
 from ..settings import properties
+from ..settings.declared import choice, integer
 from ..ui_text import localize
 from . import status
 from .action import Action, action
@@ -23,6 +24,10 @@ from .take_actions import ChosenTake
 
 #: Time between two looks at the user's keys, s, and the share of it that is worked.
 TICK, SHARE = 0.05, 0.9
+SOURCES = (
+    ("FINGERTIP", "Animated Fingertip", "The fingertip as it moves in the frames of the scene"),
+    ("TAKE", "Take", "The fingertip as it was recorded in a session"),
+)
 
 
 class LongWork(Action):
@@ -86,19 +91,9 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     needs = no_bed, session_runs.reworded("Stop the session on this bed first")
 
-    source: bpy.props.EnumProperty(
-        name="Source",
-        description="Source of the fingertip path",
-        items=[
-            ("FINGERTIP", "Animated Fingertip", "The fingertip as it moves in the frames of the scene"),
-            ("TAKE", "Take", "The fingertip as it was recorded in a session"),
-        ],
-        default="FINGERTIP",
-    )
-    first: bpy.props.IntProperty(name="First Frame", description="First frame of the session", default=1)
-    last: bpy.props.IntProperty(
-        name="Last Frame", description="Last frame of the session; a take has its own length", default=250
-    )
+    source: choice("Source", "Source of the fingertip path", items=SOURCES, default="FINGERTIP")
+    first: integer("First Frame", "First frame of the session", default=1)
+    last: integer("Last Frame", "Last frame of the session; a take has its own length", default=250)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Take the scene's frames where none are asked for, and begin."""

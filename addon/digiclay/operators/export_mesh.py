@@ -9,6 +9,7 @@ from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, find_forward
 from ..exchange import formed_bed
 from ..roles import bed_of
+from ..settings.declared import choice, flag
 from ..ui_text import localize
 from .make_mesh import SurfaceOptions, chosen_bed, sentence
 
@@ -41,27 +42,18 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(
         default="*.stl;*.obj;*.ply;*.glb;*.3mf", options={"HIDDEN", "SKIP_PRESET"}
     )
-    file_format: bpy.props.EnumProperty(
-        name="Format",
-        description="Format of the file",
+    file_format: choice(
+        "Format", "Format of the file",
         items=[(name, name.upper().replace("_", " "), sentence(words)) for name, words in FORMATS.items()],
         default="stl",
-    )
-    unit: bpy.props.EnumProperty(
-        name="Unit",
-        description="Length unit of the file; a GLB is always in meters",
-        items=[(name, name, f"Lengths in {name}") for name in UNITS],
-        default="mm",
-    )
-    forward_axis: bpy.props.EnumProperty(
-        name="Forward Axis", description="Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z"
-    )
-    up_axis: bpy.props.EnumProperty(
-        name="Up Axis", description="Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y"
-    )
-    separate: bpy.props.BoolProperty(
-        name="A File Each", description="Write each feature into a file of its own", default=False
-    )
+    )  # fmt: skip
+    unit: choice(
+        "Unit", "Length unit of the file; a GLB is always in meters",
+        items=[(name, name, f"Lengths in {name}") for name in UNITS], default="mm",
+    )  # fmt: skip
+    forward_axis: choice("Forward Axis", "Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z")
+    up_axis: choice("Up Axis", "Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y")
+    separate: flag("A File Each", "Write each feature into a file of its own", default=False)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser, with the name of the bed."""

@@ -15,6 +15,7 @@ from ..core.surface.skins import SKINS
 from ..exchange import formed_bed
 from ..panels.shape_exchange import LISTED
 from ..roles import bed_of
+from ..settings.declared import choice, flag, integer
 from ..settings.shown_units import to_si
 from ..ui_text import localize
 from .action import Action, action, millimeters
@@ -42,9 +43,9 @@ class FindingOptions(Action):
         "Threshold", Finding().threshold, sentence(FINDING["threshold"].doc) + ", in mm",
         min=0.001, max=100.0, precision=3,
     )  # fmt: skip
-    smallest: bpy.props.IntProperty(
-        name="Smallest (pins)", description=sentence(FINDING["smallest"].doc),
-        default=Finding().smallest, min=1, max=1_000_000, soft_max=100,
+    smallest: integer(
+        "Smallest (pins)", sentence(FINDING["smallest"].doc), default=Finding().smallest, min=1,
+        max=1_000_000, soft_max=100,
     )  # fmt: skip
 
     def finding(self) -> Finding:
@@ -55,22 +56,19 @@ class FindingOptions(Action):
 class SurfaceOptions(FindingOptions):
     """Kind of mesh and skin."""
 
-    kind: bpy.props.EnumProperty(
-        name="Mesh",
-        description="Kind of mesh made of the formed surface",
+    kind: choice(
+        "Mesh", "Kind of mesh made of the formed surface",
         items=[(name, sentence(name), sentence(words)) for name, words in KINDS.items()],
         default=Model().kind,
-    )
-    skin: bpy.props.EnumProperty(
-        name="Skin",
-        description="Interpolation of the surface between the pins",
+    )  # fmt: skip
+    skin: choice(
+        "Skin", "Interpolation of the surface between the pins",
         items=[(name, sentence(name), sentence(words)) for name, words in SKINS.items()],
         default=Model().skin,
-    )
-    resolution: bpy.props.IntProperty(
-        name="Points a Pitch", description=sentence(MODEL["resolution"].doc),
-        default=0, min=0, max=64, soft_max=16,
     )  # fmt: skip
+    resolution: integer(
+        "Points a Pitch", sentence(MODEL["resolution"].doc), default=0, min=0, max=64, soft_max=16
+    )
     base_thickness: millimeters(
         "Base", Model().base_thickness, sentence(MODEL["base_thickness"].doc) + ", in mm",
         min=0.01, max=1000.0, soft_max=50.0,
@@ -113,11 +111,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
     bl_label = "Make Mesh"
     bl_options = {"REGISTER", "UNDO"}
 
-    beside: bpy.props.BoolProperty(
-        name="Beside the Bed",
-        description="Place the mesh beside the bed instead of on its surface",
-        default=True,
-    )
+    beside: flag("Beside the Bed", "Place the mesh beside the bed instead of on its surface", default=True)
 
     def draw(self, context: Any) -> None:
         self.layout.use_property_split = True

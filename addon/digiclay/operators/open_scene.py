@@ -17,7 +17,7 @@ from ..device.instant import find_ellipsoid, pick_pose, read
 from ..exchange import shape_show
 from ..recorded import takes
 from ..roles import fingertip_of
-from ..settings.declared import title
+from ..settings.declared import choice, flag, integer, title
 from ..ui_text import localize
 from .action import Action, FileAction
 from .add_bed import Placed, add, add_shown
@@ -33,9 +33,7 @@ class ImportRun(Placed, FileAction, bpy.types.Operator):
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})
     filter_glob: bpy.props.StringProperty(default="*.npz", options={"HIDDEN"})
-    row: bpy.props.IntProperty(
-        name="Row", description="Recorded row to show: 0 is the first, -1 the last", default=-1
-    )
+    row: integer("Row", "Recorded row to show: 0 is the first, -1 the last", default=-1)
 
     def perform(self, context: Any) -> None:
         """Read the run and build the bed at the 3D cursor."""
@@ -50,11 +48,10 @@ class AddSceneAction(Placed, Action):
     bl_options = {"REGISTER", "UNDO"}
     needs = (inside_edit,)
 
-    take: bpy.props.BoolProperty(
-        name="Simulate as a Take",
-        description="Simulate the session of the scene and keep it as a take, for replay or bake",
+    take: flag(
+        "Simulate as a Take", "Simulate the session of the scene and keep it as a take, for replay or bake",
         default=True,
-    )
+    )  # fmt: skip
 
     def add_scene(self, context: Any, scene: Scene) -> None:
         """Add the bed of a scene, its fingertip where its path begins."""
@@ -97,13 +94,12 @@ class AddSample(AddSceneAction, bpy.types.Operator):
     bl_idname = "digiclay.add_sample"
     bl_label = "Digital Clay Sample"
 
-    sample: bpy.props.EnumProperty(
-        name="Sample",
-        items=[
+    sample: choice(
+        "Sample", items=[
             *((f"session:{name}", title(name), "A session") for name in list_samples()),
             *((f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins") for name in list_shapes()),
         ],
-    )
+    )  # fmt: skip
 
     def perform(self, context: Any) -> None:
         kind, _, name = self.sample.partition(":")

@@ -9,6 +9,7 @@ from ..core.scene.scene_source import load
 from ..core.scene.toml_table import PRESETS
 from ..roles import bed_of
 from ..settings import own_folder, own_presets, properties
+from ..settings.declared import text
 from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
 from ..ui_text import localize
@@ -24,7 +25,7 @@ class ApplyPreset(Action, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
     needs = (no_bed,)
 
-    preset: bpy.props.StringProperty(name="Preset")
+    preset: text("Preset")
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:
@@ -50,11 +51,7 @@ class SavePreset(Action, bpy.types.Operator):
     bl_label = "Save Digital Clay Preset"
     needs = (no_bed,)
 
-    name: bpy.props.StringProperty(
-        name="Name",
-        description="Name of the preset; a preset of that name is replaced",
-        maxlen=own_presets.LONGEST,
-    )
+    name: text("Name", "Name of the preset; a preset of that name is replaced", maxlen=own_presets.LONGEST)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         self.name = bed_of(context).digiclay.own_preset

@@ -15,6 +15,7 @@ from ..core.surface.pointing import find_contact_outline
 from ..press import aim, brush, tool
 from ..roles import fingertip_of
 from ..settings import finger_size
+from ..settings.declared import number
 from ..strokes.stroke import DEEPEST, SHALLOWEST, Brush
 from ..ui_text import localize
 from . import status
@@ -244,9 +245,7 @@ class ScaleSize(Action, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     needs = (no_finger,)
 
-    scalar: bpy.props.FloatProperty(
-        name="Factor", description="Factor of the size", default=1.1, min=0.1, max=10.0
-    )
+    scalar: number("Factor", "Factor of the size", default=1.1, min=0.1, max=10.0)
 
     def perform(self, context: Any) -> None:
         bed: Any = brush.bed_in_use(context)

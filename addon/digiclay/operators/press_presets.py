@@ -9,6 +9,7 @@ from ..core.base.errors import DigiclayError
 from ..press import brush
 from ..press.brush import FINGERS
 from ..settings import finger_size
+from ..settings.declared import choice
 from ..ui_text import localize
 from .action import Action, Polled
 from .poll_messages import no_finger, no_tool_in_view
@@ -22,11 +23,10 @@ class TakeFinger(Action, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     needs = (no_finger,)
 
-    kind: bpy.props.EnumProperty(
-        name="Finger",
-        description="Form and size of the fingertip",
+    kind: choice(
+        "Finger", "Form and size of the fingertip",
         items=[(name, kind.label, kind.source) for name, kind in FINGERS.items()],
-    )
+    )  # fmt: skip
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:

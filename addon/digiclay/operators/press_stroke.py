@@ -13,7 +13,7 @@ from ..press import aim, brush, pointer
 from ..press.pointer import begin_button, read_event
 from ..sessions import running
 from ..sessions.stroke_queue import change_stroke, find_stroke, queue_stroke
-from ..settings.declared import title
+from ..settings.declared import choice, flag, number, title
 from ..strokes.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw, pull
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
@@ -38,9 +38,9 @@ NOT_PRESSED = {"CANCELLED", "PASS_THROUGH"}
 class PressSettings:
     """Settings of the tool: properties of the operator, which the header shows and presets store."""
 
-    brush: bpy.props.EnumProperty(
-        name="Brush", description="What a stroke does to the surface", items=brush.BRUSH_ITEMS,
-        default="LOWER", translation_context="Brush",
+    brush: choice(
+        "Brush", "What a stroke does to the surface", items=brush.BRUSH_ITEMS, default="LOWER",
+        translation_context="Brush",
     )  # fmt: skip
     depth: millimeters(
         "Depth", 4e-3, "How far a stroke of Lower goes below the surface, in mm",
@@ -50,44 +50,33 @@ class PressSettings:
         "Height", 15e-3, "How far a stroke of Raise goes above the surface, in mm",
         min=0.1, max=1e3 * DEEPEST, soft_max=30.0, step=100,
     )  # fmt: skip
-    strength: bpy.props.FloatProperty(
-        name="Strength",
-        description="Share of the depth, of the height, or of the way to the level that a stroke reaches, "
-        "and strength of Smooth; pen pressure scales it further",
-        default=1.0, min=0.01, max=1.0, subtype="FACTOR", precision=2,
+    strength: number(
+        "Strength", "Share of the depth, of the height, or of the way to the level that a stroke reaches, "
+        "and strength of Smooth; pen pressure scales it further", default=1.0, min=0.01, max=1.0,
+        subtype="FACTOR", precision=2,
     )  # fmt: skip
-    symmetry: bpy.props.EnumProperty(
-        name="Symmetry",
-        description="Mirror images of a stroke about the middle of the bed. The device has one finger: "
-        "it forms them one after the other, as one undo step",
-        items=brush.SYMMETRY_ITEMS,
-        default="NONE",
-    )
-    path: bpy.props.EnumProperty(
-        name="Stroke", description="Path of a stroke", items=brush.PATH_ITEMS, default="FREE"
-    )
+    symmetry: choice(
+        "Symmetry", "Mirror images of a stroke about the middle of the bed. The device has one finger: "
+        "it forms them one after the other, as one undo step", items=brush.SYMMETRY_ITEMS, default="NONE",
+    )  # fmt: skip
+    path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
     stabilizer: millimeters(
         "Stabilizer", 0.0,
         "Length, in mm, by which a free stroke lags behind the mouse, so that it becomes smoother; "
         "its end is reached. 0: none",
         min=0.0, max=50.0, soft_max=15.0, precision=1, step=50,
     )  # fmt: skip
-    use_pressure: bpy.props.BoolProperty(
-        name="Pen Pressure",
-        description="Pen pressure scales depth, height and strength, up to their values",
+    use_pressure: flag(
+        "Pen Pressure", "Pen pressure scales depth, height and strength, up to their values", default=True
+    )
+    pressure_curve: choice(
+        "Pressure Curve", "Share of the values that a pen reaches with part of its pressure",
+        items=pointer.CURVE_ITEMS, default="LINEAR",
+    )  # fmt: skip
+    use_tilt: flag(
+        "Pen Tilt", "The fingertip leans with the pen, by up to 60 degrees, until the stroke ends",
         default=True,
-    )
-    pressure_curve: bpy.props.EnumProperty(
-        name="Pressure Curve",
-        description="Share of the values that a pen reaches with part of its pressure",
-        items=pointer.CURVE_ITEMS,
-        default="LINEAR",
-    )
-    use_tilt: bpy.props.BoolProperty(
-        name="Pen Tilt",
-        description="The fingertip leans with the pen, by up to 60 degrees, until the stroke ends",
-        default=True,
-    )
+    )  # fmt: skip
 
 
 class Press(PressSettings, Polled, bpy.types.Operator):

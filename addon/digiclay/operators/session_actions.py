@@ -17,6 +17,7 @@ from ..roles import bed_of, fingertip_of
 from ..sessions import running, sculpting
 from ..sessions.running import Running
 from ..settings import properties
+from ..settings.declared import flag, text
 from ..ui_text import localize
 from .action import Action, action
 from .poll_messages import no_gesture, no_server, no_session, nothing_to_reset, session_waits
@@ -70,11 +71,10 @@ class ResetSession(Action, bpy.types.Operator):
     bl_options = {"UNDO"}
     needs = (nothing_to_reset,)
 
-    running_only: bpy.props.BoolProperty(
-        name="Only While It Runs",
-        description="Exclude beds without a session, so that the key cannot reset them by accident",
+    running_only: flag(
+        "Only While It Runs", "Exclude beds without a session, so that the key cannot reset them by accident",
         options={"HIDDEN", "SKIP_SAVE"},
-    )
+    )  # fmt: skip
 
     def perform(self, context: Any) -> set[str] | None:
         """Begin anew, the recording stored as a take; what a session has done can be taken back."""
@@ -115,14 +115,8 @@ class FollowServer(Action, bpy.types.Operator):
     in_any_mode = True
     needs = (no_session,)
 
-    address: bpy.props.StringProperty(
-        name="Address",
-        description="Address and port that the server prints for OSC",
-        default="127.0.0.1:8766",
-    )
-    token: bpy.props.StringProperty(
-        name="Token", description="Token that the server prints; no file keeps it", subtype="PASSWORD"
-    )
+    address: text("Address", "Address and port that the server prints for OSC", default="127.0.0.1:8766")
+    token: text("Token", "Token that the server prints; no file keeps it", subtype="PASSWORD")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         return set(context.window_manager.invoke_props_dialog(self))

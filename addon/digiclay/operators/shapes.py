@@ -14,7 +14,7 @@ from ..exchange import shape_show
 from ..roles import bed_of
 from ..sessions import running
 from ..settings import properties
-from ..settings.declared import title
+from ..settings.declared import choice, number, title
 from ..settings.shown_units import to_si
 from ..ui_text import localize
 from .action import Action, FileAction, Needs, action, millimeters
@@ -49,17 +49,11 @@ class Shaped(Action):
 
     #: Displays the shape on a bed; returns what `shape_show` does.
     display: Callable[[Any, Any], Any]
-    fit: bpy.props.EnumProperty(
-        name="Size", description="Placement on the bed", items=FITS, default=DEFAULT.fit
-    )
-    scale: bpy.props.FloatProperty(
-        name="Times", description="Scale of the plan", default=1.0, min=1e-3, max=1e3
-    )
+    fit: choice("Size", "Placement on the bed", items=FITS, default=DEFAULT.fit)
+    scale: number("Times", "Scale of the plan", default=1.0, min=1e-3, max=1e3)
     x: millimeters("Right", DEFAULT.x, "Shift of its middle from the bed's along x", **LENGTH)
     y: millimeters("Back", DEFAULT.y, "Shift of its middle from the bed's along y", **LENGTH)
-    relief: bpy.props.EnumProperty(
-        name="Height", description="Height of the shape", items=RELIEFS, default=DEFAULT.relief
-    )
+    relief: choice("Height", "Height of the shape", items=RELIEFS, default=DEFAULT.relief)
     rise: millimeters(
         "Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over", **LENGTH
     )
@@ -119,16 +113,14 @@ class ShapeFromFile(Shaped, FileAction, bpy.types.Operator):
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH")
     filter_glob: bpy.props.StringProperty(default=";".join(f"*{kind}" for kind in KINDS), options={"HIDDEN"})
-    up: bpy.props.EnumProperty(
-        name="Up",
-        description="Upward direction of a mesh; automatic: y in a glTF file, else z",
+    up: choice(
+        "Up", "Upward direction of a mesh; automatic: y in a glTF file, else z",
         items=[("auto", "Automatic", ""), *((way, way.upper(), "") for way in UPWARDS)],
-    )
-    unit: bpy.props.EnumProperty(
-        name="Unit",
-        description="Unit of length of a mesh; automatic: meters in a glTF file, else millimeters",
+    )  # fmt: skip
+    unit: choice(
+        "Unit", "Unit of length of a mesh; automatic: meters in a glTF file, else millimeters",
         items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
-    )
+    )  # fmt: skip
 
     def display(self, context: Any, bed: Any) -> Any:
         path = str(Path(bpy.path.abspath(self.filepath)))
@@ -141,7 +133,7 @@ class ShapeSample(Shaped, bpy.types.Operator):
     bl_idname = "digiclay.shape_sample"
     bl_label = "Sample Shape"
 
-    sample: bpy.props.EnumProperty(name="Shape", items=[(name, title(name), "") for name in list_shapes()])
+    sample: choice("Shape", items=[(name, title(name), "") for name in list_shapes()])
 
     def display(self, context: Any, bed: Any) -> Any:
         return shape_show.show_file(bed, self.shape(self.sample, bed))

@@ -13,6 +13,7 @@ from ..recorded import takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
 from ..roles import bed_of
 from ..sessions import running, sculpting
+from ..settings.declared import text
 from ..ui_text import localize
 from .action import Action, FileAction, action
 from .poll_messages import baked, cannot_record, linked, no_bed, no_recording, no_take, session_runs
@@ -21,7 +22,7 @@ from .poll_messages import baked, cannot_record, linked, no_bed, no_recording, n
 class ChosenTake:
     """Mixin of an operator on one take of the active bed."""
 
-    take: bpy.props.StringProperty(name="Take", description="Number of the take; empty: the last one")
+    take: text("Take", "Number of the take; empty: the last one")
 
 
 @action("digiclay.take_record", "Record Take", cannot_record)
@@ -40,7 +41,7 @@ class KeepTake(Action, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     needs = (no_recording,)
 
-    name: bpy.props.StringProperty(name="Name", description="Name of the take; empty: its number", maxlen=60)
+    name: text("Name", "Name of the take; empty: its number", maxlen=60)
 
     def perform(self, context: Any) -> set[str] | None:
         handlers.clear_recovery()

@@ -23,6 +23,7 @@ from ..roles import bed_of, fingertip_of
 from ..sessions import sculpting
 from ..sessions.running import Running
 from ..settings import properties
+from ..settings.declared import integer
 from ..ui_text import localize
 from . import status
 from .action import Action
@@ -42,10 +43,9 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     needs = no_bed, session_runs.reworded("Stop the session on this bed first"), no_take
 
-    parts: bpy.props.IntProperty(
-        name="Finer Steps",
-        description="Number of parts of each physics step: 1 replays the take bit for bit",
-        default=1, min=1, max=MOST_PARTS,
+    parts: integer(
+        "Finer Steps", "Number of parts of each physics step: 1 replays the take bit for bit", default=1,
+        min=1, max=MOST_PARTS,
     )  # fmt: skip
 
     def perform(self, context: Any) -> None:

@@ -19,6 +19,7 @@ from ..live import bed_state
 from ..overlay import views
 from ..sessions import running
 from ..settings import properties
+from ..settings.declared import choice, flag, number
 from ..ui_text import localize
 from .base import bed_of, draw_property, is_edited, panel
 
@@ -64,6 +65,16 @@ def _in_nodes(
     return {"get": lambda display: read(display.id_data) if can(display.id_data) else default, "set": put}
 
 
+def _of_words(
+    words: tuple[str, ...], read: Callable[[Any], str], write: Callable[[Any, str], None], default: str
+) -> dict[str, Any]:
+    """Return `get` and `set` of a word about the skin, stored as its place among the words."""
+    return _in_nodes(
+        lambda bed: words.index(read(bed)), lambda bed, code: write(bed, words[code]), words.index(default),
+        form.can_show_skin,
+    )  # fmt: skip
+
+
 def _color(bed: Any, code: int) -> None:
     view.color_by(bed, COLORINGS[code][0])
     _write_forces(bed)
@@ -81,67 +92,46 @@ def _follow_overlay(display: Any, context: Any) -> None:
 class Display(bpy.types.PropertyGroup):
     """Display properties of a bed."""
 
-    form: bpy.props.EnumProperty(
-        name="Show",
-        description="What is seen of the bed, also in renders: pins, or the surface they form as a skin",
-        items=FORMS,
-        **_in_nodes(
-            lambda bed: form.FORMS.index(form.read_form(bed)),
-            lambda bed, code: form.set_form(bed, form.FORMS[code]),
-            form.FORMS.index("pins"),
-            form.can_show_skin,
-        ),
-    )
-    skin: bpy.props.EnumProperty(
-        name="Skin",
-        description="How the skin runs between the pins",
-        items=SKINS,
-        **_in_nodes(
-            lambda bed: form.KINDS.index(form.read_kind(bed)),
-            lambda bed, code: form.set_kind(bed, form.KINDS[code]),
-            0,
-            form.can_show_skin,
-        ),
-    )
-    color: bpy.props.EnumProperty(
-        name="Color",
-        description="Quantity shown by the color of a pin",
-        items=COLORINGS,
+    form: choice(
+        "Show", "What is seen of the bed, also in renders: pins, or the surface they form as a skin",
+        items=FORMS, **_of_words(form.FORMS, form.read_form, form.set_form, "pins"),
+    )  # fmt: skip
+    skin: choice(
+        "Skin", "How the skin runs between the pins",
+        items=SKINS, **_of_words(form.KINDS, form.read_kind, form.set_kind, "smooth"),
+    )  # fmt: skip
+    color: choice(
+        "Color", "Quantity shown by the color of a pin", items=COLORINGS,
         **_in_nodes(lambda bed: int(view.color_source(bed) == "force"), _color, 0),
-    )
-    top_force: bpy.props.FloatProperty(
-        name="Top Color at (N)", description="Force of the last color, in N",
-        min=1e-3, max=1e3, soft_max=2.0, precision=3, step=1,
-        **_in_nodes(view.top_color, view.scale_colors, heat.TOP),
     )  # fmt: skip
-    arrows: bpy.props.BoolProperty(
-        name="Force Arrows",
-        description="Draw the force on each pin as an arrow, with a transparent fingertip; also in renders",
+    top_force: number(
+        "Top Color at (N)", "Force of the last color, in N", min=1e-3, max=1e3, soft_max=2.0, precision=3,
+        step=1, **_in_nodes(view.top_color, view.scale_colors, heat.TOP),
+    )  # fmt: skip
+    arrows: flag(
+        "Force Arrows",
+        "Draw the force on each pin as an arrow, with a transparent fingertip; also in renders",
         **_in_nodes(view.shows_arrows, _arrows, False),
-    )
-    arrow_length: bpy.props.FloatProperty(
-        name="Arrow Length (mm/N)", description="Length of the arrow of 1 N, in mm of the device",
-        min=0.1, max=1e5, soft_min=10.0, soft_max=1000.0, precision=1, step=1000,
-        **_in_nodes(
+    )  # fmt: skip
+    arrow_length: number(
+        "Arrow Length (mm/N)", "Length of the arrow of 1 N, in mm of the device", min=0.1, max=1e5,
+        soft_min=10.0, soft_max=1000.0, precision=1, step=1000, **_in_nodes(
             lambda bed: 1e3 * view.arrow_length(bed),
-            lambda bed, length: view.scale_arrows(bed, 1e-3 * length),
-            LENGTH,
+            lambda bed, length: view.scale_arrows(bed, 1e-3 * length), LENGTH,
         ),
     )  # fmt: skip
-    overlay: bpy.props.BoolProperty(
-        name="Overlay",
-        description="While a session runs, show force and state in a corner of the 3D view",
-        default=True,
+    overlay: flag(
+        "Overlay", "While a session runs, show force and state in a corner of the 3D view", default=True,
         update=_follow_overlay,
-    )
-    overlay_full: bpy.props.BoolProperty(
-        name="Overlay Details",
-        description="Show curves, heights of picked pins and modes in the overlay, not force and state alone",
+    )  # fmt: skip
+    overlay_full: flag(
+        "Overlay Details",
+        "Show curves, heights of picked pins and modes in the overlay, not force and state alone",
         update=_follow_overlay,
-    )
-    seconds: bpy.props.FloatProperty(
-        name="Past (s)", description="Time span of the overlay's curves, in s",
-        default=5.0, min=0.5, max=SPAN, precision=1, step=50,
+    )  # fmt: skip
+    seconds: number(
+        "Past (s)", "Time span of the overlay's curves, in s", default=5.0, min=0.5, max=SPAN, precision=1,
+        step=50,
     )  # fmt: skip
     picked: bpy.props.IntVectorProperty(
         name="Picked Pins", description="Pins whose heights the overlay shows; -1 for none",

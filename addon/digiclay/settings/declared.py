@@ -35,6 +35,18 @@ LABELS = {"centring_time": "Centering Time"}
 Update = Callable[[Any, Any], None]
 
 
+def _named(declare: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of Blender's that declares a property, given label and tooltip first."""
+    return lambda name, words="", **options: declare(name=name, description=words, **options)
+
+
+choice = _named(bpy.props.EnumProperty)
+number = _named(bpy.props.FloatProperty)
+integer = _named(bpy.props.IntProperty)
+flag = _named(bpy.props.BoolProperty)
+text = _named(bpy.props.StringProperty)
+
+
 def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type:
     """Make the property group of a part; `updates` of its fields are called with group and context."""
     properties = {field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)}

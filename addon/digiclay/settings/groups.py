@@ -17,7 +17,7 @@ from ..core.scene.toml_table import PRESETS
 from ..roles import fingertip_of
 from ..ui_text import localize
 from . import finger_size
-from .declared import WHOLE, Update, fill, group, make_group, read, title, whole
+from .declared import WHOLE, Update, choice, fill, flag, group, make_group, number, read, text, title, whole
 
 #: Blender keeps no reference to the texts of a list that is made on demand: this one does.
 OFFERED: list[tuple[str, str, str, int]] = []
@@ -148,9 +148,9 @@ def use_properties() -> dict[str, Any]:
     for section in OPTIONAL:
         along = [other for other, needed in NEEDS.items() if needed == section and other not in OPTIONAL]
         words = " and ".join([title(section).lower(), *(title(other).lower() for other in along)])
-        switches[f"use_{section}"] = bpy.props.BoolProperty(
-            name=title(section),
-            description=f"Simulate the {words}; without it, no time is spent on it",
+        switches[f"use_{section}"] = flag(
+            title(section),
+            f"Simulate the {words}; without it, no time is spent on it",
             default=section not in UNASKED,
         )
     return switches
@@ -182,33 +182,31 @@ SETTINGS = make_group(
     "settings",
     "Every parameter of a bed's scene.",
     {
-        "preset": bpy.props.EnumProperty(
-            name="Preset",
-            description="Fluid and valves; a choice sets their parameters",
+        "preset": choice(
+            "Preset",
+            "Fluid and valves; a choice sets their parameters",
             items=[(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS],
             update=take_preset,
         ),
-        "method": bpy.props.EnumProperty(
-            name="Method",
-            description="Control method of the cells; a choice also sets its blister",
+        "method": choice(
+            "Method",
+            "Control method of the cells; a choice also sets its blister",
             items=method_items(),
             default="virtual_master",
             update=take_method,
         ),
         "own_method": bpy.props.StringProperty(options={"HIDDEN"}, update=take_own_method),
-        "chosen_method": bpy.props.EnumProperty(
-            name="Method",
-            description="Control method of the cells; a choice also sets its blister",
+        "chosen_method": choice(
+            "Method",
+            "Control method of the cells; a choice also sets its blister",
             items=list_offered,
             get=place_of,
             set=choose,
         ),
-        "own_preset": bpy.props.StringProperty(
-            name="Own Preset", description="The custom preset that was applied last", options={"HIDDEN"}
-        ),
-        "size": bpy.props.FloatProperty(
-            name="Size (mm)",
-            description="Width of the fingertip, in mm; its length and height change in proportion",
+        "own_preset": text("Own Preset", "The custom preset that was applied last", options={"HIDDEN"}),
+        "size": number(
+            "Size (mm)",
+            "Width of the fingertip, in mm; its length and height change in proportion",
             get=lambda settings: 1e3 * finger_size.read_size(settings),
             set=lambda settings, value: finger_size.set_size(settings, 1e-3 * value),
             min=1e3 * finger_size.SMALLEST,
@@ -217,9 +215,9 @@ SETTINGS = make_group(
             step=50,
             precision=1,
         ),
-        "blister_follows": bpy.props.BoolProperty(
-            name="Blister Follows",
-            description="Keep the size of the blister in proportion to that of the fingertip",
+        "blister_follows": flag(
+            "Blister Follows",
+            "Keep the size of the blister in proportion to that of the fingertip",
             default=True,
         ),
         "blister_suits": bpy.props.FloatProperty(options={"HIDDEN"}),
