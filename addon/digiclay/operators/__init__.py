@@ -1,48 +1,17 @@
-"""Operators and menus: a class of a module here that has a `bl_idname` is registered.
+"""Operators and menus: a class with a `bl_idname` is registered, in whichever module here it is.
 
 No module here postpones its annotations: Blender reads an operator's properties from them.
 """
 
 from __future__ import annotations
 
-from ..compat import bpy
-from . import (
-    add_bed,
-    bake_session,
-    export_mesh,
-    make_mesh,
-    open_scene,
-    pin_view,
-    presets,
-    press_adjust,
-    press_presets,
-    press_shape,
-    press_stroke,
-    session_actions,
-    session_loop,
-    shapes,
-    take_actions,
-    take_replay,
-)
+import importlib
+import pkgutil
 
-MODULES = (
-    add_bed,
-    presets,
-    pin_view,
-    press_stroke,
-    press_shape,
-    press_adjust,
-    press_presets,
-    export_mesh,
-    make_mesh,
-    session_loop,
-    session_actions,
-    shapes,
-    open_scene,
-    take_actions,
-    take_replay,
-    bake_session,
-)
+from ..compat import bpy
+from . import add_bed, export_mesh, open_scene, session_loop
+
+MODULES = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
 CLASSES: tuple[type, ...] = tuple(
     kind
     for module in MODULES
