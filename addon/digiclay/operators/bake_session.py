@@ -1,7 +1,7 @@
 """Bake of a take, or of an animated fingertip, into the bed; removal of a bake."""
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -30,24 +30,28 @@ SOURCES = (
 )
 
 
-class LongWork(Action):
-    """Mixin of an operator with progress and Esc in a window, without them elsewhere.
+class Bake(ChosenTake, Action, bpy.types.Operator):
+    """Make an ordinary animation of the bed from a session; it plays and renders without simulation"""
 
-    Its `work` gives the completed share, from 0 to 1, after each step, and changes Blender's data only
-    in the last of its steps, so that Esc leaves everything as it was.
-    """
+    bl_idname = "digiclay.bake"
+    bl_label = "Bake Session"
+    bl_options = {"REGISTER", "UNDO"}
+    needs = no_bed, session_runs.reworded("Stop the session on this bed first")
 
-    bl_label: str
-
-    #: Gives the share done after each step; raises DigiclayError when the work cannot be done.
-    work: Callable[[Any], Generator[float, None, None]]
+    source: choice("Source", "Source of the fingertip path", items=SOURCES, default="FINGERTIP")
+    first: integer("First Frame", "First frame of the session", default=1)
+    last: integer("Last Frame", "Last frame of the session; a take has its own length", default=250)
 
     def perform(self, context: Any) -> None:
         for _ in self.work(context):
             pass
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Begin the work; it continues while Blender draws and handles events."""
+        """Take the scene's frames where none are asked for, and begin; work goes on while Blender draws."""
+        if not self.properties.is_property_set("first"):
+            self.first = context.scene.frame_start
+        if not self.properties.is_property_set("last"):
+            self.last = context.scene.frame_end
         self._steps = self.work(context)
         manager = context.window_manager
         self._timer = manager.event_timer_add(TICK, window=context.window)
@@ -82,29 +86,8 @@ class LongWork(Action):
         context.window_manager.progress_end()
         status.clear()
 
-
-class Bake(ChosenTake, LongWork, bpy.types.Operator):
-    """Make an ordinary animation of the bed from a session; it plays and renders without simulation"""
-
-    bl_idname = "digiclay.bake"
-    bl_label = "Bake Session"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, session_runs.reworded("Stop the session on this bed first")
-
-    source: choice("Source", "Source of the fingertip path", items=SOURCES, default="FINGERTIP")
-    first: integer("First Frame", "First frame of the session", default=1)
-    last: integer("Last Frame", "Last frame of the session; a take has its own length", default=250)
-
-    def invoke(self, context: Any, event: Any) -> set[str]:
-        """Take the scene's frames where none are asked for, and begin."""
-        if not self.properties.is_property_set("first"):
-            self.first = context.scene.frame_start
-        if not self.properties.is_property_set("last"):
-            self.last = context.scene.frame_end
-        return super().invoke(context, event)
-
     def work(self, context: Any) -> Generator[float, None, None]:
-        """Read the fingertip's path, simulate it, and write the bake."""
+        """Read the path, simulate it and write the bake, which Esc leaves out; yield the share done."""
         bed, scene = bed_of(context), context.scene
         recorded = self.source == "TAKE"
         if recorded:
