@@ -8,6 +8,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError, one_line
+from ..panels.base import declare
 from ..settings.declared import number
 from ..ui_text import localize
 from . import status
@@ -94,19 +95,13 @@ class Action(Polled):
 
 def action(
     idname: str, label: str, *needs: Callable[[Any], str], options: Iterable[str] = ("REGISTER", "UNDO"),
-    base: type = Action, in_any_mode: bool = False,
+    in_any_mode: bool = False,
 ) -> Callable[[Callable[[Any, Any], set[str] | None]], Any]:  # fmt: skip
     """Return a decorator that makes an operator of its `perform`, whose docstring is the description."""
-
-    def make(perform: Callable[[Any, Any], set[str] | None]) -> Any:
-        entries = {
-            "bl_idname": idname, "bl_label": label, "bl_options": set(options), "needs": needs,
-            "in_any_mode": in_any_mode, "perform": perform, "__doc__": perform.__doc__,
-            "__module__": perform.__module__,
-        }  # fmt: skip
-        return type(perform.__name__, (base, bpy.types.Operator), entries)
-
-    return make
+    return declare(
+        (Action, bpy.types.Operator), "perform", idname, label,
+        bl_options=set(options), needs=needs, in_any_mode=in_any_mode,
+    )  # fmt: skip
 
 
 class FileAction(Action):

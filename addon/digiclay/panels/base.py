@@ -9,7 +9,9 @@ from typing import Any
 from ..compat import bpy
 from ..device.view import bed_of, is_edited
 
-__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_property", "is_edited", "panel"]
+__all__ = [
+    "CATEGORY", "Panel", "bed_of", "declare", "draw_lines", "draw_property", "is_edited", "menu", "panel",
+]  # fmt: skip
 
 CATEGORY = "Digital Clay"
 #: Letters a line of the sidebar holds at its usual width.
@@ -33,20 +35,30 @@ class Panel:
         return bed_of(context) is not None
 
 
+def declare(
+    bases: tuple[type, ...], method: str, idname: str, label: str, **entries: Any
+) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that makes a class for Blender of its one method, the docstring included."""
+
+    def make(function: Callable[..., Any]) -> Any:
+        own = {"bl_idname": idname, "bl_label": label, method: function, "__doc__": function.__doc__}
+        return type(function.__name__, bases, own | {"__module__": function.__module__} | entries)
+
+    return make
+
+
 def panel(
     idname: str, label: str, order: int, *, closed: bool = True
 ) -> Callable[[Callable[[Any, Any], None]], Any]:
     """Return a decorator that makes a panel of its `draw`."""
 
-    def make(draw: Callable[[Any, Any], None]) -> Any:
-        entries = {
-            "bl_idname": idname, "bl_label": label, "bl_order": order, "draw": draw,
-            "bl_options": {"DEFAULT_CLOSED"} if closed else set(), "__doc__": draw.__doc__,
-            "__module__": draw.__module__,
-        }  # fmt: skip
-        return type(draw.__name__, (Panel, bpy.types.Panel), entries)
+    options = {"DEFAULT_CLOSED"} if closed else set()
+    return declare((Panel, bpy.types.Panel), "draw", idname, label, bl_order=order, bl_options=options)
 
-    return make
+
+def menu(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], Any]:
+    """Return a decorator that makes a menu of its `draw`."""
+    return declare((bpy.types.Menu,), "draw", idname, label)
 
 
 def draw_lines(layout: Any, words: str, icon: str) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 from ..compat import bpy
 from ..press.brush import tool_settings
 from ..press.tool import draw_presets
+from .base import declare
 
 
 def popover(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], Any]:
@@ -21,12 +23,10 @@ def popover(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], A
             if settings is not None:
                 draw_settings(panel.layout.column(), settings)
 
-        entries = {
-            "bl_idname": idname, "bl_label": label, "bl_space_type": "VIEW_3D", "bl_region_type": "HEADER",
-            "bl_ui_units_x": 12, "draw": draw, "__doc__": draw_settings.__doc__, "__module__": __name__,
-            "poll": classmethod(lambda cls, context: tool_settings(context) is not None),
-        }  # fmt: skip
-        return type(draw_settings.__name__, (bpy.types.Panel,), entries)
+        return declare(
+            (bpy.types.Panel,), "draw", idname, label, bl_space_type="VIEW_3D", bl_region_type="HEADER",
+            bl_ui_units_x=12, poll=classmethod(lambda cls, context: tool_settings(context) is not None),
+        )(wraps(draw_settings)(draw))  # fmt: skip
 
     return make
 
