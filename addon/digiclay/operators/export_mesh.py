@@ -8,6 +8,7 @@ from ..core.mesh_io.export_model import make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, find_forward
 from ..exchange import formed_bed
+from ..panels.base import menu
 from ..roles import bed_of
 from ..settings.declared import choice, flag
 from ..ui_text import localize
@@ -131,22 +132,18 @@ def _format_of(name: str) -> str:
     return max(fitting, key=lambda kind: len(find_suffix(kind)), default="")
 
 
-class ExportMenu(bpy.types.Menu):
+@menu("DIGICLAY_MT_export", "Digital Clay")
+def exports(entries: Any, context: Any) -> None:
     """Frequent exports, and a dialog for all others"""
-
-    bl_idname = "DIGICLAY_MT_export"
-    bl_label = "Digital Clay"
-
-    def draw(self, context: Any) -> None:
-        self.layout.operator_context = "INVOKE_DEFAULT"
-        for words, icon, options in ENTRIES:
-            entry = self.layout.operator(ExportMesh.bl_idname, text=words, icon=icon)
-            for name, value in {"skin": "bilinear", "separate": False, **options}.items():
-                setattr(entry, name, value)
-        self.layout.separator()
-        self.layout.operator(ExportMesh.bl_idname, text="Other ...")
+    entries.layout.operator_context = "INVOKE_DEFAULT"
+    for words, icon, options in ENTRIES:
+        export = entries.layout.operator(ExportMesh.bl_idname, text=words, icon=icon)
+        for name, value in {"skin": "bilinear", "separate": False, **options}.items():
+            setattr(export, name, value)
+    entries.layout.separator()
+    entries.layout.operator(ExportMesh.bl_idname, text="Other ...")
 
 
-def entry(menu: Any, context: Any) -> None:
+def entry(parent: Any, context: Any) -> None:
     """Draw the entry in File > Export."""
-    menu.layout.menu(ExportMenu.bl_idname, icon="MESH_GRID")
+    parent.layout.menu(exports.bl_idname, icon="MESH_GRID")

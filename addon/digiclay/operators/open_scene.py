@@ -1,5 +1,6 @@
 """Scene files, samples and recorded runs as beds: menus, file dialogs, drop into the 3D view."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from ..core.shapes.source_file import list_shapes
 from ..core.studies.job_table import embed_heights
 from ..device.instant import find_ellipsoid, pick_pose, read
 from ..exchange import shape_show
+from ..panels.base import menu
 from ..recorded import takes
 from ..roles import fingertip_of
 from ..settings.declared import choice, flag, integer, title
@@ -114,46 +116,32 @@ class AddSample(AddSceneAction, bpy.types.Operator):
         self.place(context, bed)
 
 
-class SampleMenu:
-    """Mixin of a menu of samples."""
-
-    layout: Any
-    kind = ""
-
-    def draw(self, context: Any) -> None:
-        for name in list_samples() if self.kind == "session" else list_shapes():
-            entry = self.layout.operator(AddSample.bl_idname, text=title(name))
-            entry.sample = f"{self.kind}:{name}"
+def _list_samples(layout: Any, kind: str, names: Iterable[str]) -> None:
+    """Draw an entry for each sample of a kind."""
+    for name in names:
+        layout.operator(AddSample.bl_idname, text=title(name)).sample = f"{kind}:{name}"
 
 
-class SessionSamples(SampleMenu, bpy.types.Menu):
+@menu("DIGICLAY_MT_session_samples", "Sessions")
+def session_samples(entries: Any, context: Any) -> None:
     """Sample sessions of Digital Clay"""
-
-    bl_idname = "DIGICLAY_MT_session_samples"
-    bl_label = "Sessions"
-    kind = "session"
+    _list_samples(entries.layout, "session", list_samples())
 
 
-class ShapeSamples(SampleMenu, bpy.types.Menu):
+@menu("DIGICLAY_MT_shape_samples", "Shapes")
+def shape_samples(entries: Any, context: Any) -> None:
     """Sample shapes of Digital Clay, displayed on a bed"""
-
-    bl_idname = "DIGICLAY_MT_shape_samples"
-    bl_label = "Shapes"
-    kind = "shape"
+    _list_samples(entries.layout, "shape", list_shapes())
 
 
-class Samples(bpy.types.Menu):
+@menu("DIGICLAY_MT_samples", "Digital Clay Samples")
+def samples(entries: Any, context: Any) -> None:
     """Sample sessions and shapes of Digital Clay"""
-
-    bl_idname = "DIGICLAY_MT_samples"
-    bl_label = "Digital Clay Samples"
-
-    def draw(self, context: Any) -> None:
-        self.layout.menu(SessionSamples.bl_idname, icon="CON_TRACKTO")
-        self.layout.menu(ShapeSamples.bl_idname, icon="RNDCURVE")
-        self.layout.separator()
-        self.layout.operator_context = "INVOKE_DEFAULT"
-        self.layout.operator(OpenScene.bl_idname, text="Scene File...", icon="FILE_FOLDER")
+    entries.layout.menu(session_samples.bl_idname, icon="CON_TRACKTO")
+    entries.layout.menu(shape_samples.bl_idname, icon="RNDCURVE")
+    entries.layout.separator()
+    entries.layout.operator_context = "INVOKE_DEFAULT"
+    entries.layout.operator(OpenScene.bl_idname, text="Scene File...", icon="FILE_FOLDER")
 
 
 class SceneFiles(bpy.types.FileHandler):
@@ -170,12 +158,12 @@ class SceneFiles(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def samples_entry(menu: Any, context: Any) -> None:
+def samples_entry(parent: Any, context: Any) -> None:
     """Draw the submenu in Add > Mesh."""
-    menu.layout.menu(Samples.bl_idname, icon="MESH_GRID")
+    parent.layout.menu(samples.bl_idname, icon="MESH_GRID")
 
 
-def import_entry(menu: Any, context: Any) -> None:
+def import_entry(parent: Any, context: Any) -> None:
     """Draw the entries in File > Import."""
-    menu.layout.operator(ImportRun.bl_idname, text="Digital Clay run (.npz)")
-    menu.layout.operator(OpenScene.bl_idname, text="Digital Clay scene (.toml)")
+    parent.layout.operator(ImportRun.bl_idname, text="Digital Clay run (.npz)")
+    parent.layout.operator(OpenScene.bl_idname, text="Digital Clay scene (.toml)")

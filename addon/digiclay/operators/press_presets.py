@@ -6,6 +6,7 @@ from bl_operators.presets import AddPresetBase  # type: ignore[import-not-found]
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
+from ..panels.base import menu
 from ..press import brush
 from ..press.brush import FINGERS
 from ..settings import finger_size
@@ -41,15 +42,11 @@ class TakeFinger(Action, bpy.types.Operator):
         finger_size.resize(bed.digiclay, FINGERS[self.kind].finger)
 
 
-class FingerMenu(bpy.types.Menu):
+@menu("DIGICLAY_MT_fingers", "Finger")
+def fingers(entries: Any, context: Any) -> None:
     """Preset fingers."""
-
-    bl_idname = "DIGICLAY_MT_fingers"
-    bl_label = "Finger"
-
-    def draw(self, context: Any) -> None:
-        for name, kind in FINGERS.items():
-            self.layout.operator(TakeFinger.bl_idname, text=kind.label).kind = name
+    for name, kind in FINGERS.items():
+        entries.layout.operator(TakeFinger.bl_idname, text=kind.label).kind = name
 
 
 class ApplyBrush(Action, bpy.types.Operator):

@@ -15,7 +15,7 @@ from ..settings.declared import WHOLE, title
 from ..settings.groups import method_of, method_property
 from ..settings.properties import part_group
 from ..ui_text import localize
-from .base import Panel, bed_of, draw_lines, is_edited, panel
+from .base import Panel, bed_of, draw_lines, is_edited, menu, panel
 
 #: Kinds of properties whose label stands beside the field.
 BESIDE = {"ENUM", "STRING"}
@@ -42,20 +42,16 @@ class Start(Panel, bpy.types.Panel):
         draw_lines(self.layout, running.last_message(), "INFO")
 
 
-class Presets(bpy.types.Menu):
+@menu("DIGICLAY_MT_presets", "Presets")
+def presets(entries: Any, context: Any) -> None:
     """Presets of the core and of the user."""
-
-    bl_idname = "DIGICLAY_MT_presets"
-    bl_label = "Presets"
-
-    def draw(self, context: Any) -> None:
-        for name in PRESETS:
-            self.layout.operator("digiclay.preset_apply", text=title(name)).preset = name
-        own = own_presets.names()
-        if own:
-            self.layout.separator()
-        for name in own:
-            self.layout.operator("digiclay.preset_apply", text=name).preset = name
+    for name in PRESETS:
+        entries.layout.operator("digiclay.preset_apply", text=title(name)).preset = name
+    own = own_presets.names()
+    if own:
+        entries.layout.separator()
+    for name in own:
+        entries.layout.operator("digiclay.preset_apply", text=name).preset = name
 
 
 @panel("DIGICLAY_PT_device", "Device", 70)
@@ -64,7 +60,7 @@ def device(sidebar: Any, context: Any) -> None:
     bed = bed_of(context)
     settings = bed.digiclay
     row = sidebar.layout.row(align=True)
-    row.menu(Presets.bl_idname, text=settings.own_preset or title(settings.preset))
+    row.menu(presets.bl_idname, text=settings.own_preset or title(settings.preset))
     row.operator("digiclay.preset_save", text="", icon="ADD")
     row.operator("digiclay.preset_remove", text="", icon="REMOVE")
     reason = properties.rebuild_reason(bed)
@@ -158,7 +154,7 @@ PARTS = (
     "relaxation",
 )
 CLASSES = (
-    Presets,
+    presets,
     Start,
     device,
     *(section_panel(section, device.bl_idname, order) for order, section in enumerate(PARTS)),
