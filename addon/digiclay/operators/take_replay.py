@@ -21,7 +21,6 @@ from ..live import bed_state, tick
 from ..recorded import takes
 from ..roles import bed_of, fingertip_of
 from ..sessions import sculpting
-from ..sessions.running import Running
 from ..settings import properties
 from ..settings.declared import integer
 from ..ui_text import localize
@@ -129,7 +128,10 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         bed, system = bed_of(context), self._system
         state = snapshot.dump(system, self._state)
         self._place(bed)
-        bed_state.write(bed, self._came_to(bed, state))
+        # The session that would go on from here.
+        uid, pose, tick_count = bed.session_uid, pick_pose(self._take.poses[-1]), bed_state.read_tick(bed)
+        begun = sculpting.begin_session(uid, bed.name, self._take.scene, pose, state, tick_count)
+        bed_state.write(bed, begun[0])
         view.show_state(bed, system, self._state)
         seconds = f"{self._take.duration:.1f} s"
         if state == self._take.end:
@@ -144,12 +146,6 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
             words = localize("steps {} times finer end {:.3g} µm away", self.parts, away)
             self.report({"INFO"}, localize("Replayed {}: {}", seconds, words))
         return {"FINISHED"}
-
-    def _came_to(self, bed: Any, state: bytes) -> Running:
-        """Return the session that would go on from here."""
-        take = self._take
-        uid, pose, tick_count = bed.session_uid, pick_pose(take.poses[-1]), bed_state.read_tick(bed)
-        return sculpting.begin_session(uid, bed.name, take.scene, pose, state, tick_count)[0]
 
     def _restore(self, context: Any) -> set[str]:
         """Show the bed as it was before."""

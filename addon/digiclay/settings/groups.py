@@ -17,7 +17,7 @@ from ..core.scene.toml_table import PRESETS
 from ..roles import fingertip_of
 from ..ui_text import localize
 from . import finger_size
-from .declared import WHOLE, Update, choice, fill, flag, group, make_group, number, read, text, title, whole
+from .declared import WHOLE, Update, choice, fill, flag, group, make_group, number, text, title, whole
 
 #: Blender keeps no reference to the texts of a list that is made on demand: this one does.
 OFFERED: list[tuple[str, str, str, int]] = []
@@ -93,15 +93,10 @@ def take_method(settings: Any, context: Any) -> None:
     """Set the blister the chosen built-in method is made for; it takes the place of one of one's own."""
     if settings.own_method:
         settings.own_method = ""
-    _take_blister(settings)
+    take_blister(settings, context)
 
 
-def take_own_method(settings: Any, context: Any) -> None:
-    """Set the blister the chosen method of one's own is made for."""
-    _take_blister(settings)
-
-
-def _take_blister(settings: Any) -> None:
+def take_blister(settings: Any, context: Any) -> None:
     """Set the blister that the method is made for; none where it forms none, or is not known here."""
     method = list_methods().get(method_of(settings))
     values = method.blister if method is not None else None
@@ -120,10 +115,9 @@ def take_arrangement(layout: Any, context: Any) -> None:
 
 def take_size(fingertip: Any, context: Any) -> None:
     """Show the fingertip in its new size."""
-    bed = fingertip.id_data
-    tip = fingertip_of(bed)
+    tip = fingertip_of(fingertip.id_data)
     if tip is not None:
-        bridge.resize_fingertip(tip, Fingertip(**read(fingertip, Fingertip, {}, "fingertip")))
+        bridge.resize_fingertip(tip, finger_size.read_finger(fingertip.id_data.digiclay))
 
 
 #: What happens after a change, by section and field.
@@ -195,7 +189,7 @@ SETTINGS = make_group(
             default="virtual_master",
             update=take_method,
         ),
-        "own_method": bpy.props.StringProperty(options={"HIDDEN"}, update=take_own_method),
+        "own_method": bpy.props.StringProperty(options={"HIDDEN"}, update=take_blister),
         "chosen_method": choice(
             "Method",
             "Control method of the cells; a choice also sets its blister",
