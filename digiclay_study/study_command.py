@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -22,6 +20,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.studies.axes import Point, Record
 from digiclay.core.studies.evaluation import FIGURES, make_bundles
+from digiclay.core.studies.sweep_plan import format_csv
 from digiclay.plots.sweep import read_unit
 
 from .indices import (
@@ -200,20 +199,18 @@ HEAD = (
 
 def format_index_table(findings: Findings) -> str:
     """Return all indices as CSV, with half the widths of their intervals; empty where there are none."""
-    lines = io.StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(["output", "order", "parameter", "with", "index", f"interval ({CONFIDENCE:.0%}, +-)"])
+    rows = [["output", "order", "parameter", "with", "index", f"interval ({CONFIDENCE:.0%}, +-)"]]
     keys = findings.subject.keys
     for name, indices in findings.indices.items():
         for order in ("first", "total"):
             for i, key in enumerate(keys):
                 pair = ["", ""] if indices is None else [repr(float(part[i])) for part in indices[order]]
-                writer.writerow([name, order, key, "", *pair])
+                rows.append([name, order, key, "", *pair])
         if indices and "second" in indices:
             for i, j in zip(*np.triu_indices(len(keys), 1), strict=True):
                 pair = [repr(float(part[i, j])) for part in indices["second"]]
-                writer.writerow([name, "second", keys[i], keys[j], *pair])
-    return lines.getvalue()
+                rows.append([name, "second", keys[i], keys[j], *pair])
+    return format_csv(rows)
 
 
 def format_page(findings: Findings, pictures: Sequence[str]) -> str:

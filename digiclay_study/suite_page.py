@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.metadata
-import io
 import os
 import platform
 import textwrap
@@ -19,6 +17,7 @@ from digiclay import __version__
 from digiclay.commands.gallery import make_links, make_table, wrap
 from digiclay.commands.progress import table as aligned
 from digiclay.core.studies.axes import Point, Record
+from digiclay.core.studies.sweep_plan import format_csv
 
 from .league import KIND, MEASURES, Interval, Row, Table, find_interval
 from .method_trials import LIMITS, LOW, OUTCOMES
@@ -198,10 +197,5 @@ def _find_interval(table: Table, method: str, trajectory: str, measure: str) -> 
 
 def _format_csv(source: Provenance, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Return rows as CSV below comments with their origin."""
-    lines = io.StringIO()
-    for name, value in source.facts():
-        lines.write(f"# {name}: {textwrap.shorten(value, 2000)}\n")
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
-    return lines.getvalue()
+    facts = [f"# {name}: {textwrap.shorten(value, 2000)}\n" for name, value in source.facts()]
+    return "".join(facts) + format_csv([head, *rows])

@@ -158,12 +158,17 @@ def format_table(
     names: Sequence[str],
 ) -> str:
     """Return points as CSV: the varied parameters, the metrics, and the error; SI units, in the header."""
-    lines = io.StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
     units = [*varied, *((name, FIGURES[name].unit) for name in names)]
-    writer.writerow([*(f"{name} ({unit})" if unit else name for name, unit in units), "error"])
+    table: list[Sequence[Any]] = [[*(f"{name} ({unit})" if unit else name for name, unit in units), "error"]]
     for values, record in zip(rows, records, strict=True):
         figures = record.get("figures", {})
         written = [repr(figures[name]) if figures.get(name) is not None else "" for name in names]
-        writer.writerow([*values, *written, record.get("error", "")])
+        table.append([*values, *written, record.get("error", "")])
+    return format_csv(table)
+
+
+def format_csv(rows: Iterable[Sequence[Any]]) -> str:
+    """Return rows as CSV."""
+    lines = io.StringIO()
+    csv.writer(lines, lineterminator="\n").writerows(rows)
     return lines.getvalue()
