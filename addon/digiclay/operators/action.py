@@ -95,12 +95,12 @@ class Action(Polled):
 
 def action(
     idname: str, label: str, *needs: Callable[[Any], str], options: Iterable[str] = ("REGISTER", "UNDO"),
-    in_any_mode: bool = False,
+    in_any_mode: bool = False, **properties: Any,
 ) -> Callable[[Callable[[Any, Any], set[str] | None]], Any]:  # fmt: skip
-    """Return a decorator that makes an operator of its `perform`, whose docstring is the description."""
+    """Return a decorator that makes an operator, with properties, of its `perform` and its docstring."""
     return declare(
         (Action, bpy.types.Operator), "perform", idname, label,
-        bl_options=set(options), needs=needs, in_any_mode=in_any_mode,
+        bl_options=set(options), needs=needs, in_any_mode=in_any_mode, __annotations__=properties,
     )  # fmt: skip
 
 

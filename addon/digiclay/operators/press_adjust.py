@@ -19,7 +19,7 @@ from ..settings.declared import number
 from ..strokes.stroke import DEEPEST, SHALLOWEST, Brush
 from ..ui_text import localize
 from . import status
-from .action import Action, Drawing
+from .action import Drawing, action
 from .poll_messages import no_finger, no_tool_in_view
 
 #: Factor of the mouse's way with Shift held down.
@@ -237,16 +237,11 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
         return [find_contact_outline(finger, turn, depth), find_contact_outline(finger, turn, depth * value)]
 
 
-class ScaleSize(Action, bpy.types.Operator):
+@action(
+    "digiclay.press_scale", "Scale Fingertip", no_finger,
+    scalar=number("Factor", "Factor of the size", default=1.1, min=0.1, max=10.0),
+)  # fmt: skip
+def scale_size(operator: Any, context: Any) -> None:
     """Scale the fingertip; its blister follows"""
-
-    bl_idname = "digiclay.press_scale"
-    bl_label = "Scale Fingertip"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = (no_finger,)
-
-    scalar: number("Factor", "Factor of the size", default=1.1, min=0.1, max=10.0)
-
-    def perform(self, context: Any) -> None:
-        bed: Any = brush.bed_in_use(context)
-        finger_size.set_size(bed.digiclay, finger_size.read_size(bed.digiclay) * self.scalar)
+    bed: Any = brush.bed_in_use(context)
+    finger_size.set_size(bed.digiclay, finger_size.read_size(bed.digiclay) * operator.scalar)

@@ -63,35 +63,30 @@ def rewind_session(operator: Any, context: Any) -> None:
     tick.place_finger(context, bed, back)
 
 
-class ResetSession(Action, bpy.types.Operator):
-    """Return all pins to rest and lift the fingertip off them"""
-
-    bl_idname = "digiclay.session_reset"
-    bl_label = "Reset"
-    bl_options = {"UNDO"}
-    needs = (nothing_to_reset,)
-
-    running_only: flag(
+@action(
+    "digiclay.session_reset", "Reset", nothing_to_reset, options=("UNDO",),
+    running_only=flag(
         "Only While It Runs", "Exclude beds without a session, so that the key cannot reset them by accident",
         options={"HIDDEN", "SKIP_SAVE"},
-    )  # fmt: skip
-
-    def perform(self, context: Any) -> set[str] | None:
-        """Begin anew, the recording stored as a take; what a session has done can be taken back."""
-        active = active_session(context)
-        if active is None:
-            if self.running_only:
-                return {"PASS_THROUGH"}
-            _bring_to_rest(bed_of(context))
-            return None
-        bed, session = active
-        words = takes.keep_recording(bed, session)
-        back = sculpting.reset(session)
-        tick.show(bed, back)
-        tick.place_finger(context, bed, back)
-        if words:
-            self.report({"INFO"}, words)
+    ),
+)  # fmt: skip
+def reset_session(operator: Any, context: Any) -> set[str] | None:
+    """Return all pins to rest and lift the fingertip off them"""
+    active = active_session(context)
+    if active is None:
+        if operator.running_only:
+            return {"PASS_THROUGH"}
+        _bring_to_rest(bed_of(context))
         return None
+    bed, session = active
+    # What a session has done can be taken back: its recording is stored as a take.
+    words = takes.keep_recording(bed, session)
+    back = sculpting.reset(session)
+    tick.show(bed, back)
+    tick.place_finger(context, bed, back)
+    if words:
+        operator.report({"INFO"}, words)
+    return None
 
 
 def _bring_to_rest(bed: Any) -> None:

@@ -15,14 +15,16 @@ from ..roles import bed_of
 from ..sessions import running, sculpting
 from ..settings.declared import text
 from ..ui_text import localize
-from .action import Action, FileAction, action
+from .action import FileAction, action
 from .poll_messages import baked, cannot_record, linked, no_bed, no_recording, no_take, session_runs
+
+TAKE = text("Take", "Number of the take; empty: the last one")
 
 
 class ChosenTake:
     """Mixin of an operator on one take of the active bed."""
 
-    take: text("Take", "Number of the take; empty: the last one")
+    take: TAKE
 
 
 @action("digiclay.take_record", "Record Take", cannot_record)
@@ -33,29 +35,24 @@ def record_take(operator: Any, context: Any) -> None:
     running.put(sculpting.set_recording(session, True))
 
 
-class KeepTake(Action, bpy.types.Operator):
+@action(
+    "digiclay.take_keep", "Keep Take", no_recording,
+    name=text("Name", "Name of the take; empty: its number", maxlen=60),
+)  # fmt: skip
+def keep_take(operator: Any, context: Any) -> set[str] | None:
     """Stop recording and keep the take in this file"""
-
-    bl_idname = "digiclay.take_keep"
-    bl_label = "Keep Take"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = (no_recording,)
-
-    name: text("Name", "Name of the take; empty: its number", maxlen=60)
-
-    def perform(self, context: Any) -> set[str] | None:
-        handlers.clear_recovery()
-        bed = bed_of(context)
-        session = running.find(bed)
-        assert session is not None  # by the poll
-        take = takes.read_recording(session)
-        running.put(sculpting.set_recording(session, False))
-        if take is None:
-            self.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
-            return {"CANCELLED"}
-        entry = takes.add(bed, take, self.name)
-        self.report({"INFO"}, localize("{}: {:.1f} s kept", entry.name, entry.seconds))
-        return None
+    handlers.clear_recovery()
+    bed = bed_of(context)
+    session = running.find(bed)
+    assert session is not None  # by the poll
+    take = takes.read_recording(session)
+    running.put(sculpting.set_recording(session, False))
+    if take is None:
+        operator.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
+        return {"CANCELLED"}
+    entry = takes.add(bed, take, operator.name)
+    operator.report({"INFO"}, localize("{}: {:.1f} s kept", entry.name, entry.seconds))
+    return None
 
 
 class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
@@ -87,16 +84,10 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
         self.report({"INFO"}, localize("{} written to {}", entry.name, file))
 
 
-class RemoveTake(ChosenTake, Action, bpy.types.Operator):
+@action("digiclay.take_remove", "Remove Take", no_bed, no_take, take=TAKE)
+def remove_take(operator: Any, context: Any) -> None:
     """Remove a take"""
-
-    bl_idname = "digiclay.take_remove"
-    bl_label = "Remove Take"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, no_take
-
-    def perform(self, context: Any) -> None:
-        takes.remove(bed_of(context), takes.find(bed_of(context), self.take).number)
+    takes.remove(bed_of(context), takes.find(bed_of(context), operator.take).number)
 
 
 class PlayStrokes(FileAction, bpy.types.Operator):
