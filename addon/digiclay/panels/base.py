@@ -19,7 +19,7 @@ LINE = 36
 
 
 class Panel:
-    """Mixin of a sub-panel in the 3D view's sidebar, shown while a part of a bed is active.
+    """Mixin of a sub-panel in the 3D view's sidebar, shown while a part of a bed is active, or while none is.
 
     A panel derives from this and from `bpy.types.Panel`, has a `bl_label`, a `bl_idname` that
     starts with ``DIGICLAY_PT_`` and a `bl_order`, and draws only: it never changes anything.
@@ -28,11 +28,12 @@ class Panel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = CATEGORY
+    with_bed = True
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Show the panel when there is a bed it can be about."""
-        return bed_of(context) is not None
+        """Show the panel when there is a bed it can be about, or one of none when there is none."""
+        return (bed_of(context) is not None) == cls.with_bed
 
 
 def declare(
@@ -48,12 +49,14 @@ def declare(
 
 
 def panel(
-    idname: str, label: str, order: int, *, closed: bool = True
+    idname: str, label: str, order: int, *, closed: bool = True, with_bed: bool = True
 ) -> Callable[[Callable[[Any, Any], None]], Any]:
     """Return a decorator that makes a panel of its `draw`."""
 
-    options = {"DEFAULT_CLOSED"} if closed else set()
-    return declare((Panel, bpy.types.Panel), "draw", idname, label, bl_order=order, bl_options=options)
+    return declare(
+        (Panel, bpy.types.Panel), "draw", idname, label, bl_order=order, with_bed=with_bed,
+        bl_options={"DEFAULT_CLOSED"} if closed else set(),
+    )  # fmt: skip
 
 
 def menu(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], Any]:

@@ -21,25 +21,14 @@ from .base import Panel, bed_of, draw_lines, is_edited, menu, panel
 BESIDE = {"ENUM", "STRING"}
 
 
-class Start(Panel, bpy.types.Panel):
+@panel("DIGICLAY_PT_start", "Digital Clay", 0, closed=False, with_bed=False)
+def start(sidebar: Any, context: Any) -> None:
     """Content of the tab without an active bed: how to add one."""
-
-    bl_idname = "DIGICLAY_PT_start"
-    bl_label = "Digital Clay"
-    bl_order = 0
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Show it only while no bed is active."""
-        return bed_of(context) is None
-
-    def draw(self, context: Any) -> None:
-        """Draw the hint, and the last message: a session may have ended with its file."""
-        column = self.layout.column()
-        column.label(text="Select a bed or its fingertip,")
-        column.label(text="or add a new device:")
-        column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
-        draw_lines(self.layout, running.last_message(), "INFO")
+    column = sidebar.layout.column()
+    column.label(text="Select a bed or its fingertip,")
+    column.label(text="or add a new device:")
+    column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
+    draw_lines(sidebar.layout, running.last_message(), "INFO")  # a session may have ended with its file
 
 
 @menu("DIGICLAY_MT_presets", "Presets")
@@ -155,7 +144,7 @@ PARTS = (
 )
 CLASSES = (
     presets,
-    Start,
+    start,
     device,
     *(section_panel(section, device.bl_idname, order) for order, section in enumerate(PARTS)),
     finger,
