@@ -10,6 +10,8 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 BLENDER = os.environ.get("DIGICLAY_BLENDER_WINDOW", "")
 #: The words of a command for a Blender that draws on the display of its environment.
 ON_DISPLAY = shlex.split(os.environ.get("DIGICLAY_BLENDER_DISPLAY", ""))
@@ -20,6 +22,18 @@ ADDON = HERE.parents[1] / "addon" / "digiclay"
 LIMIT = 1200
 #: What a script has seen, by name.
 Seen = dict[str, Any]
+#: Pins at rest, and how far a pin is down at least that a finger of 4 mm depth has passed, mm.
+REST, FORMED = 40.0, 1.0
+
+
+def bed(seen: Seen, name: str) -> np.ndarray:
+    """Return the heights of a step, mm, rows by columns."""
+    return np.array(seen[name]["bed"])
+
+
+def down(seen: Seen, name: str) -> np.ndarray:
+    """Return how far the pins are down in a step, mm."""
+    return REST - bed(seen, name)
 
 
 def played(

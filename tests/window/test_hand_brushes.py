@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.window.blender_window import Seen
+from tests.window.blender_window import REST, Seen, bed
 from tests.window.hand_brushes import HALF, LONG, SPIKE
 
 PLAYED = {"script": "hand_brushes.py", "size": (1100, 640), "by_hand": True}
-REST = 40.0
 #: The columns of the bed that lie on the strokes that raise, 3 mm a pin.
 COLUMNS = np.abs(np.arange(-36, 37, 3)) <= LONG
 #: Rows and column of the pins that stand out.
@@ -18,7 +17,7 @@ MIDDLE, ABOVE = (12, 12), (18, 12)
 
 def up(seen: Seen, name: str) -> np.ndarray:
     """Return how far the pins are up, mm, rows by columns."""
-    return np.array(seen[name]["bed"]) - REST
+    return bed(seen, name) - REST
 
 
 @pytest.mark.parametrize(("name", "row"), [("raised", 12), ("inverted", 5)])

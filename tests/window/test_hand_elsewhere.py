@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.window.blender_window import BLENDER, Seen, played
+from tests.window.blender_window import BLENDER, FORMED, Seen, down, played
 from tests.window.hand_strokes import HALF
 from tests.window.space_mouse import VARIABLE, driver
 
-PITCH, REST = 3.0, 40.0
-#: A pin that a finger of 4 mm depth has passed is down by more than this, mm.
-FORMED = 1.0
+PITCH = 3.0
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +24,10 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> Seen:
 @pytest.mark.parametrize("name", ["turned", "quarter", "second window"])
 def test_a_stroke_is_formed_wherever_the_hand_has_drawn(seen: Seen, name: str) -> None:
     # The path is that of the samples that the tool has queued while the button was held.
-    path, bed = np.array(seen[name]["path"]), np.array(seen[name]["bed"])
+    path = np.array(seen[name]["path"])
     np.testing.assert_allclose(path[[0, -1]], [[-HALF, 0.0], [HALF, 0.0]], rtol=0, atol=2.0)
     columns, rows = np.rint(path / PITCH + 12).astype(int).clip(0, 24).T
-    assert (REST - bed[rows, columns] > FORMED).mean() >= 0.95
+    assert (down(seen, name)[rows, columns] > FORMED).mean() >= 0.95
 
 
 def test_a_3d_mouse_turns_the_view_and_the_wheels_of_a_trackpad_zoom_in_mid_stroke(seen: Seen) -> None:

@@ -5,21 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.window.blender_window import Seen
+from tests.window.blender_window import FORMED, Seen, down
 from tests.window.hand_strokes import HALF, STROKES, TAPS
 
 PLAYED = {"script": "hand_strokes.py", "size": (800, 560), "by_hand": True}
-REST = 40.0
 #: The columns of the bed that lie on the strokes, 3 mm a pin, and their row.
 COLUMNS = np.abs(np.arange(-36, 37, 3)) <= HALF
 ROW = 12
-#: A pin that a fingertip of 4 mm depth has passed is down by more than this, mm.
-FORMED = 1.0
-
-
-def down(seen: Seen, name: str) -> np.ndarray:
-    """Return how far the pins are down, mm, rows by columns."""
-    return REST - np.array(seen[name]["bed"])
 
 
 @pytest.mark.parametrize("when", [*(f"{duration:g}" for duration, _ in STROKES), "under a message"])

@@ -5,18 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.window.blender_window import Seen
+from tests.window.blender_window import FORMED, Seen, down
 from tests.window.press_sizes import MIRRORED, RADIUS, WIDER
 
 PLAYED = {"script": "press_sizes.py", "size": (800, 560), "by_hand": True}
-REST = 40.0
-#: A pin that a finger of 4 mm depth has passed is down by more than this, mm.
-FORMED = 1.0
-
-
-def down(seen: Seen, name: str) -> np.ndarray:
-    """Return how far the pins are down, mm, rows by columns."""
-    return REST - np.array(seen[name]["bed"])
 
 
 @pytest.mark.parametrize(

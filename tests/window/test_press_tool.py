@@ -5,19 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.window.blender_window import Seen
+from tests.window.blender_window import REST, Seen, bed
 
 PLAYED = {"script": "press_tool.py", "size": (1100, 720)}
 #: Pins the valley is drawn over, 6 mm off the middle row of 25, and their columns.
 ROW, COLUMNS = 14, slice(8, 17)
-REST = 40.0
 #: Pins settle by tenths of a millimeter while the finger leaves and after; the valley is 3.5 mm deep.
 SETTLING = 0.5
-
-
-def bed(seen: Seen, name: str) -> np.ndarray:
-    """Return the heights of a step, mm, rows by columns."""
-    return np.array(seen[name]["bed"])
 
 
 def finger(seen: Seen, name: str) -> np.ndarray:

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.window.blender_window import Seen
+from tests.window.blender_window import REST, Seen, bed
 
 PLAYED = {"script": "keep_takes.py", "size": (1000, 640)}
-REST = 40.0
 #: Pins come to rest by hundredths of a millimeter for some time after the finger has left them; mm.
 SETTLING = 0.1
-
-
-def bed(seen: Seen, name: str) -> np.ndarray:
-    """Return the heights of a step, mm, rows by columns."""
-    return np.array(seen[name]["bed"])
 
 
 def test_a_finger_that_is_lifted_slowly_raises_a_ridge_and_draws_it_along(seen: Seen) -> None:
