@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -15,6 +16,8 @@ HALF = 27.0
 STROKES = ((0.3, 125), (3.0, 60))
 #: Places of three taps within a second, mm.
 TAPS = ((-24.0, 24.0), (0.0, 24.0), (24.0, 24.0))
+#: The strokes of the letter A of the gallery.
+LETTER = Path(__file__).parents[2] / "benchmarks" / "strokes" / "letter_a.toml"
 
 Pixel = tuple[int, int]
 Place = tuple[float, float]
@@ -167,6 +170,8 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from navigation(blender)
     yield from pie_menu(blender)
     yield from taken_back(blender)
+    yield from act(blender, "key Escape")
+    yield from letter(blender)
 
 
 def message(blender: Any) -> Iterator[float | None]:
@@ -241,3 +246,25 @@ def taken_back(blender: Any) -> Iterator[float | None]:
         hand("mouseup 1")
         yield from finish(blender, process)
         note(blender, name)
+
+
+def follow(blender: Any, recorded_stroke: Any) -> str:
+    """Return what moves the hand as the pointer moved, with the button held down."""
+    start, *moves = recorded_stroke.moves
+    words, before = [to(on_the_screen(blender, 1e3 * start[1], 1e3 * start[2])), "mousedown 1"], 0.0
+    for time, x, y in moves:
+        words.append(to(on_the_screen(blender, 1e3 * x, 1e3 * y), time - before))
+        before = time
+    return " ".join([*words, "mouseup 1"])
+
+
+def letter(blender: Any) -> Iterator[float | None]:
+    """Form the letter on an empty bed, stroke by stroke, with the brush of each."""
+    recorded = blender.part("recorded.pointer_strokes").read_strokes(LETTER)
+    yield from prepare(blender, "TOP", bed=recorded.bed)
+    settings = brush(blender)
+    for number, recorded_stroke in enumerate(recorded.strokes, 1):
+        settings.brush, settings.depth = recorded_stroke.kind.value, 1e3 * recorded_stroke.depth
+        yield from act(blender, follow(blender, recorded_stroke))
+        blender.shot(f"letter_{number}")
+    note(blender, "formed")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.settings.devices import BEDS
 
+from benchmarks.made import find_relief
 from tests.window.blender_window import FORMED, Seen, down
 from tests.window.hand_strokes import HALF, STROKES, TAPS
 
@@ -55,3 +58,14 @@ def test_a_stroke_pans_in_its_middle_and_ends_where_a_pie_menu_has_taken_the_rel
 def test_an_unfinished_stroke_is_taken_back_and_the_session_goes_on(seen: Seen, name: str) -> None:
     assert np.abs(down(seen, name)).max() < 1e-3
     assert seen[name]["sessions"] == 1
+
+
+def test_a_letter_drawn_by_a_hand_is_what_was_intended(seen: Seen) -> None:
+    plan = BEDS["design"]
+    grid = make_grid(Layout(rows=plan.rows, columns=plan.columns, pitch=plan.pitch))
+    intended = find_relief("letter_a", *grid.positions.T)
+    formed = -1e-3 * down(seen, "formed").ravel()
+    assert seen["formed"]["drawn"] == 3
+    assert np.corrcoef(formed, intended)[0, 1] >= 0.9
+    slope = np.cov(formed, intended)[0, 1] / intended.var(ddof=1)
+    assert 0.75 <= slope <= 1.25
