@@ -1,4 +1,4 @@
-"""Played by `driver`: opens the sidebar's tab with every panel unfolded, and looks at each of them."""
+"""Played by `driver`: opens the tab with every panel unfolded, looks at each, and exports a form."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 #: Pins as a user sees them.
 FINE_PINS = True
@@ -43,6 +44,7 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.SEEN["rebuilt"] = sorted(blender.call(bpy.ops.digiclay.rebuild))
     blender.SEEN["pins"] = len(blender.beds()[0].data.vertices)
     yield from own_methods(blender)
+    yield from export(blender)
 
 
 def own_methods(blender: Any) -> Iterator[float | None]:
@@ -78,3 +80,75 @@ def refused(blender: Any) -> str:
     except RuntimeError as error:
         return str(error)
     return ""
+
+
+def export(blender: Any) -> Iterator[float | None]:
+    """Form a ridge and a pit on another bed, and take them out of the bed in every way there is."""
+    yield from blender.empty_scene()
+    yield from blender.add_paper_bed()
+    bed = blender.beds()[0]
+    form(blender, bed)
+    with blender.unfolded("export", "DIGICLAY_PT_export") as tab:
+        yield from blender.open_sidebar(tab)
+        blender.call(bpy.ops.digiclay.find_features)
+        yield None
+        yield None
+        blender.shot("export_features")
+    blender.SEEN["listed"] = bed["digiclay_features"]
+    blender.call(bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="solid", skin="smooth")
+    made = blender.window().view_layer.objects.active
+    blender.SEEN["groups"] = [group.name for group in made.vertex_groups]
+    made.location.y -= 0.9
+    blender.select(bed)
+    blender.call(bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="features", skin="smooth")
+    yield None
+    blender.key("HOME", blender.middle())
+    yield None
+    yield None
+    blender.shot("export_meshes")
+    count = len(bpy.data.objects)
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield None
+    yield None
+    blender.SEEN["undone"] = count - len(bpy.data.objects)
+    blender.select(blender.beds()[0])
+    yield from browser(blender)
+
+
+def browser(blender: Any) -> Iterator[float | None]:
+    """Export by File > Export: look at the browser's options, change the format, and confirm."""
+    blender.call(bpy.ops.export_mesh.digital_clay, "INVOKE_DEFAULT", kind="solid", file_format="3mf")
+    yield 1.0
+    yield None
+    windows = bpy.context.window_manager.windows
+    area = next(a for w in windows for a in w.screen.areas if a.type == "FILE_BROWSER")
+    shown = next(w for w in windows if area in w.screen.areas[:])
+    area.spaces.active.params.directory = str(blender.OUT).encode()
+    area.spaces.active.params.filename = "für später.stl"
+    yield None
+    blender.shot("export_browser")
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    with bpy.context.temp_override(window=shown, area=area, region=region):
+        bpy.ops.file.execute()
+    yield 0.5
+    blender.SEEN["files"] = sorted(path.name for path in blender.OUT.glob("*.3mf"))
+
+
+def form(blender: Any, bed: Any) -> None:
+    """Show a ridge and a pit on the pins of a bed."""
+    instant = blender.part("device.instant").Instant
+    cells = blender.part("bridge").read_cells(bed.data)
+    x, y = cells["position"].T * 1e3
+    along = np.clip(np.abs(x) - 15.0, 0.0, None)
+    raised = 14.0 * np.exp(-(along**2 + (y - 12.0) ** 2) / 60.0) - 9.0 * np.exp(
+        -(x**2 + (y + 18) ** 2) / 80.0
+    )
+    blender.part("device.view").show(
+        bed,
+        instant(
+            position=cells["position"], height=0.04 + 1e-3 * raised,
+            mode=np.where(np.abs(raised) > 0.5, 1, 0), force=np.zeros(len(x)),
+            fingertip=np.array([0.0, -0.018, 0.06, 1.0, 0.0, 0.0, 0.0]),
+        ),
+    )  # fmt: skip
+    bpy.ops.ed.undo_push(message="Form")
