@@ -161,7 +161,6 @@ def views(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter(blender) is not None)
     yield from tapped(blender, blender.pixel(blender.world(15.0, -9.0), top_quarter(blender)), "quad view")
-    blender.event("MOUSEMOVE", "NOTHING", (2, 2))  # the cursor's words are not the overlay's
     with drawn(blender) as marks:
         yield from blender.until(lambda: len(marks) == 4)
     blender.SEEN["drawn in the quarters"] = sorted(marks.values())
@@ -191,13 +190,15 @@ def top_quarter(blender: Any) -> Any:
 
 
 @contextmanager
-def drawn(blender: Any) -> Iterator[dict[int, tuple[bool, bool]]]:
-    """Write down of every region the overlay draws into whether it writes words and whether it marks pins."""
+def drawn(blender: Any) -> Iterator[dict[int, bool]]:
+    """Write down of every region in which the overlay marks pins whether it writes words too."""
     module = blender.part("overlay.draw")
     draw, seen = module.draw, {}
 
     def noted(picture: Any, width: float, height: float) -> None:
-        seen[bpy.context.region.as_pointer()] = bool(picture.words), bool(picture.dots)
+        # What the cursor of the Press tool draws has words alone.
+        if picture.dots:
+            seen[bpy.context.region.as_pointer()] = bool(picture.words)
         draw(picture, width, height)
 
     module.draw = noted
