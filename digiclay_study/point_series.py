@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from digiclay import __version__
-from digiclay.commands.arguments import name_methods, settings_of, whole_number
+from digiclay.commands.arguments import add_options, name_methods, settings_of, whole_number
 from digiclay.commands.evaluation_pool import Evaluation, add_series
 from digiclay.commands.progress import format_duration
 from digiclay.core.base.arrays import Floats
@@ -154,7 +154,7 @@ class Subject:
 def add_subject(parser: argparse.ArgumentParser, metrics: str) -> None:
     """Add the options of `read_subject`, and the seed. `metrics`: default of --metric."""
     add_series(parser, "LOW:HIGH, LOW:HIGH:log or A,B,C", metrics)
-    parser.add_argument("--seed", metavar="N", type=whole_number(1, 2**31), default=1, help="default: 1")
+    add_options(parser, {"--seed N": (whole_number(1, 2**31), "default: 1", 1)})
 
 
 def read_subject(arguments: argparse.Namespace) -> Subject:

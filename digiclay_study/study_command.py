@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay import __version__
-from digiclay.commands.arguments import add_command
+from digiclay.commands.arguments import add_command, add_options
 from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.extras import format_command
 from digiclay.commands.progress import Counted
@@ -67,13 +67,12 @@ def add(commands: Any) -> None:
     """Add the command."""
     description = "Find which parameters matter: Sobol indices of metrics over ranges of parameters."
     purpose = "find which parameters matter for which metric"
-    parser = add_command(commands, "study", purpose, EXAMPLES, description)
+    parser = add_command(commands, "study", purpose, EXAMPLES, description, carry_out=carry_out)
     add_subject(parser, METRICS)
-    parser.add_argument(
-        "--samples", metavar="N", type=_read_samples, default=64, help="a power of two; default: 64"
-    )
-    parser.add_argument("--second", action="store_true", help="indices of pairs of parameters, too")
-    parser.set_defaults(carry_out=carry_out)
+    add_options(parser, {
+        "--samples N": (_read_samples, "a power of two; default: 64", 64),
+        "--second": "indices of pairs of parameters, too",
+    })  # fmt: skip
 
 
 def _read_samples(text: str) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from digiclay import __version__
-from digiclay.commands.arguments import METHOD, settings_of, whole_number
+from digiclay.commands.arguments import METHOD, add_options, settings_of, whole_number
 from digiclay.commands.evaluation_pool import add_pool, run_series
 from digiclay.commands.extras import format_command
 from digiclay.commands.stop import refuse_without
@@ -40,8 +40,6 @@ from .suite_page import (
 SCENE = "ridge_mound_valley"
 #: Columns of a point.
 KEYS = ("method", "trajectory", "seed")
-#: Largest number of seeds, and of random drags.
-MOST_REPEATS, MOST_DRAGS = 100, 200
 #: The pictures.
 RFD_PICTURE, MEASURES_PICTURE = "rfd.svg", "measures.svg"
 
@@ -65,21 +63,15 @@ class Plan(NamedTuple):
 
 def add_suite(parser: argparse.ArgumentParser) -> None:
     """Add the options of a suite."""
-    group = parser.add_argument_group("benchmark of methods (--suite)")
-    group.add_argument(
-        "--suite", action="store_true", help=f"many trajectories with repeated noise; default scene {SCENE}"
-    )
-    group.add_argument("--trajectories", metavar="T,...", help=f"some of {', '.join(GROUPS)}; default: all")
-    group.add_argument(
-        "--repeats", metavar="N", type=whole_number(1, MOST_REPEATS),
-        help="number of seeds of the noise; default: 5",
-    )  # fmt: skip
-    group.add_argument("--first-seed", metavar="N", type=whole_number(0, 2**31), help="default: 1")
-    group.add_argument("--noise", metavar="FORCE", help='noise of the force sensors; default: "2 mN"')
-    group.add_argument(
-        "--drags", metavar="N", type=whole_number(1, MOST_DRAGS), help="number of random drags; default: 20"
-    )
-    group.add_argument("--quick", action="store_true", help=f"{', '.join(QUICK)}, 2 seeds: for a first look")
+    add_options(parser.add_argument_group("benchmark of methods (--suite)"), {
+        "--suite": f"many trajectories with repeated noise; default scene {SCENE}",
+        "--trajectories T,...": f"some of {', '.join(GROUPS)}; default: all",
+        "--repeats N": (whole_number(1, 100), "number of seeds of the noise; default: 5"),
+        "--first-seed N": (whole_number(0, 2**31), "default: 1"),
+        "--noise FORCE": 'noise of the force sensors; default: "2 mN"',
+        "--drags N": (whole_number(1, 200), "number of random drags; default: 20"),
+        "--quick": f"{', '.join(QUICK)}, 2 seeds: for a first look",
+    })  # fmt: skip
     add_pool(parser)
 
 

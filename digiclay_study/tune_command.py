@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from digiclay.commands.arguments import add_command, whole_number
+from digiclay.commands.arguments import add_command, add_options, whole_number
 from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.stop import refuse_without
 from digiclay.core.base.arrays import Floats
@@ -53,19 +53,15 @@ KNEE = "knee"
 def add(commands: Any) -> None:
     """Add the command."""
     description = "Find the best trade-off of two metrics: their Pareto front over ranges of parameters."
-    parser = add_command(commands, "tune", "find the best trade-off of two metrics", EXAMPLES, description)
+    purpose = "find the best trade-off of two metrics"
+    parser = add_command(commands, "tune", purpose, EXAMPLES, description, carry_out=carry_out)
     add_subject(parser, METRICS)
-    options = (("population", 4, 64, "runs a generation; "), ("generations", 1, 10, ""))
-    for name, least, usual, words in options:
-        kind = whole_number(least, 4096)
-        parser.add_argument(
-            f"--{name}", metavar="N", type=kind, default=usual, help=f"{words}default: {usual}"
-        )
-    parser.add_argument(
-        "--choose", metavar="M", default=KNEE,
-        help="what is chosen on the front: knee, or the metric that is to be least; default: knee",
-    )  # fmt: skip
-    parser.set_defaults(carry_out=carry_out)
+    chosen = "what is chosen on the front: knee, or the metric that is to be least; default: knee"
+    add_options(parser, {
+        "--population N": (whole_number(4, 4096), "runs a generation; default: 64", 64),
+        "--generations N": (whole_number(1, 4096), "default: 10", 10),
+        "--choose M": (None, chosen, KNEE),
+    })  # fmt: skip
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

@@ -18,15 +18,10 @@ from ..plugins.method_loader import load_method
 
 #: The key of the control method in scene files.
 METHOD = "control.method"
-#: Options by ``"--name METAVAR"``: the help, or type or choices, help, and perhaps the default.
+#: Options by ``"--name METAVAR"``: the help; type or choices, help, and perhaps the default; or a dict of
+#: arguments of `argparse`.
 Options = Mapping[str, Any]
-#: Options that change a scene.
-SCENE_OPTIONS = {
-    "--method M": "control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
-    "--stepper S": "stepper: the same as --set simulation.stepper=S",
-    "--tolerance T": 'largest error of the heights, such as "1 um": chooses the adaptive stepper',
-}
-#: Their keys in scene files.
+#: Keys in scene files of options that change a scene.
 SET_BY = {"method": METHOD, "stepper": "simulation.stepper", "tolerance": "simulation.tolerance"}
 #: Arguments of a command on a finished run.
 RUN = {"run RUN": (Path, "run folder of 'digiclay run'"), "--quiet": "print errors only"}
@@ -46,26 +41,44 @@ def add_options(parser: Any, options: Options) -> None:
     """Add a table of options; one without metavar and type is a switch."""
     for words, row in options.items():
         name, _, metavar = words.partition(" ")
-        if isinstance(row, str) and not metavar:
-            parser.add_argument(name, action="store_true", help=row)
-            continue
-        kind, help, default = (None, row, None) if isinstance(row, str) else (*row, None)[:3]
-        read = {"type": kind} if kind is None or callable(kind) else {"choices": kind}
-        parser.add_argument(name, metavar=metavar or None, default=default, help=help, **read)
+        named = {"metavar": metavar} if metavar else {}
+        if isinstance(row, str):
+            row = (None, row) if metavar else {"action": "store_true", "help": row}
+        if isinstance(row, tuple):
+            kind, text, default = (*row, None)[:3]
+            limit = "type" if kind is None or callable(kind) else "choices"
+            row = {limit: kind, "help": text, "default": default}
+        parser.add_argument(name, **named, **row)
+
+
+def _setting(text: str) -> Setting:
+    """Read KEY=VALUE."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise argparse.ArgumentTypeError(f"must be KEY=VALUE (got {text!r})")
+    return Setting(key.strip(), value.strip())
+
+
+#: Options that change a scene.
+SCENE_OPTIONS: Options = {
+    "--method M": "control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
+    "--stepper S": "stepper: the same as --set simulation.stepper=S",
+    "--tolerance T": 'largest error of the heights, such as "1 um": chooses the adaptive stepper',
+    "--set KEY=VALUE": {
+        "dest": "settings", "type": _setting, "action": "append", "default": [],
+        "help": 'override a parameter, such as layout.pitch="4 mm" or conduit=absent; may be repeated',
+    },
+}  # fmt: skip
 
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
     """Add SCENE, or --scene where there is a default, and the options that change it."""
     scene = "a .toml file, a sample's name, or the folder of a run"
     if default:
-        parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{scene}; default {default}")
+        add_options(parser, {"--scene SCENE": (None, f"{scene}; default {default}", default)})
     else:
         parser.add_argument("scene", metavar="SCENE", nargs="?" if optional else None, help=scene)
     add_options(parser, SCENE_OPTIONS)
-    parser.add_argument(
-        "--set", dest="settings", metavar="KEY=VALUE", type=_setting, action="append", default=[],
-        help='override a parameter, such as layout.pitch="4 mm" or conduit=absent; may be repeated',
-    )  # fmt: skip
 
 
 def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
@@ -143,14 +156,6 @@ def told_as_options(*owners: str, **names: str) -> Iterator[None]:
             raise
         option = names.get(error.field, error.field).replace("_", "-")
         raise OutputError(f"--{option} {error.rule} (got {error.value}).") from None
-
-
-def _setting(text: str) -> Setting:
-    """Read KEY=VALUE."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise argparse.ArgumentTypeError(f"must be KEY=VALUE (got {text!r})")
-    return Setting(key.strip(), value.strip())
 
 
 def whole_number(least: int, most: int) -> Callable[[str], int]:

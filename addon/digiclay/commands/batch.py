@@ -19,7 +19,7 @@ from ..core.files.run_folder import make_safe_name, resolve_inside, write_whole
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
 from ..farms.series_plan import FORMATS, Submission, plan_series, split_frames
 from ..plugins.method_loader import find_word
-from .arguments import QUIET, add_command, add_options, load_by_option, say
+from .arguments import QUIET, Options, add_command, add_options, load_by_option, say
 from .batch_folder import Folder, open_batch
 from .evaluation_pool import read_count
 from .job_steps import PROGRESS, check_outputs, find_error, read_fraction, read_tail
@@ -46,10 +46,15 @@ FARM_OPTIONS = {
         "with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
     "--chunk N": (read_count, f"with --submit: frames of a film that a task draws; default {CHUNK}"),
 }  # fmt: skip
-OPTIONS = {
+OPTIONS: Options = {
     "file JOBS": "a .toml file, or a sample's name",
     "--out DIR": (Path, "folder; default: the file's name in the working folder"),
-}
+    "--method M": {
+        "action": "append", "default": [],
+        "help": "one more method for all scenes, also one of your own, mine.py:Mine; may be repeated",
+    },
+    "--jobs N": (read_count, "number of processes; default: one a core"),
+}  # fmt: skip
 #: Options of which one may be given.
 INSTEAD = {
     "--prepare": "write the files of the jobs, run none",
@@ -87,11 +92,6 @@ def add(commands: Any) -> None:
     """Add the command."""
     purpose = "run a job series in the background: scenes, exports, pictures and films"
     parser = add_command(commands, "batch", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
-    parser.add_argument(
-        "--method", metavar="M", action="append", default=[],
-        help="one more method for all scenes, also one of your own, mine.py:Mine; may be repeated",
-    )  # fmt: skip
-    add_options(parser, {"--jobs N": (read_count, "number of processes; default: one a core")})
     add_options(parser.add_mutually_exclusive_group(), INSTEAD)
     add_options(parser, {**FARM_OPTIONS, "--quiet": QUIET})
 

@@ -49,12 +49,12 @@ PLACES = {
 def add_series(parser: argparse.ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:
     """Add SCENE and the options of what varies, by its `syntax`, what is measured, where, and how."""
     add_scene(parser)
-    parser.add_argument(
-        "--vary", metavar=f"KEY={varied}", action="append", required=True, help=f"{syntax}; may be repeated"
-    )
-    shown = f"metrics of tables and plots; default: {metrics}"
-    add_options(parser, {"--metric M,...": (None, shown, metrics)})
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder")
+    several = {"action": "append", "required": True, "help": f"{syntax}; may be repeated"}
+    add_options(parser, {
+        f"--vary KEY={varied}": several,
+        "--metric M,...": (None, f"metrics of tables and plots; default: {metrics}", metrics),
+        "--out DIR": {"type": Path, "required": True, "help": "the folder"},
+    })  # fmt: skip
     add_pool(parser)
     add_options(parser, {"--quiet": QUIET})
 

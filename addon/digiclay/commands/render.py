@@ -17,7 +17,7 @@ from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
 from ..core.session.run_scene import History
-from .arguments import RUN, add_command, add_options, say, seconds, size, told_as_options
+from .arguments import RUN, Options, add_command, add_options, say, seconds, size, told_as_options
 from .progress import Counted
 from .stop import (
     STOPPED,
@@ -44,20 +44,27 @@ KINDS = {
     "--film": "session as film.mp4, with a plot of the force",
     "--turntable": "one rotation at an instant, as turntable.mp4",
 }
-OPTIONS = {
+OPTIONS: Options = {
     "--time T": (seconds, "instant, s; default: the last touch, or the end for a turntable"),
     "--out FILE": (Path, "output file; default: in the run folder"),
     "--size WxH": (size, "default 1600x1000; 960x600 for films"),
     "--engine": (ENGINES, "default cycles; workbench for films"),
     "--color": (COLORS, "quantity shown by the colors of the pins; default: mode"),
-}
-MOVING = {
+    # Scripts written for older versions have it so.
+    "--colour": {"dest": "color", "choices": COLORS, "help": argparse.SUPPRESS},
+    "--arrows": {
+        "action": argparse.BooleanOptionalAction, "help": "forces as arrows; default: in films only",
+    },
     "--rate N": (int, "frames a second of film; default 25"),
     "--frames N": (int, "frames of a rotation; default: 75"),
     "--speed X": (float, "simulated seconds a second of film; default 1"),
     "--start T": (seconds, "first instant of the film, s"),
     "--stop T": (seconds, "last instant of the film, s"),
-}
+    "--strip": {
+        "action": argparse.BooleanOptionalAction,
+        "help": "plot of the total force over time; default: in films",
+    },
+}  # fmt: skip
 #: What a picture is called unless told otherwise.
 PICTURE = "pins.png"
 #: How a picture looks unless told otherwise.
@@ -73,19 +80,8 @@ def add(commands: Any) -> None:
     """Add the command."""
     purpose = "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy"
     parser = add_command(commands, "render", purpose, EXAMPLES, carry_out=carry_out, options=RUN)
-    kind = parser.add_mutually_exclusive_group()
-    add_options(kind, KINDS)
+    add_options(parser.add_mutually_exclusive_group(), KINDS)
     add_options(parser, OPTIONS)
-    # Scripts written for older versions have it so.
-    parser.add_argument("--colour", dest="color", choices=COLORS, help=argparse.SUPPRESS)
-    parser.add_argument(
-        "--arrows", action=argparse.BooleanOptionalAction, help="forces as arrows; default: in films only"
-    )
-    add_options(parser, MOVING)
-    parser.add_argument(
-        "--strip", action=argparse.BooleanOptionalAction,
-        help="plot of the total force over time; default: in films",
-    )  # fmt: skip
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
