@@ -142,9 +142,9 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
     assert (code, err, list((here / "out").glob("points/*"))) == (130, "", [])
 
 
-def idle() -> Processes:
+def idle() -> Processes[Evaluator]:
     """Return the processes of a series that nobody stops."""
-    return Processes(lambda: False, lambda: None)
+    return Processes[Evaluator](lambda: False, lambda: None)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
@@ -182,6 +182,6 @@ def test_a_worker_is_out_of_reach_of_ctrl_c_and_ends_when_it_cannot_read_its_bun
         worker.input.write(b"cdigiclay.no_such_module\nPoint\n.")  # as another version may send it
         worker.input.flush()
         assert worker.process.wait(TIMEOUT) == 0
-    stopped = Processes(lambda: True, lambda: None)
+    stopped = Processes[Evaluator](lambda: True, lambda: None)
     assert stopped.stopped()
     assert evaluate_elsewhere(stopped, [], some(2), errors=False) == [None, None]

@@ -10,7 +10,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
@@ -111,66 +112,47 @@ def carry_out(arguments: argparse.Namespace) -> int:
         if arguments.prepare:
             say(arguments, f"{len(made.jobs)} jobs written to {out / 'jobs'}")
             return 0
-        return _submit(arguments, folder) if arguments.submit else _finish(arguments, folder)
+        failed = {job.name: job.error for job in made.jobs if job.error}
+        if arguments.submit:
+            say(arguments, *write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk))
+        elif not _finish(arguments, folder, failed):
+            return STOPPED
+    if not failed:
+        return 0
+    name, error = next(iter(failed.items()))
+    print(f"{len(failed)} of {len(made.jobs)} jobs failed; the first one: {name}: {error}", file=sys.stderr)
+    return FAILED
 
 
-def _submit(arguments: argparse.Namespace, folder: Folder) -> int:
-    """Write the files of a farm, print how they are submitted, and return the exit code."""
-    say(arguments, *write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk))
-    return _tell_failed(
-        {job.name: job.error for job in folder.batch.jobs if job.error}, len(folder.batch.jobs)
-    )
-
-
-def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
-    """Run the jobs, report them, and return the exit code."""
+def _finish(arguments: argparse.Namespace, folder: Folder, failed: dict[str, str]) -> bool:
+    """Run the jobs, add to `failed` why some failed, and report; return False after a stop."""
     made, started = folder.batch, time.monotonic()
-    failed = {job.name: job.error for job in made.jobs if job.error}
     todo = [job for job in made.jobs if not job.error and not folder.is_done(job)]
     before = len(made.jobs) - len(todo)
-
     for name, error in failed.items():
         say(arguments, f"failed: {name}: {error}")
     count = max(1, min(arguments.jobs or count_cores(), len(todo)))
+    ended, due = before, started
     with Stop() as stop, Counted(sys.stderr, made.name, "jobs", before) as bar:
-        running: dict[str, JobProcess] = {}
-        ended: list[Job] = []
-        due = time.monotonic()
-
-        def refresh() -> None:
-            nonlocal due
-            began = time.monotonic()
-            if began >= due:
-                summary = f"{before + len(ended)} of {len(made.jobs)} jobs ended so far"
-                folder.write_index(failed, f"{summary}, {len(failed)} failed." if failed else f"{summary}.")
-                due = time.monotonic() + max(PAUSE, REST * (time.monotonic() - began))
-
-        def begin(job: Job) -> JobProcess:
-            running[job.name] = process = _start_job(folder, job)
-            return process
-
-        def end(job: Job) -> None:
-            process = running.pop(job.name)
-            if not folder.is_done(job):
-                fail(job, process.read_error())
-            else:
-                ended.append(job)
-                refresh()
-
-        def fail(job: Job, error: str) -> None:
-            ended.append(job)
-            if not stop():
-                failed[job.name] = error
-                say(arguments, f"failed: {job.name}: {error}")
-                refresh()
 
         def draw() -> None:
             if not arguments.quiet:  # each reads its log
-                done = before + len(ended) + sum(process.read_fraction() for process in running.values())
+                done = ended + sum(map(JobProcess.read_fraction, processes.alive))
                 bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
 
-        with Processes(stop, draw) as processes:
-            processes.finish(count, todo, begin, end, fail)
+        with Processes[JobProcess](stop, draw) as processes:
+            for job, outcome in processes.finish(count, todo, partial(_start_job, folder)):
+                ended += 1
+                if not folder.is_done(job):
+                    if stop():
+                        continue
+                    error = outcome if isinstance(outcome, str) else outcome.read_error()
+                    failed[job.name] = error
+                    say(arguments, f"failed: {job.name}: {error}")
+                began = time.monotonic()
+                if began >= due:
+                    folder.write_index(failed, f"{folder.summarize(ended, failed, 'ended so far')}.")
+                    due = time.monotonic() + max(PAUSE, REST * (time.monotonic() - began))
         stopped = stop()
     now = sum(folder.is_done(job) for job in todo)
     done = before - sum(bool(job.error) for job in made.jobs) + now
@@ -186,17 +168,8 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
     say(arguments, f"{summary}.", f"written to {index}")
     if stopped and done + len(failed) < len(made.jobs):
         say(arguments, "Stopped: what is done is kept, and the same command goes on from there.")
-        return STOPPED
-    return _tell_failed(failed, len(made.jobs))
-
-
-def _tell_failed(failed: Mapping[str, str], count: int) -> int:
-    """Print the first of the jobs that failed, and return the exit code."""
-    if not failed:
-        return 0
-    name, error = next(iter(failed.items()))
-    print(f"{len(failed)} of {count} jobs failed; the first one: {name}: {error}", file=sys.stderr)
-    return FAILED
+        return False
+    return True
 
 
 def _start_job(folder: Folder, job: Job) -> JobProcess:

@@ -115,9 +115,9 @@ class Folder:
             write_whole(path, page(f"Batch {self.batch.name}", summary, cards, refresh).encode())
         return path
 
-    def summarize(self, done: int, failed: Mapping[str, str]) -> str:
-        """Write how many jobs are done, and how many have failed."""
-        text = f"{done} of {len(self.batch.jobs)} jobs done"
+    def summarize(self, count: int, failed: Mapping[str, str], state: str = "done") -> str:
+        """Write how many jobs are in a state, and how many have failed."""
+        text = f"{count} of {len(self.batch.jobs)} jobs {state}"
         return f"{text}, {len(failed)} failed" if failed else text
 
     def write_page(self) -> str:

@@ -95,13 +95,13 @@ def open_evaluators(
     count: int, stop: Callable[[], bool], draw: Callable[[], None], *, errors: bool
 ) -> Iterator[Pool]:
     """Yield an evaluation of bundles in processes, each waited for by a thread."""
-    with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
+    with ThreadPoolExecutor(count) as threads, Processes[Evaluator](stop, draw) as processes:
         task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
         yield partial(submit, threads, task, stopped=processes.stopped)
 
 
 def evaluate_elsewhere(
-    processes: Processes, idle: list[Evaluator], bundle: Sequence[Point], *, errors: bool
+    processes: Processes[Evaluator], idle: list[Evaluator], bundle: Sequence[Point], *, errors: bool
 ) -> list[Record | None]:
     """Evaluate a bundle in an idle process; in another one when that dies, DigiclayError when both do."""
     how = ""
@@ -109,8 +109,7 @@ def evaluate_elsewhere(
         try:
             evaluator = idle.pop()
         except IndexError:
-            started = processes.start(Evaluator)
-            if started is None:
+            if (started := processes.start(Evaluator)) is None:
                 break
             evaluator = started
         try:

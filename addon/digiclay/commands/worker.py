@@ -13,11 +13,11 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from ..core.base.errors import DigiclayError
 from ..core.studies.series import describe_error
@@ -105,7 +105,7 @@ class Process:
         return f"signal {-code}" if code < 0 else f"code {code}"
 
 
-class Processes:
+class Processes(Generic[Started]):
     """All processes of a series: stopped together when `stop` says so, and ended at the end of the block.
 
     `draw` is called again and again meanwhile.
@@ -113,10 +113,10 @@ class Processes:
 
     def __init__(self, stop: Callable[[], bool], draw: Callable[[], None]) -> None:
         self._stop, self._draw = stop, draw
-        self._alive: list[Process] = []
+        self.alive: list[Started] = []
         self._deadline = math.inf
 
-    def __enter__(self) -> Processes:
+    def __enter__(self) -> Self:
         return self
 
     def stopping(self) -> bool:
@@ -133,7 +133,7 @@ class Processes:
     def _stop_all(self) -> None:
         """Request all to stop, or kill them."""
         self._deadline = min(self._deadline, time.monotonic() + GRACE)
-        for process in list(self._alive):
+        for process in list(self.alive):
             process.kill() if time.monotonic() >= self._deadline else process.stop()
 
     def start(self, make: Callable[[], Started]) -> Started | None:
@@ -141,27 +141,22 @@ class Processes:
         if self.stopping():
             return None
         process = make()
-        self._alive.append(process)
+        self.alive.append(process)
         if self.stopping():  # since then: evaluators are started by several threads
             process.stop()
         return process
 
-    def wait(self, process: Process) -> str:
+    def wait(self, process: Started) -> str:
         """Wait for a process to end, remove it, and return its outcome."""
         how = process.wait()
-        self._alive.remove(process)
+        self.alive.remove(process)
         return how
 
     def finish(
-        self,
-        count: int,
-        pieces: Iterable[Piece],
-        begin: Callable[[Piece], Process],
-        end: Callable[[Piece], None],
-        fail: Callable[[Piece, str], None],
-    ) -> None:
-        """Begin a process for each piece, `count` at a time; tell of each that ended or could not begin."""
-        waiting, running = deque(pieces), list[tuple[Piece, Process]]()
+        self, count: int, pieces: Iterable[Piece], begin: Callable[[Piece], Started]
+    ) -> Iterator[tuple[Piece, Started | str]]:
+        """Begin a process for each piece, `count` at a time; yield each that ended, or why it did not begin."""
+        waiting, running = deque(pieces), list[tuple[Piece, Started]]()
         while waiting or running:
             if self.stopped():
                 waiting.clear()
@@ -170,17 +165,17 @@ class Processes:
                 try:
                     process = self.start(partial(begin, piece))
                 except Exception as error:  # the other pieces are worth having
-                    fail(piece, describe_error(error))
+                    yield piece, describe_error(error)
                 else:
                     running += [(piece, process)] if process else []
             ended = [found for found in running if found[1].process.poll() is not None]
             for piece, process in ended:
                 running.remove((piece, process))
                 self.wait(process)
-                end(piece)
+                yield piece, process
             time.sleep(0.0 if ended else PAUSE)
 
     def __exit__(self, *raised: object) -> None:
         self._stop_all()
-        for process in list(self._alive):
+        for process in list(self.alive):
             process.kill()
