@@ -155,7 +155,7 @@ class Processes(Generic[Started]):
     def finish(
         self, count: int, pieces: Iterable[Piece], begin: Callable[[Piece], Started]
     ) -> Iterator[tuple[Piece, Started | str]]:
-        """Begin a process for each piece, `count` at a time; yield each that ended, or why it did not begin."""
+        """Begin a process a piece, `count` at a time; yield those that ended, and why some did not begin."""
         waiting, running = deque(pieces), list[tuple[Piece, Started]]()
         while waiting or running:
             if self.stopped():
