@@ -1,29 +1,16 @@
 """Preferences of all beds: redraw rate, colors, control periods to catch up in a tick."""
 
 # No postponed annotations here: Blender reads the preferences' properties from them.
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 from .compat import RELATIVE_PATH, bpy
 from .device import palettes
 from .settings import own_folder
-from .settings.declared import title
+from .settings.declared import choice, flag, integer, text, title
 
 #: Corners of a 3D view for the overlay.
 CORNERS = ("top_left", "top_right", "bottom_left", "bottom_right")
-
-
-@dataclass(frozen=True)
-class Choices:
-    """Default preferences; `Preferences` says what they mean."""
-
-    redraw_rate: int = 30
-    most_periods: int = 20
-    palette: str = palettes.DEFAULT
-    take_press_tool: bool = True
-    overlay_corner: str = "top_left"
-    run_own_methods: bool = False
-    methods_folder: str = ""
 
 
 def take_palette(preferences: Any, context: Any) -> None:
@@ -61,63 +48,35 @@ class Preferences(bpy.types.AddonPreferences):
 
     bl_idname = __package__
 
-    redraw_rate: bpy.props.IntProperty(
-        name="Redraw Rate (Hz)",
-        description="Largest redraw rate of a live session, in Hz; drawing takes most of the time",
-        default=Choices.redraw_rate,
-        min=1,
-        max=240,
-        soft_min=10,
-        soft_max=60,
-    )
-    most_periods: bpy.props.IntProperty(
-        name="Periods per Redraw",
-        description=(
-            "Control periods simulated between two redraws at most. A machine that does not manage them "
-            "runs the session slower than real time instead of stalling"
-        ),
-        default=Choices.most_periods,
-        min=1,
-        max=1000,
-        soft_max=100,
-    )
-    palette: bpy.props.EnumProperty(
-        name="Mode Colors",
-        description="Colors of the modes; a choice recolors the beds of the open file",
-        items=[(name, *words) for name, words in palettes.WORDS.items()],
-        default=Choices.palette,
+    redraw_rate: integer(
+        "Redraw Rate (Hz)", "Largest redraw rate of a live session, in Hz; drawing takes most of the time",
+        default=30, min=1, max=240, soft_min=10, soft_max=60,
+    )  # fmt: skip
+    most_periods: integer(
+        "Periods per Redraw", "Control periods simulated between two redraws at most. A machine that does "
+        "not manage them runs the session slower than real time instead of stalling",
+        default=20, min=1, max=1000, soft_max=100,
+    )  # fmt: skip
+    palette: choice(
+        "Mode Colors", "Colors of the modes; a choice recolors the beds of the open file",
+        items=[(name, *words) for name, words in palettes.WORDS.items()], default=palettes.DEFAULT,
         update=take_palette,
+    )  # fmt: skip
+    take_press_tool: flag(
+        "Take the Press Tool", "The start of a session takes the Press tool in hand", default=True
     )
-
-    take_press_tool: bpy.props.BoolProperty(
-        name="Take the Press Tool",
-        description="The start of a session takes the Press tool in hand",
-        default=Choices.take_press_tool,
-    )
-    overlay_corner: bpy.props.EnumProperty(
-        name="Overlay Corner",
-        description="Corner of the 3D view with the overlay of a session",
-        items=[(name, name.replace("_", " ").title(), "") for name in CORNERS],
-        default=Choices.overlay_corner,
-        update=redraw_views,
-    )
-    run_own_methods: bpy.props.BoolProperty(
-        name="Run Own Methods",
-        description=(
-            "Run all Python files of a folder, now and whenever Blender starts: "
-            "the control methods in them are offered in the panel Control"
-        ),
-        default=Choices.run_own_methods,
-        update=take_methods,
-    )
-    methods_folder: bpy.props.StringProperty(
-        name="Own Methods",
-        description="Folder with Python files of control methods; a change turns Run Own Methods off",
-        default=Choices.methods_folder,
-        subtype="DIR_PATH",
-        options=RELATIVE_PATH,
-        update=take_folder,
-    )
+    overlay_corner: choice(
+        "Overlay Corner", "Corner of the 3D view with the overlay of a session",
+        items=[(name, title(name), "") for name in CORNERS], default="top_left", update=redraw_views,
+    )  # fmt: skip
+    run_own_methods: flag(
+        "Run Own Methods", "Run all Python files of a folder, now and whenever Blender starts: "
+        "the control methods in them are offered in the panel Control", default=False, update=take_methods,
+    )  # fmt: skip
+    methods_folder: text(
+        "Own Methods", "Folder with Python files of control methods; a change turns Run Own Methods off",
+        default="", subtype="DIR_PATH", options=RELATIVE_PATH, update=take_folder,
+    )  # fmt: skip
 
     def draw(self, context: Any) -> None:
         """Draw the preferences."""
@@ -147,10 +106,16 @@ class Preferences(bpy.types.AddonPreferences):
             column.label(text=line, icon="CANCEL", translate=False)
 
 
+def defaults() -> SimpleNamespace:
+    """Return the preferences of one who has changed none."""
+    declared = Preferences.__annotations__
+    return SimpleNamespace(**{name: each.keywords["default"] for name, each in declared.items()})
+
+
 def get(context: Any) -> Any:
     """Return the user's preferences; where the package is used without being enabled, the defaults."""
     entry = context.preferences.addons.get(__package__)
-    return Choices() if entry is None or entry.preferences is None else entry.preferences
+    return defaults() if entry is None or entry.preferences is None else entry.preferences
 
 
 def register() -> None:

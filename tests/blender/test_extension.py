@@ -184,9 +184,9 @@ def test_a_palette_in_a_file_without_a_bed_does_nothing() -> None:
 
 @pytest.mark.usefixtures("extension")
 def test_where_the_package_is_not_enabled_the_preferences_are_the_defaults_of_the_properties() -> None:
-    assert preferences.get(bpy.context) == preferences.Choices()
+    assert preferences.get(bpy.context) == preferences.defaults()
     shown = preferences.Preferences.bl_rna.properties
-    for name, value in vars(preferences.Choices()).items():
+    for name, value in vars(preferences.defaults()).items():
         assert shown[name].default == value
 
 

@@ -54,7 +54,7 @@ def choose(bed: Any, name: str) -> Any:
 
 
 def test_no_code_is_run_until_the_preferences_allow_it(chosen: Any, tmp_path: Path) -> None:
-    assert not preferences.Choices().run_own_methods
+    assert not preferences.defaults().run_own_methods
     assert (chosen.run_own_methods, list_added()) == (False, {})
     assert not bpy.ops.digiclay.methods_reload.poll()
     chosen.run_own_methods = True
