@@ -19,11 +19,12 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.render_settings import Still
-from digiclay.device import form, view
+from digiclay.device import view
 from digiclay.device.instant import CLEARANCE, Instant
 from digiclay.pictures import stage
 from digiclay.pictures.still import add_picture_scene, apply_style, render_picture
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
+from digiclay.roles import fingertip_of
 from digiclay.sessions.sculpting import begin_session
 from digiclay.settings.devices import BEDS, make_scene
 from numpy.typing import NDArray
@@ -240,9 +241,9 @@ def draw_relief(scene: Scene, relief: Floats, lowest: float, out: Path) -> None:
         drawn = add_picture_scene("Digital Clay Made Thing", looks)
         bed = view.build(instant, drawn.collection, scene.actuator.rest_height + lowest - CLEAR)
         apply_style(bed, looks)
-        form.set_form(bed, "skin")
+        view.set_form(bed, "skin")
         bed.rotation_euler.z = TURN
-        tip = view.fingertip_of(bed)
+        tip = fingertip_of(bed)
         for part in (tip, *tip.children_recursive) if tip is not None else ():
             part.hide_render = True
         points = stage.outline(bed)

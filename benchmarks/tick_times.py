@@ -23,11 +23,13 @@ from digiclay.core.model.layout import Layout
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, live_session, snapshot
-from digiclay.device import form, view
+from digiclay.device import view
 from digiclay.device.instant import Instant, find_ellipsoid
+from digiclay.device.node_tree import MEMBRANE
 from digiclay.live import bed_state, tick
 from digiclay.operators.add_bed import add, select_only
 from digiclay.panels import display
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running, sculpting
 from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
 from digiclay.settings import properties
@@ -325,7 +327,7 @@ def measure_bed(rows: int, columns: int, ticks: int) -> dict[str, float]:
         down = min(count / (0.8 * WARM_UP), 1.0) * (PRESSED + 2e-3)
         height = scene.actuator.rest_height + 2e-3 - down
         pose = np.array([CIRCLE * np.cos(turn), CIRCLE * np.sin(turn), height, 1.0, 0.0, 0.0, 0.0])
-        bridge.place_fingertip(view.fingertip_of(bed), pose, find_ellipsoid(scene))
+        bridge.place_fingertip(fingertip_of(bed), pose, find_ellipsoid(scene))
         bpy.context.view_layer.update()
 
     with open_session(make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master")) as bed:
@@ -372,8 +374,8 @@ def measure_skin(rows: int, columns: int, updates: int) -> dict[str, float]:
         bed = view.build(instant, bpy.context.scene.collection)
         while len(spent[0]) < updates:
             for times, (shown, kind) in zip(spent, SHOWN, strict=True):
-                form.set_form(bed, shown)
-                form.set_kind(bed, kind)
+                view.set_form(bed, shown)
+                view.write_setting(bed, MEMBRANE, kind == "membrane")
                 for count in range(IN_A_ROW):
                     bridge.write_cells(bed.data, instant.position, instant.height + noise[count % 2])
                     started = time.process_time()

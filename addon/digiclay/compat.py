@@ -11,7 +11,7 @@ from typing import Any
 from .core.base.errors import DigiclayError
 
 try:
-    import bpy
+    import bpy as bpy  # for the others
 except ModuleNotFoundError as error:
     if error.name != "bpy":
         raise
@@ -20,11 +20,6 @@ except ModuleNotFoundError as error:
     ) from None
 except ImportError as error:
     raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
-
-__all__ = [
-    "PACKAGE", "RELATIVE_PATH", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting",
-    "own_curves", "quiet", "scratch", "set_node_setting", "shader_nodes", "strips", "to_video",
-]  # fmt: skip
 
 #: The name Blender knows the extension by.
 PACKAGE = __package__
@@ -44,6 +39,12 @@ def shader_nodes(owner: Any) -> Any:
     if owner.node_tree is None:
         owner.use_nodes = True
     return owner.node_tree
+
+
+def has_node_setting(modifier: Any, name: str) -> bool:
+    """Return whether a geometry nodes modifier's tree has an input, be it under its name in older files."""
+    inputs = modifier.node_group.interface.items_tree
+    return name in inputs or FORMER_INPUTS.get(name, name) in inputs
 
 
 def node_setting(modifier: Any, name: str) -> Any:

@@ -10,8 +10,8 @@ from typing import Any
 import bpy
 import numpy as np
 from digiclay.compat import strips
-from digiclay.device import unit, view
-from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE
+from digiclay.device import unit
+from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE, fingertip_of, is_bed
 
 #: Files with a bed each, by how it was added.
 FILES = tempfile.TemporaryDirectory(prefix="digiclay-beds-")
@@ -86,7 +86,7 @@ def added(x: float = 0.0) -> Any:
     bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
     bed = bpy.context.object
     bed.location.x = x
-    view.fingertip_of(bed).location.x += 0.05
+    fingertip_of(bed).location.x += 0.05
     done("Add")
     return bed
 
@@ -101,12 +101,12 @@ def select(*things: Any) -> None:
 
 def beds() -> list[Any]:
     """Return the beds of the scene."""
-    return [thing for thing in bpy.context.scene.objects if view.is_bed(thing)]
+    return [thing for thing in bpy.context.scene.objects if is_bed(thing)]
 
 
 def whole(*found: Any) -> bool:
     """Tell whether the scene has these beds, each with a fingertip of its own, and nothing else."""
-    tips = [view.fingertip_of(bed) for bed in found]
+    tips = [fingertip_of(bed) for bed in found]
     balls = [tip[BALL] for tip in tips if tip is not None]
     parts = {*found, *tips, *balls}
     of_balls = [ball.parent for ball in balls] == tips
@@ -147,7 +147,7 @@ def older(bed: Any) -> None:
     tree.links.new(next(end for end in ends if end.node.name != "Housing"), last.inputs[0])
     tree.nodes.remove(tree.nodes["Housing"])
     tree.nodes["Sources"].name = "Collection Info"
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     ball, tip.instance_collection = tip[BALL], None
     for thing, names in ((bed, [FINGER]), (tip, [BALL, OWNED]), (ball, [OWNED])):
         for name in names:

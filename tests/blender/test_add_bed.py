@@ -12,7 +12,7 @@ from digiclay import bridge
 from digiclay.core.control.methods import METHODS
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.toml_table import PRESETS, resolve
-from digiclay.device import view
+from digiclay.roles import fingertip_of
 from digiclay.settings import own_presets, properties
 from digiclay.settings.devices import BEDS, make_scene
 
@@ -84,13 +84,13 @@ def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale:
     # float32 at 3 units.
     assert min((bed.matrix_world @ point.co).z for point in shown.vertices) == pytest.approx(3.0, abs=1e-5)
     assert bridge.uniform(bed) == pytest.approx(scale, rel=1e-6)
-    assert bridge.pose(view.fingertip_of(bed))[2] > 0.040
+    assert bridge.pose(fingertip_of(bed))[2] > 0.040
 
 
 def test_the_scale_shown_leaves_the_device_as_it_is() -> None:
     small, large = add(rows=6, columns=6), add(rows=6, columns=6, scale=3.0)
     bpy.context.view_layer.update()
-    poses = [bridge.pose(view.fingertip_of(bed)) for bed in (small, large)]
+    poses = [bridge.pose(fingertip_of(bed)) for bed in (small, large)]
     # Blender's matrices are float32, here of lengths up to 0.5 units: 0.05 m of the device.
     np.testing.assert_allclose(poses[0], poses[1], rtol=0, atol=1e-7)
     assert properties.scene_of(large).layout == properties.scene_of(small).layout

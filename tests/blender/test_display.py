@@ -14,6 +14,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import Mode
 from digiclay.core.session.accuracy import Errors
 from digiclay.device import palettes, view
+from digiclay.device.node_tree import ARROW_LENGTH, ARROWS, TOP_FORCE
 from digiclay.live import bed_state
 from digiclay.operators.pin_view import pick_pins
 from digiclay.overlay import views
@@ -21,6 +22,7 @@ from digiclay.overlay.picture import choose_colors
 from digiclay.overlay.sections import lay_out
 from digiclay.panels import display
 from digiclay.panels.session import error_line
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 
@@ -41,7 +43,7 @@ def bed() -> Any:
 def session(bed: Any) -> Iterator[running.Running]:
     """A running session whose finger has pressed the middle of the bed for a third of a second."""
     scene = properties.scene_of(bed)
-    above = bridge.pose(view.fingertip_of(bed))
+    above = bridge.pose(fingertip_of(bed))
     begun, _ = sculpting.begin_session(bed.session_uid, bed.name, scene, above)
     pressed = above.copy()
     pressed[2] = 0.037
@@ -66,9 +68,9 @@ def forces(bed: Any) -> np.ndarray:
 def test_the_properties_are_the_settings_of_the_geometry_nodes(bed: Any) -> None:
     shown = bed.digiclay_display
     shown.color, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
-    assert (view.color_source(bed), view.shows_arrows(bed)) == ("force", True)
-    assert view.top_color(bed) == 0.5
-    assert view.arrow_length(bed) == pytest.approx(0.25, rel=1e-12)
+    assert (view.shows_force(bed), view.read_setting(bed, ARROWS, False)) == (True, True)
+    assert view.read_setting(bed, TOP_FORCE, 0.0) == 0.5
+    assert view.read_setting(bed, ARROW_LENGTH, 0.0) == 250.0
     view.color_by(bed, "mode")
     assert shown.color == "mode"
 

@@ -9,9 +9,9 @@ from typing import Any
 import bpy
 import pytest
 from digiclay import operators
-from digiclay.device import view
 from digiclay.live import handlers, tick
 from digiclay.press import tool
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.sessions.stroke_queue import queue_stroke
 
@@ -33,7 +33,7 @@ NO_MESH = "POINTCLOUD" if bpy.app.version >= (4, 5) else "CURVE"
 #: What can be active, and what can become of a bed that was active.
 ODD: dict[str, Callable[[Any], object]] = {
     "a bed": lambda bed: None,
-    "its fingertip": lambda bed: select(view.fingertip_of(bed)),
+    "its fingertip": lambda bed: select(fingertip_of(bed)),
     "nothing": lambda bed: setattr(bpy.context.view_layer.objects, "active", None),
     "another mesh": lambda bed: select(bpy.data.objects["Cube"]),
     "a light": lambda bed: select(bpy.data.objects["Light"]),
@@ -59,8 +59,8 @@ ODD: dict[str, Callable[[Any], object]] = {
     "joined with a cube": lambda bed: (select(bpy.data.objects["Cube"], bed), BPY.object.join()),
     "joined into a cube": lambda bed: (select(bed, bpy.data.objects["Cube"]), BPY.object.join()),
     "geometry nodes removed": lambda bed: bed.modifiers.clear(),
-    "fingertip deleted": lambda bed: bpy.data.objects.remove(view.fingertip_of(bed)),
-    "fingertip without parent": lambda bed: setattr(view.fingertip_of(bed), "parent", None),
+    "fingertip deleted": lambda bed: bpy.data.objects.remove(fingertip_of(bed)),
+    "fingertip without parent": lambda bed: setattr(fingertip_of(bed), "parent", None),
     "hidden": lambda bed: bed.hide_set(True),
     "stretched": lambda bed: setattr(bed, "scale", (1.0, 2.0, 1.0)),
     "mirrored": lambda bed: setattr(bed, "scale", (-1.0, 1.0, 1.0)),

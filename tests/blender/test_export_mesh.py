@@ -14,6 +14,7 @@ from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.device.instant import Instant
 from digiclay.exchange import formed_bed
+from digiclay.roles import fingertip_of
 from digiclay.settings import properties
 
 from tests.blender.at_hand import new_bed
@@ -154,7 +155,7 @@ def test_an_export_that_cannot_be_written_is_refused_in_one_line(bed, tmp_path, 
 
 def test_lengths_are_millimeters_of_the_device_whatever_the_size_of_the_bed(bed, tmp_path):
     bed.scale = (3.0, 3.0, 3.0)
-    bpy.context.view_layer.objects.active = view.fingertip_of(bed)  # as good as the bed
+    bpy.context.view_layer.objects.active = fingertip_of(bed)  # as good as the bed
     bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), kind="surface")
     bpy.ops.wm.stl_import(filepath=str(tmp_path / "bed.stl"))
     assert np.ptp(corners(bpy.context.object)[:, 0]) == pytest.approx(13 * 3.0, rel=1e-6)

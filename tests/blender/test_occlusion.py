@@ -12,7 +12,7 @@ from digiclay import bridge
 from digiclay.bridge import SCALE
 from digiclay.device import view
 from digiclay.press import aim
-from digiclay.roles import ROLE
+from digiclay.roles import ROLE, fingertip_of
 from digiclay.sessions import running
 from mathutils import Vector
 
@@ -79,7 +79,7 @@ def test_an_object_in_front_hides_the_pins_behind_it_and_no_others(context: Any)
 
 
 def test_the_bed_does_not_hide_itself_with_its_fingertip(context: Any) -> None:
-    tip = view.fingertip_of(beds()[0])
+    tip = fingertip_of(beds()[0])
     tip.location = Vector(COVERED[0] * SCALE) + Vector((0.0, 0.0, 0.02))
     assert points_at(context, COVERED)
     for part in tip.children:

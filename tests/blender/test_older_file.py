@@ -13,9 +13,11 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session import snapshot
 from digiclay.device import view
+from digiclay.device.node_tree import TOP_FORCE
 from digiclay.exchange import formed_bed
 from digiclay.live import bed_state, tick
 from digiclay.recorded import takes
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import properties
 
@@ -69,7 +71,7 @@ def test_an_older_bed_is_colored_by_force_under_the_former_names() -> None:
     found = bed("Session")
     shown_as = found.digiclay_display
     shown_as.color, shown_as.top_force = "force", 0.5
-    assert (shown_as.color, view.top_color(found)) == ("force", 0.5)
+    assert (shown_as.color, view.read_setting(found, TOP_FORCE, 0.0)) == ("force", 0.5)
     names = set(found.modifiers["Pins"].node_group.interface.items_tree.keys())
     assert {"Colour by Force", "Top Colour at (N)"} <= names
 
@@ -88,7 +90,7 @@ def test_the_take_replays_to_the_stored_heights() -> None:
 
 def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip() -> None:
     found = bed("Session")
-    pose = bridge.pose(view.fingertip_of(found))
+    pose = bridge.pose(fingertip_of(found))
     np.testing.assert_allclose(pose, bed_state.read_pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
     assert bed_state.read_snapshot(found) is None
@@ -102,7 +104,7 @@ def test_settings_and_features_of_the_user_s_own_are_those_of_the_scene_file() -
     display = found.digiclay_display
     assert (display.color, display.arrows) == ("force", True)
     assert tuple(display.picked) == (40, 41, -1, -1, -1, -1)
-    assert view.color_source(found) == "force"
+    assert view.shows_force(found)
     # Features are measured from the surface that was kept.
     assert formed_bed.has_reference(found)
     listed = found["digiclay_features"]

@@ -11,9 +11,9 @@ import pytest
 from digiclay import bridge
 from digiclay.core.scene.scene_source import SAMPLES, find, list_samples, load
 from digiclay.core.shapes.source_file import list_shapes
-from digiclay.device import view
 from digiclay.operators.open_scene import SceneFiles
 from digiclay.recorded import takes
+from digiclay.roles import fingertip_of, is_bed
 from digiclay.settings import properties
 
 from tests.assemble import replayed
@@ -30,7 +30,7 @@ def test_a_sample_session_opens_as_the_bed_it_describes(name: str) -> None:
         assert made.section(section) == wanted.section(section)
     start = wanted.section("trajectory").waypoints[0].position
     # 32 bits of a few tenths of a Blender unit.
-    assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - start).max() < 1e-7
+    assert np.abs(bridge.pose(fingertip_of(bed))[:3] - start).max() < 1e-7
     # What a scene needs from elsewhere is in the .blend.
     assert (made.shape is None) == (wanted.shape is None)
     assert made.shape is None or made.shape.heights
@@ -59,7 +59,7 @@ def test_a_scene_file_opens(tmp_path: Path, how: str) -> None:
     path = tmp_path / "mein Beet äöü.toml"
     path.write_text((SAMPLES / "tap.toml").read_text(encoding="utf-8"), encoding="utf-8")
     assert bpy.ops.digiclay.open_scene(how, filepath=str(path)) == {"FINISHED"}
-    assert view.is_bed(bpy.context.object)
+    assert is_bed(bpy.context.object)
     assert len(bpy.context.object.data.vertices) == 121
 
 

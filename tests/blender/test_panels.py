@@ -9,9 +9,9 @@ import pytest
 from digiclay import panels
 from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.schema import SECTIONS
-from digiclay.device import view
-from digiclay.panels.base import CATEGORY, bed_of
+from digiclay.panels.base import CATEGORY
 from digiclay.panels.parameters import in_use
+from digiclay.roles import bed_of, fingertip_of
 
 from tests.blender.at_hand import new_bed
 
@@ -36,7 +36,7 @@ def test_the_panels_are_about_the_bed_that_the_active_object_belongs_to(bed: Any
     bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
     assert bed_of(bpy.context) == bpy.context.object
     cube = bpy.data.objects["Cube"]
-    cube.parent = view.fingertip_of(bed)
+    cube.parent = fingertip_of(bed)
     for part in (bed, *bed.children_recursive):
         bpy.context.view_layer.objects.active = part
         assert bed_of(bpy.context) == bed

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.device import view
 from digiclay.live import bed_state
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 
 from tests.blender.at_hand import new_bed
@@ -38,8 +38,8 @@ def test_strokes_are_formed_and_kept_by_the_bed(bed: Any, tmp_path: Path) -> Non
     assert running.find(bed) is None
     assert bed_state.read_snapshot(bed) is not None
     # Its fingertip is above the bed again, of its own size.
-    assert bridge.finger_of(view.fingertip_of(bed)).width == pytest.approx(8e-3)
-    assert bridge.pose(view.fingertip_of(bed))[2] > 40e-3
+    assert bridge.finger_of(fingertip_of(bed)).width == pytest.approx(8e-3)
+    assert bridge.pose(fingertip_of(bed))[2] > 40e-3
 
 
 @pytest.mark.parametrize(("text", "said"), [("[[stroke", "line 1"), (f"{PRESS}wide = 3", "known key")])

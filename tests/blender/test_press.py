@@ -13,9 +13,9 @@ from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import make_grid
-from digiclay.device import view
 from digiclay.press import aim, brush, tool
 from digiclay.press.drape import drape
+from digiclay.roles import fingertip_of
 from digiclay.settings import properties
 from digiclay.strokes.stroke import Brush
 
@@ -136,7 +136,7 @@ def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
 def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_pressed_in(bed: Any) -> None:
     cells, height = aim.read_surface(bed)
     rim = tool.touch_outline(bed, cells, height, np.array([0.002, 0.001, 0.04]), 4e-3)
-    finger = bridge.finger_of(view.fingertip_of(bed))
+    finger = bridge.finger_of(fingertip_of(bed))
     # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
     across = np.ptp(rim[:, :2], axis=0) / 2
     np.testing.assert_allclose(across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6)

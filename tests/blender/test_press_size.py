@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.scene.assembly import assemble
-from digiclay.device import view
 from digiclay.operators.press_adjust import AdjustStrength
 from digiclay.operators.press_presets import BrushMenu
 from digiclay.press import brush
 from digiclay.press.brush import FINGERS, find_kind
+from digiclay.roles import fingertip_of
 from digiclay.settings import finger_size, properties
 
 from tests.blender.at_hand import in_the_view, new_bed
@@ -55,27 +55,27 @@ def lengths(bed: Any) -> tuple[float, ...]:
 def test_the_ellipsoid_follows_the_size_and_the_blister_unless_it_is_set_by_itself(
     bed: Any, follows: bool, size: float, wanted: tuple[float, ...]
 ) -> None:
-    before = bridge.pose(view.fingertip_of(bed))
+    before = bridge.pose(fingertip_of(bed))
     bed.digiclay.blister_follows = follows
     bed.digiclay.size = size
     assert lengths(bed) == wanted
     bpy.context.view_layer.update()
-    finger, half = bridge.finger_of(view.fingertip_of(bed)), size * 0.5e-3
+    finger, half = bridge.finger_of(fingertip_of(bed)), size * 0.5e-3
     assert (finger.length, finger.width, finger.height) == pytest.approx((1.25 * half, half, half), rel=1e-6)
     # The lowest point stays: a larger finger does not press.
-    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), before, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(bridge.pose(fingertip_of(bed)), before, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize(("name", "usual"), [("length", 20.0), ("width", 16.0), ("height", 16.0)])
 def test_the_panel_shows_whole_widths_and_stores_semi_axes(bed: Any, name: str, usual: float) -> None:
-    group, lowest = bed.digiclay.fingertip, bridge.pose(view.fingertip_of(bed))
+    group, lowest = bed.digiclay.fingertip, bridge.pose(fingertip_of(bed))
     assert getattr(group, f"whole_{name}") == usual
     setattr(group, f"whole_{name}", 12.6)
     bpy.context.view_layer.update()
     (finger,) = properties.scene_of(bed).fingers
     assert getattr(finger.fingertip, name) == 6.3e-3
     assert bed.digiclay.size == pytest.approx(12.6 if name == "width" else 16.0)
-    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), lowest, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(bridge.pose(fingertip_of(bed)), lowest, rtol=0, atol=1e-7)
     assert group.bl_rna.properties[f"whole_{name}"].description.endswith(f"by default {usual:g} mm")
 
 
@@ -113,7 +113,7 @@ def test_the_bracket_keys_scale_it_and_undo_brings_it_back(bed: Any) -> None:
 
 def test_without_a_bed_or_its_fingertip_the_size_cannot_be_changed(bed: Any) -> None:
     assert bpy.ops.digiclay.press_scale.poll()
-    bpy.data.objects.remove(view.fingertip_of(bed))
+    bpy.data.objects.remove(fingertip_of(bed))
     assert not bpy.ops.digiclay.press_scale.poll()
     bpy.data.objects.remove(bed)
     assert not bpy.ops.digiclay.press_scale.poll()

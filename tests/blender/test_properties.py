@@ -19,6 +19,7 @@ from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_paramet
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
 from digiclay.live import bed_state
+from digiclay.roles import fingertip_of
 from digiclay.settings import properties
 from digiclay.settings.declared import read
 from digiclay.settings.shown_units import unit_of
@@ -194,7 +195,7 @@ def bed() -> Any:
     """A small bed away from the origin, its fingertip moved and its pins formed."""
     bed = new_bed(rows=6, columns=8)
     bed.location = (1.0, -2.0, 0.5)
-    view.fingertip_of(bed).location.x += 0.05
+    fingertip_of(bed).location.x += 0.05
     bed.data.vertices[7].co.z += 0.02
     bpy.context.view_layer.update()
     return bed
@@ -202,10 +203,10 @@ def bed() -> Any:
 
 def identity(bed: Any) -> tuple[Any, ...]:
     """Return what a rebuilt bed keeps."""
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     counts = (len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.node_groups))
     places = (tuple(bed.location), tuple(tip.location))
-    return bed.session_uid, tip.session_uid, *places, *counts, view.color_source(bed)
+    return bed.session_uid, tip.session_uid, *places, *counts, view.shows_force(bed)
 
 
 def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_says(bed: Any) -> None:
@@ -224,9 +225,9 @@ def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_sa
     shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
     housing, pins = (max(vertex.co.x for vertex in one.data.vertices) for one in (shown, bed))
     assert housing > pins
-    bpy.data.objects.remove(view.fingertip_of(bed))
+    bpy.data.objects.remove(fingertip_of(bed))
     bpy.ops.digiclay.rebuild()
-    assert view.fingertip_of(bed) is not None
+    assert fingertip_of(bed) is not None
 
 
 def test_settings_that_do_not_go_together_leave_the_bed_as_it_is(bed: Any) -> None:

@@ -14,9 +14,9 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
 from digiclay.core.shapes.fitting import unpack as heights_of
-from digiclay.device import view
 from digiclay.exchange import image_reader
 from digiclay.live import bed_state
+from digiclay.roles import fingertip_of, is_bed
 from digiclay.settings import properties
 
 from tests.blender.at_hand import beds, new_bed
@@ -70,7 +70,7 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
     assert wanted.max() == pytest.approx(52e-3, abs=4e-9)
     assert np.abs(heights(made) - wanted).max() <= SHOWN
     bpy.context.view_layer.update()
-    assert bridge.pose(view.fingertip_of(made))[2] > wanted.max()  # the finger is lifted out of it
+    assert bridge.pose(fingertip_of(made))[2] > wanted.max()  # the finger is lifted out of it
     # A session goes on from there: its state is in the bed, and the method has taken over.
     system = assemble(scene)
     state = snapshot.load(system, bed_state.read_snapshot(made))
@@ -150,7 +150,7 @@ def test_a_mesh_made_of_the_clay_is_the_same_clay_when_it_goes_in_again() -> Non
     shown = heights(made)
     assert bpy.ops.mesh.digital_clay_make(kind="solid", beside=False) == {"FINISHED"}
     mesh = bpy.context.object
-    assert not view.is_bed(mesh)
+    assert not is_bed(mesh)
     bpy.ops.object.select_all(action="DESELECT")
     bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
     other = bpy.context.object

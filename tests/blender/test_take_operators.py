@@ -14,6 +14,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.device import view
 from digiclay.live import bed_state, tick
 from digiclay.recorded import bake, takes
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from numpy.typing import NDArray
 
@@ -39,7 +40,7 @@ def begin(bed: Any) -> None:
 
 def press(bed: Any, ticks: int = 12, *, deep: float = 8e-3) -> None:
     """Let a session live while the finger goes down from 2 mm above the pins."""
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     top = bridge.read_cells(bed.data)["height"].max() * bridge.SCALE
     reach = bridge.pose(tip)[2] * bridge.SCALE - tip.location.z
     for count in range(ticks + 1):
@@ -95,7 +96,7 @@ def test_a_baked_take_shows_its_end_at_its_last_frame_and_starts_no_session(bed:
 
 
 def test_an_animated_fingertip_bakes_in_the_background_without_a_session(bed: Any) -> None:
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     for frame, down in ((1, 0.0), (21, 14e-3)):
         tip.location.z -= down * bridge.SCALE
         tip.keyframe_insert("location", frame=frame)

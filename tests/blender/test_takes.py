@@ -23,6 +23,7 @@ from digiclay.core.session.take import Take
 from digiclay.device import view
 from digiclay.device.instant import Instant
 from digiclay.recorded import bake, takes
+from digiclay.roles import ROLE, fingertip_of
 from numpy.typing import NDArray
 
 from tests.blender.at_hand import open_bed
@@ -126,7 +127,7 @@ def test_every_frame_shows_heights_modes_forces_and_fingertip_of_its_moment(bed:
     assert np.array_equal(mode, moments.mode[20])
     assert force.max() > 0.0
     bpy.context.scene.frame_set(10 + 12)
-    assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - take.poses[60, 0, :3]).max() < 1e-7
+    assert np.abs(bridge.pose(fingertip_of(bed))[:3] - take.poses[60, 0, :3]).max() < 1e-7
 
 
 def test_a_bake_replaces_the_former_and_freed_leaves_nothing(bed: Any) -> None:
@@ -135,7 +136,7 @@ def test_a_bake_replaces_the_former_and_freed_leaves_nothing(bed: Any) -> None:
         moments = baked(bed, taken(count)[0])
         assert len(moments.height) == 1 + count // 5
         assert len(bed.modifiers) == 2
-        assert len([one for one in bpy.data.objects if one.get(view.ROLE) == bake.BAKE]) == 1
+        assert len([one for one in bpy.data.objects if one.get(ROLE) == bake.BAKE]) == 1
     assert bake.is_baked(bed)
     assert bake.free(bed)
     assert (len(bpy.data.meshes), len(bpy.data.node_groups)) == (meshes, trees)
@@ -191,7 +192,7 @@ def test_a_bake_plays_without_the_extension(bed: Any, tmp_path: Path) -> None:
 
 
 def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     bridge.place_fingertip(tip, np.array([0.0, 0.0, 45e-3, *LEVEL]), Fingertip())
     tip.keyframe_insert("location", frame=1)
     tip.location.z -= 8e-3 * bridge.SCALE

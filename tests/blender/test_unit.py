@@ -15,7 +15,7 @@ from digiclay.device import view
 from digiclay.exchange import formed_bed
 from digiclay.live import tick
 from digiclay.recorded import bake
-from digiclay.roles import BALL, ROLE
+from digiclay.roles import BALL, ROLE, fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import properties
 
@@ -29,9 +29,7 @@ def still(bed: Any) -> bake.BakedFrames:
     """Return a bake of two frames in which nothing moves."""
     cells = bridge.read_cells(bed.data)
     twice = {name: np.array([cells[name]] * 2) for name in ("height", "mode", "force")}
-    return bake.BakedFrames(
-        cells["position"], **twice, pose=np.array([bridge.pose(view.fingertip_of(bed))] * 2)
-    )
+    return bake.BakedFrames(cells["position"], **twice, pose=np.array([bridge.pose(fingertip_of(bed))] * 2))
 
 
 @pytest.mark.parametrize("how", ["append", "append baked", "link"])
@@ -39,7 +37,7 @@ def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_pat
     bed = added()
     if how == "append baked":
         bake.apply(bed, still(bed), 1, Fingertip(), keyframe_finger=False)
-    at = bridge.pose(view.fingertip_of(bed))
+    at = bridge.pose(fingertip_of(bed))
     name = bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -63,7 +61,7 @@ def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_pat
     assert whole(bed)
     assert housings() == 1
     bpy.context.view_layer.update()
-    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), at, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(bridge.pose(fingertip_of(bed)), at, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("by_hand", [True, False])
@@ -73,15 +71,15 @@ def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand: bool) -> 
     done("Duplicate")
     copy = bpy.context.object
     if by_hand:
-        select(view.fingertip_of(copy))
+        select(fingertip_of(copy))
         bpy.ops.object.delete()
     else:
-        bpy.data.objects.remove(view.fingertip_of(copy))
+        bpy.data.objects.remove(fingertip_of(copy))
     done("Delete")
     copy.location.x = 1.0
     done("Move")
     undone()
-    without = [bed for bed in beds() if view.fingertip_of(bed) is None]
+    without = [bed for bed in beds() if fingertip_of(bed) is None]
     assert [bed.location.x for bed in without] == [0.0]
 
 
@@ -105,7 +103,7 @@ def test_a_bed_is_deleted_with_its_fingertip_and_undo_brings_both_back(everythin
 
 def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone() -> None:
     bed, other = added(), added(1.0)
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     tip[BALL].hide_select, tip[BALL].lock_location = True, (False, False, False)  # as in older files
     done("Older")
     assert (tip[BALL].hide_select, all(tip[BALL].lock_location)) == (False, True)
@@ -113,14 +111,14 @@ def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone() -> None:
     done("Select")
     assert bpy.context.view_layer.objects.active == tip
     assert set(bpy.context.selected_objects) == {tip, tip[BALL]}
-    assert not view.fingertip_of(other).select_get()
+    assert not fingertip_of(other).select_get()
     before = bridge.pose(tip)
     bpy.ops.transform.translate(value=(0.1, 0.0, 0.0))
     done("Move")
     # A millimeter of the device is a centimeter in Blender; its matrices are of 32 bits.
     np.testing.assert_allclose(bridge.pose(tip)[:3] - before[:3], (0.01, 0.0, 0.0), rtol=0, atol=1e-7)
     undone()
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     np.testing.assert_allclose(bridge.pose(tip), before, rtol=0, atol=1e-7)
     assert tip.select_get()
 
@@ -129,7 +127,7 @@ def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone() -> None:
 @pytest.mark.parametrize("along", [False, True], ids=["the bed", "its fingertip too"])
 def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked: bool, along: bool) -> None:
     bed = added()
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     tip.keyframe_insert("location", frame=1)
     select(*[tip] * along, bed)
     done("Select")
@@ -139,7 +137,7 @@ def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked: bool, along: bool) -
     assert len(beds()) == 2
     assert whole(*beds())
     assert housings() == 2
-    tips = [view.fingertip_of(one) for one in beds()]
+    tips = [fingertip_of(one) for one in beds()]
     poses = [bridge.pose(one) for one in tips]
     np.testing.assert_allclose(*poses, rtol=0, atol=1e-7)
     if not (linked and along):  # else Blender has copied it, and was asked to share
@@ -166,7 +164,7 @@ def test_several_beds_are_copied_at_once_and_the_first_ones_deleted_before_anybo
 
 def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_session() -> None:
     bed = added()
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     at = bridge.pose(tip)
     select(tip)
     bpy.ops.object.delete()
@@ -175,7 +173,7 @@ def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_se
     notes = tick.start(bpy.context, bed)
     assert [note.message for note in notes] == [f"{bed.name} got its fingertip back"]
     assert whole(bed)
-    np.testing.assert_array_equal(bridge.pose(view.fingertip_of(bed)), at)
+    np.testing.assert_array_equal(bridge.pose(fingertip_of(bed)), at)
 
 
 def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state() -> None:
@@ -202,7 +200,7 @@ def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is() -> None:
     bed.location.z = 0.0  # what hangs on something that is deleted goes to the origin: that is Blender's way
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     bpy.context.collection.objects.link(camera)
-    camera.parent, camera.location = view.fingertip_of(bed), (0.0, 0.0, 0.3)
+    camera.parent, camera.location = fingertip_of(bed), (0.0, 0.0, 0.3)
     done("Hang")
     where = np.array(camera.matrix_world)
     bpy.data.objects.remove(bed)
@@ -219,7 +217,7 @@ def hidden(name: str, *things: Any) -> list[bool]:
 @pytest.mark.parametrize("name", ["eye", "hide_viewport", "hide_render"])
 def test_a_bed_is_hidden_and_shown_with_its_fingertip(name: str) -> None:
     bed = added()
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     parts = bed, tip, tip[BALL]
 
     def hide(thing: Any, on: bool) -> None:
@@ -241,7 +239,7 @@ def test_a_bed_is_hidden_and_shown_with_its_fingertip(name: str) -> None:
     assert hidden(name, *parts) == [False] * 3
     hide(bed, True)
     undone()
-    tip = view.fingertip_of(beds()[0])
+    tip = fingertip_of(beds()[0])
     assert hidden(name, beds()[0], tip, tip[BALL]) == [False] * 3
 
 
@@ -283,7 +281,7 @@ def test_a_bed_of_an_older_file_stays_as_it_is_and_is_one_all_the_same(tmp_path:
     copy = bpy.context.object
     assert len(bpy.context.scene.objects) == 7
     assert housings() == 2
-    assert view.color_source(copy) == "mode"
+    assert not view.shows_force(copy)
     select(bed)
     bpy.ops.object.delete()
     done("Delete")

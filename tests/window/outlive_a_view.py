@@ -71,8 +71,8 @@ def escape(blender: Any) -> Iterator[float | None]:
 
 def counted(blender: Any, name: str) -> None:
     """Count the beds, those with a fingertip, the objects of the scene, those hidden, and the sessions."""
-    view, scene = blender.part("device.view"), blender.window().scene
-    tips = [view.fingertip_of(bed) for bed in blender.beds()]
+    scene = blender.window().scene
+    tips = [blender.part("roles").fingertip_of(bed) for bed in blender.beds()]
     whole = sum(tip is not None for tip in tips)
     hidden = sum(thing.hide_get() for thing in scene.objects)
     blender.SEEN[name] = [len(tips), whole, len(scene.objects), hidden, len(blender.sessions())]

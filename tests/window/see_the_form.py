@@ -35,7 +35,7 @@ def rectangle_of_the_bed(blender: Any) -> list[float]:
 
 def note(blender: Any, name: str) -> None:
     """Write down what is shown, and take a picture."""
-    form, bed = blender.part("device.form"), blender.beds()[0]
+    form, bed = blender.part("device.view"), blender.beds()[0]
     blender.shot(name)
     blender.SEEN[name] = {
         "form": bed.digiclay_display.form,

@@ -13,7 +13,9 @@ import numpy as np
 
 from ..compat import bpy
 from ..core.base.arrays import Floats
-from . import form, view
+from ..roles import is_bed
+from . import view
+from .node_tree import FAR
 
 #: Pitch below which the skin is drawn, and above which pins are drawn again, pixels at a UI scale of 1.
 SMALL, LARGE = 3.0, 4.0
@@ -35,8 +37,8 @@ def measure_pitch(to_clip: Floats, to_view: Floats, pitch: float, height: float)
 def follow() -> None:
     """Have every bed of the scenes in view drawn as its size in the views asks for."""
     for bed, pitch in _sizes():
-        if choose_far(pitch, form.is_far(bed)) != form.is_far(bed):
-            form.set_far(bed, not form.is_far(bed))
+        if choose_far(pitch, view.is_far(bed)) != view.is_far(bed):
+            view.write_setting(bed, FAR, not view.is_far(bed))
 
 
 def _sizes() -> Iterator[tuple[Any, float]]:
@@ -44,7 +46,7 @@ def _sizes() -> Iterator[tuple[Any, float]]:
     sizes: dict[Any, float] = {}
     scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     for window in bpy.context.window_manager.windows:
-        beds = [thing for thing in window.scene.objects if view.is_bed(thing) and _is_automatic(thing)]
+        beds = [thing for thing in window.scene.objects if is_bed(thing) and _is_automatic(thing)]
         for region, looking in _regions(window) if beds else ():
             lens = np.array(looking.window_matrix)
             for bed in beds:
@@ -65,7 +67,7 @@ def _regions(window: Any) -> Iterator[tuple[Any, Any]]:
 
 def _is_automatic(bed: Any) -> bool:
     """Return whether a bed's size in the views decides what is drawn of it."""
-    return bed.library is None and form.can_show_skin(bed) and form.read_form(bed) == "automatic"
+    return bed.library is None and view.can_show_skin(bed) and view.read_form(bed) == "automatic"
 
 
 def _pitch(bed: Any) -> float:
@@ -79,7 +81,7 @@ def _pitch(bed: Any) -> float:
 
 def _look() -> None:
     """Have the beds follow once the drawing under way is done: while Blender draws, data must not change."""
-    changes = any(choose_far(pitch, form.is_far(bed)) != form.is_far(bed) for bed, pitch in _sizes())
+    changes = any(choose_far(pitch, view.is_far(bed)) != view.is_far(bed) for bed, pitch in _sizes())
     if changes and not bpy.app.timers.is_registered(follow):
         bpy.app.timers.register(follow, first_interval=0.0)
 

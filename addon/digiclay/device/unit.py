@@ -27,6 +27,7 @@ from ..roles import (
     PIN,
     ROLE,
     ellipsoid,
+    fingertip_of,
     is_linked,
 )
 from ..settings import properties
@@ -54,7 +55,7 @@ class Faults(NamedTuple):
 def mark_parts() -> frozenset[int]:
     """Mark what belongs to the beds there are; return the uids of all objects that are known from now on."""
     for bed in _beds():
-        tip = view.fingertip_of(bed)
+        tip = fingertip_of(bed)
         if tip is None:
             continue
         if bed.get(FINGER) != tip:  # an older file
@@ -74,9 +75,7 @@ def mark_parts() -> frozenset[int]:
 
 def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
     """Return what is to be put right."""
-    bare = [
-        bed for bed in _beds() if view.fingertip_of(bed) is None and _lacks_part(bed, FINGER, known, mended)
-    ]
+    bare = [bed for bed in _beds() if fingertip_of(bed) is None and _lacks_part(bed, FINGER, known, mended)]
     tips = (thing for thing in bpy.data.objects if thing.get(ROLE) == FINGERTIP and not thing.library)
     bare += [tip for tip in tips if is_linked(tip) and _lacks_part(tip, BALL, known, mended)]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
@@ -101,7 +100,7 @@ def repair(found: Faults) -> None:
 
 def give_fingertip(bed: Any, scene: Scene) -> str:
     """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one."""
-    if view.fingertip_of(bed) is not None:
+    if fingertip_of(bed) is not None:
         return ""
     tip = bed.get(FINGER)
     if tip is not None and tip.parent == bed:  # deleted: nothing but the bed holds it any more
@@ -118,7 +117,7 @@ def give_fingertip(bed: Any, scene: Scene) -> str:
 def follow_visibility() -> None:
     """Have the parts of a bed hidden while it is, and an ellipsoid while its fingertip is."""
     for bed in _beds():
-        tip, case = view.fingertip_of(bed), view.housing_of(bed)
+        tip, case = fingertip_of(bed), view.housing_of(bed)
         if case is not None and case.parent == bed:
             _hide_along(bed, case)
         if tip is None:
@@ -131,7 +130,7 @@ def follow_visibility() -> None:
 
 def follow_selection() -> None:
     """Have a fingertip selected where its ellipsoid is, and active: a click on the ball takes hold of it."""
-    for tip in filter(None, map(view.fingertip_of, _beds())):
+    for tip in filter(None, map(fingertip_of, _beds())):
         ball = ellipsoid(tip)
         if ball is None:
             continue

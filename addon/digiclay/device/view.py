@@ -17,38 +17,20 @@ from numpy.typing import NDArray
 
 from .. import bridge
 from ..bridge import SCALE
-from ..compat import node_setting, set_node_setting
+from ..compat import has_node_setting, node_setting, set_node_setting
 from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
-from ..roles import (
-    BED,
-    ELLIPSOID,
-    FINGERTIP,
-    HOUSING,
-    ROLE,
-    bed_of,
-    ellipsoid,
-    fingertip_of,
-    is_bed,
-    is_edited,
-)
+from ..roles import BED, HOUSING, ROLE, ellipsoid, fingertip_of
 from . import parts
-from .form import find_modifier, require_modifier
 from .instant import Instant
-from .node_tree import ARROW_LENGTH, ARROWS, CASE, COLOR_BY_FORCE, SOURCES, TOP_FORCE, bed_nodes
-from .parts import material
+from .node_tree import ARROWS, CASE, COLOR_BY_FORCE, FAR, FORM, SOURCES, bed_nodes
 
-__all__ = [
-    "BED", "COLORINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "add_modifier", "arrow_length",
-    "bed_of", "build", "color_by", "color_source", "fingertip_of", "hold_parts", "housing_of", "is_bed",
-    "is_drawn", "is_edited", "material", "picked_pins", "scale_arrows", "scale_colors", "show",
-    "show_arrows", "show_state", "shows_arrows", "shows_force", "sources_of", "top_color", "underside",
-    "wants_force",
-]  # fmt: skip
-
-#: What the color of a pin can tell.
-COLORINGS = ("mode", "force")
+#: What the color of a pin can tell; and forms of a bed in view: its pins, a live skin over them, or both. In
+#: the order of the numbers in the settings of the geometry nodes.
+COLORINGS, FORMS = ("mode", "force"), ("automatic", "pins", "skin", "both")
+#: Where a bed keeps the form that it had before its skin was toggled, until a form is chosen.
+BEFORE = "digiclay_form_before"
 #: Name of the bed's modifier.
 MODIFIER = "Pins"
 
@@ -115,65 +97,100 @@ def show_state(bed: Any, system: System, state: State) -> None:
     bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)
 
 
+def find_modifier(bed: Any) -> Any | None:
+    """Return the modifier that draws the pins, or None when the user has removed or changed it."""
+    for modifier in bed.modifiers:
+        tree = modifier.node_group if modifier.type == "NODES" else None
+        if tree is not None and ARROWS in tree.interface.items_tree:
+            return modifier
+    return None
+
+
+def require_modifier(bed: Any) -> Any:
+    """Return the modifier that draws the pins, or refuse a bed without. Raises DigiclayError."""
+    found = find_modifier(bed)
+    if found is None:
+        rule = "must have the geometry nodes modifier that draws its pins (got none)"
+        raise DigiclayError(f"{bed.name} {rule}. Undo its removal.")
+    return found
+
+
+def is_drawn(bed: Any) -> bool:
+    """Return whether the bed still has the modifier that draws its pins."""
+    return find_modifier(bed) is not None
+
+
+def has_setting(bed: Any, name: str) -> bool:
+    """Return whether a bed's geometry nodes have a setting: those of older files have none of the skin's."""
+    modifier = find_modifier(bed)
+    return modifier is not None and has_node_setting(modifier, name)
+
+
+def read_setting(bed: Any, name: str, default: Any) -> Any:
+    """Return a setting of a bed's geometry nodes, see `node_tree.SETTINGS`; the default without it."""
+    return node_setting(find_modifier(bed), name) if has_setting(bed, name) else default
+
+
+def write_setting(bed: Any, name: str, value: Any) -> None:
+    """Change a setting of a bed's geometry nodes, of its own type. Raises DigiclayError without it."""
+    modifier = require_modifier(bed)
+    if not has_setting(bed, name):
+        raise DigiclayError(
+            f"{bed.name} is of an older file and has no skin. Rebuild it in the panel Device."
+        )
+    set_node_setting(modifier, name, value)
+
+
 def color_by(bed: Any, what: str) -> None:
-    """Color the pins by what they do ("mode") or by the force on them ("force")."""
-    if what not in COLORINGS:
-        raise DigiclayError(f"view.color_by must be one of {', '.join(COLORINGS)} (got {what!r}).")
-    set_node_setting(require_modifier(bed), COLOR_BY_FORCE, what == "force")
-
-
-def color_source(bed: Any) -> str:
-    """Return the quantity shown by the color of the pins: "mode" or "force"."""
-    return "force" if node_setting(require_modifier(bed), COLOR_BY_FORCE) else "mode"
-
-
-def top_color(bed: Any) -> float:
-    """Return the force from which on a pin has the last color, N."""
-    return float(node_setting(require_modifier(bed), TOP_FORCE))
+    """Color the pins by one of `COLORINGS`: what they do, or the force on them."""
+    write_setting(bed, COLOR_BY_FORCE, bool(COLORINGS.index(what)))
 
 
 def shows_force(bed: Any) -> bool:
     """Return whether the colors of the pins show the force on them."""
-    return is_drawn(bed) and color_source(bed) == "force"
-
-
-def scale_colors(bed: Any, top: float) -> None:
-    """Set the force from which on a pin has the last color, N."""
-    set_node_setting(require_modifier(bed), TOP_FORCE, _positive("top color", top, "N"))
+    return bool(read_setting(bed, COLOR_BY_FORCE, False))
 
 
 def show_arrows(bed: Any, on: bool) -> None:
     """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so."""
-    set_node_setting(require_modifier(bed), ARROWS, bool(on))
+    write_setting(bed, ARROWS, bool(on))
     tip = fingertip_of(bed)
     ball = ellipsoid(tip) if tip is not None else None
     if ball is not None:
         ball.material_slots[0].material = parts.finger_material(clear=bool(on))
 
 
-def shows_arrows(bed: Any) -> bool:
-    """Return whether the bed's forces are drawn as arrows."""
-    return bool(node_setting(require_modifier(bed), ARROWS))
-
-
-def arrow_length(bed: Any) -> float:
-    """Return the length of the arrow of 1 N, m of the device."""
-    return float(node_setting(require_modifier(bed), ARROW_LENGTH)) * 1e-3
-
-
-def scale_arrows(bed: Any, length: float) -> None:
-    """Set the length of the arrow of 1 N, m of the device."""
-    set_node_setting(require_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
-
-
 def wants_force(bed: Any) -> bool:
     """Return whether anything drawn needs the force on each pin."""
-    return shows_force(bed) or (is_drawn(bed) and shows_arrows(bed))
+    return shows_force(bed) or bool(read_setting(bed, ARROWS, False))
 
 
-def is_drawn(bed: Any) -> bool:
-    """Return whether the bed still has the modifier that draws its pins."""
-    return find_modifier(bed) is not None
+def can_show_skin(bed: Any) -> bool:
+    """Return whether a bed's geometry nodes have a skin: those of older files have none."""
+    return has_setting(bed, FORM)
+
+
+def read_form(bed: Any) -> str:
+    """Return one of `FORMS`; "pins" for a bed without a skin."""
+    number = int(read_setting(bed, FORM, FORMS.index("pins")))
+    return FORMS[min(max(number, 0), len(FORMS) - 1)]
+
+
+def set_form(bed: Any, form: str) -> None:
+    """Show a bed as one of `FORMS`. Raises DigiclayError for a bed without a skin."""
+    write_setting(bed, FORM, FORMS.index(form))
+    bed.pop(BEFORE, None)
+
+
+def is_far(bed: Any) -> bool:
+    """Return whether the pins of a bed are too small in the views to be drawn one by one."""
+    return bool(read_setting(bed, FAR, False))
+
+
+def is_skin_shown(bed: Any) -> bool:
+    """Return whether a skin is seen in the views."""
+    form = read_form(bed)
+    return form in ("skin", "both") or (form == "automatic" and is_far(bed))
 
 
 def housing_of(bed: Any) -> Any | None:
@@ -203,10 +220,3 @@ def _place_fingertip(bed: Any, instant: Instant) -> None:
     tip = fingertip_of(bed)
     if tip is not None:
         bridge.place_fingertip(tip, instant.fingertip, instant.finger)
-
-
-def _positive(name: str, value: float, unit: str) -> float:
-    """Return a finite number above 0, or refuse it."""
-    if not (np.isfinite(value) and value > 0.0):
-        raise DigiclayError(f"Display.{name} must be above 0 {unit} (got {value:g} {unit}).")
-    return float(value)

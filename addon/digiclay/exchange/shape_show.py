@@ -25,6 +25,7 @@ from ..core.shapes.source_file import fit_shape
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..live import bed_state
+from ..roles import ROLE, fingertip_of
 from ..sessions import sculpting
 from ..settings import properties
 
@@ -38,7 +39,7 @@ AWAY = 50.0
 
 def has_surface(thing: Any) -> bool:
     """Return whether an object has a surface that can be displayed."""
-    return thing is not None and thing.type in SURFACED and view.ROLE not in thing
+    return thing is not None and thing.type in SURFACED and ROLE not in thing
 
 
 def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
@@ -94,7 +95,7 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
         raise DigiclayError(f"{bed.name}: {problem}")
     bed_state.write(bed, began)
     view.show_state(bed, system, began.state)
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     if tip is not None:
         bridge.place_fingertip(tip, pose, find_ellipsoid(scene))
     return laid, off
@@ -102,7 +103,7 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
 
 def _lift_finger(bed: Any, scene: Scene, heights: Any) -> Any:
     """Return the pose of the bed's fingertip, raised to above the shape where it is not already."""
-    tip, finger = view.fingertip_of(bed), find_ellipsoid(scene)
+    tip, finger = fingertip_of(bed), find_ellipsoid(scene)
     pose = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
     touch = find_touch_height(make_grid(scene.layout), heights, finger, float(pose[0]), float(pose[1]))
     pose[2] = max(pose[2], touch + CLEARANCE)

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..device import view
+from ..roles import BED, ROLE, bed_of, fingertip_of
 from ..sessions import running
 from ..sessions.running import TABLE, Running
 from ..ui_text import localize
@@ -38,7 +38,7 @@ def find_bed(uid: int, name: str) -> Any | None:
     bed = bpy.data.objects.get(name)
     if bed is None or bed.session_uid != uid:
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
-    if bed is None or bed.get(view.ROLE) != view.BED:  # one that was converted can come back by undo
+    if bed is None or bed.get(ROLE) != BED:  # one that was converted can come back by undo
         return None
     # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is worth that.
     return bed if _is_shown(bpy.context, bed) or bed.users_scene else None
@@ -62,7 +62,7 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
     fault = bridge.find_fault(bed.data, pins)
     if fault:
         return fault
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     if tip is None:
         return localize(
             "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
@@ -78,7 +78,7 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
 
 def active_session(context: Any) -> tuple[Any, Running] | None:
     """Return the bed that is active, or the only one with a session, and its session; None without."""
-    bed, sessions = view.bed_of(context), running.list_sessions()
+    bed, sessions = bed_of(context), running.list_sessions()
     if bed is None and len(sessions) == 1:
         bed = find_bed(sessions[0].uid, sessions[0].name)
     session = running.find(bed)

@@ -18,6 +18,7 @@ from ..device import unit, view
 from ..device.instant import find_ellipsoid
 from ..recorded import takes
 from ..recorded.bake import is_baked
+from ..roles import fingertip_of
 from ..sessions import running, sculpting
 from ..sessions.running import Running
 from ..sessions.stroke_queue import drop_strokes
@@ -49,7 +50,7 @@ def start(context: Any, bed: Any) -> list[Note]:
     if reason:
         raise DigiclayError(f"The session of {bed.name} cannot start: {reason}.")
     begun, fault = sculpting.begin_session(
-        bed.session_uid, bed.name, scene, bridge.pose(view.fingertip_of(bed)),
+        bed.session_uid, bed.name, scene, bridge.pose(fingertip_of(bed)),
         bed_state.read_snapshot(bed), bed_state.read_tick(bed),
     )  # fmt: skip
     show(bed, replace(begun, settings=settings))
@@ -86,7 +87,7 @@ def _evaluate(context: Any) -> None:
 
 def _move_finger(bed: Any, session: Running) -> bool:
     """Put the fingertip where a session has it, without evaluation; return whether there is one."""
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     if tip is not None:
         bridge.move_fingertip(tip, session.pose, find_ellipsoid(session.scene))
     return tip is not None
@@ -150,7 +151,7 @@ def _advance_session(
     try:
         # The fingertip of a stroke is where the session has put it.
         pose = session.pose if session.strokes else followed
-        pose = bridge.pose(view.fingertip_of(bed)) if pose is None else pose
+        pose = bridge.pose(fingertip_of(bed)) if pose is None else pose
         later = sculpting.advance(session, pose, now, most, view.picked_pins(bed))
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
@@ -205,5 +206,5 @@ def _take_settings(bed: Any, session: Running) -> tuple[Running, str]:
     changed, words = sculpting.change_scene(session, scene)
     # A take is of one scene: what was recorded under the former one is not lost.
     words = ". ".join(filter(None, (words, takes.keep_recording(bed, session))))
-    bridge.resize_fingertip(view.fingertip_of(bed), find_ellipsoid(scene))
+    bridge.resize_fingertip(fingertip_of(bed), find_ellipsoid(scene))
     return changed, words

@@ -6,7 +6,7 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.session.recent_trace import PICKED
-from ..device import detail, form, view
+from ..device import detail, view
 from ..overlay import views
 from ..press import aim
 from ..roles import bed_of
@@ -101,12 +101,12 @@ def clear_pins(operator: Any, context: Any) -> None:
 def toggle_skin(operator: Any, context: Any) -> None:
     """Show the surface of the pins as a skin, or the pins again"""
     bed = bed_of(context)
-    seen, before = form.is_skin_shown(bed), bed.get(form.BEFORE)
+    seen, before = view.is_skin_shown(bed), bed.get(view.BEFORE)
     # The form there was before, if that changes what is seen.
-    if before in form.FORMS:
-        form.set_form(bed, before)
+    if before in view.FORMS:
+        view.set_form(bed, before)
         detail.follow()
-    if before not in form.FORMS or form.is_skin_shown(bed) == seen:
-        before = before or form.read_form(bed)
-        form.set_form(bed, "pins" if seen else "skin")
-        bed[form.BEFORE] = before
+    if before not in view.FORMS or view.is_skin_shown(bed) == seen:
+        before = before or view.read_form(bed)
+        view.set_form(bed, "pins" if seen else "skin")
+        bed[view.BEFORE] = before

@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import bridge, preferences
 from ..compat import bpy
-from ..device import form, view
+from ..device import view
 from ..exchange import formed_bed
 from ..live import bed_state, follow, loop
 from ..live.beds import active_session, blocking_reason
@@ -74,7 +74,7 @@ from_rest = Need(
     "Features are measured from the bed at rest already",
 )
 no_skin = Need(
-    lambda context: not form.can_show_skin(bed_of(context)),
+    lambda context: not view.can_show_skin(bed_of(context)),
     "The bed is of an older file and has no skin: rebuild it in the panel Device",
 )
 no_shape = Need(lambda context: not bed_of(context).digiclay.use_shape, "The bed has no shape")

@@ -19,6 +19,7 @@ from ..core.base.modes import Mode
 from ..core.model.control_interface import find_set_point
 from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
+from ..device.node_tree import TOP_FORCE
 from ..sessions import running
 from .picture import Dot, Look, Picture, choose_colors
 from .sections import COMPACT, FULL, Readings, Room, find_room, lay_out
@@ -98,7 +99,7 @@ def read_session(
         modes=np.bincount(session.state.mode(), minlength=len(Mode)),
         colors=tuple(colors[mode] for mode in Mode),
         seconds=bed.digiclay_display.seconds,
-        top=view.top_color(bed) if view.shows_force(bed) else None,
+        top=view.read_setting(bed, TOP_FORCE, None) if view.shows_force(bed) else None,
         beyond=exceeds_law(session.system, session.state, session.pose),
     )
 

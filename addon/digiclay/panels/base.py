@@ -7,11 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ..compat import bpy
-from ..device.view import bed_of, is_edited
-
-__all__ = [
-    "CATEGORY", "Panel", "bed_of", "declare", "draw_lines", "draw_property", "is_edited", "menu", "panel",
-]  # fmt: skip
+from ..roles import bed_of
 
 CATEGORY = "Digital Clay"
 #: Letters a line of the sidebar holds at its usual width.

@@ -13,15 +13,16 @@ from ..core.base.errors import DigiclayError
 from ..core.scene.assembly import assemble
 from ..core.session import snapshot
 from ..core.session.recent_trace import PICKED, SPAN
-from ..device import form, heat, view
-from ..device.node_tree import LENGTH
+from ..device import heat, view
+from ..device.node_tree import ARROW_LENGTH, ARROWS, COLOR_BY_FORCE, FORM, LENGTH, MEMBRANE, TOP_FORCE
 from ..live import bed_state
 from ..overlay import views
+from ..roles import bed_of, is_edited
 from ..sessions import running
 from ..settings import properties
 from ..settings.declared import choice, flag, number
 from ..ui_text import localize
-from .base import bed_of, draw_property, is_edited, panel
+from .base import draw_property, panel
 
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
@@ -54,25 +55,15 @@ def _write_forces(bed: Any) -> None:
 
 
 def _in_nodes(
-    read: Callable[[Any], Any], write: Callable[[Any, Any], None], default: Any, can: Any = view.is_drawn
-) -> dict[str, Any]:
+    name: str, default: Any, write: Callable[[Any, Any], None] | None = None
+) -> dict[str, Callable[..., Any]]:
     """Return `get` and `set` of a property stored in a bed's geometry nodes; the default without them."""
 
     def put(display: Any, value: Any) -> None:
-        if can(display.id_data):
-            write(display.id_data, value)
+        if view.has_setting(display.id_data, name):
+            write(display.id_data, value) if write else view.write_setting(display.id_data, name, value)
 
-    return {"get": lambda display: read(display.id_data) if can(display.id_data) else default, "set": put}
-
-
-def _of_words(
-    words: tuple[str, ...], read: Callable[[Any], str], write: Callable[[Any, str], None], default: str
-) -> dict[str, Any]:
-    """Return `get` and `set` of a word about the skin, stored as its place among the words."""
-    return _in_nodes(
-        lambda bed: words.index(read(bed)), lambda bed, code: write(bed, words[code]), words.index(default),
-        form.can_show_skin,
-    )  # fmt: skip
+    return {"get": lambda display: view.read_setting(display.id_data, name, default), "set": put}
 
 
 def _color(bed: Any, code: int) -> None:
@@ -94,31 +85,31 @@ class Display(bpy.types.PropertyGroup):
 
     form: choice(
         "Show", "What is seen of the bed, also in renders: pins, or the surface they form as a skin",
-        items=FORMS, **_of_words(form.FORMS, form.read_form, form.set_form, "pins"),
+        items=FORMS, get=lambda display: view.FORMS.index(view.read_form(display.id_data)),
+        set=_in_nodes(FORM, 0, lambda bed, code: view.set_form(bed, FORMS[code][0]))["set"],
     )  # fmt: skip
     skin: choice(
         "Skin", "How the skin runs between the pins",
-        items=SKINS, **_of_words(form.KINDS, form.read_kind, form.set_kind, "smooth"),
+        items=SKINS, **_in_nodes(
+            MEMBRANE, 0, lambda bed, code: view.write_setting(bed, MEMBRANE, bool(code))
+        ),
     )  # fmt: skip
     color: choice(
         "Color", "Quantity shown by the color of a pin", items=COLORINGS,
-        **_in_nodes(lambda bed: int(view.color_source(bed) == "force"), _color, 0),
+        **_in_nodes(COLOR_BY_FORCE, 0, _color),
     )  # fmt: skip
     top_force: number(
         "Top Color at (N)", "Force of the last color, in N", min=1e-3, max=1e3, soft_max=2.0, precision=3,
-        step=1, **_in_nodes(view.top_color, view.scale_colors, heat.TOP),
+        step=1, **_in_nodes(TOP_FORCE, heat.TOP),
     )  # fmt: skip
     arrows: flag(
         "Force Arrows",
         "Draw the force on each pin as an arrow, with a transparent fingertip; also in renders",
-        **_in_nodes(view.shows_arrows, _arrows, False),
+        **_in_nodes(ARROWS, False, _arrows),
     )  # fmt: skip
     arrow_length: number(
         "Arrow Length (mm/N)", "Length of the arrow of 1 N, in mm of the device", min=0.1, max=1e5,
-        soft_min=10.0, soft_max=1000.0, precision=1, step=1000, **_in_nodes(
-            lambda bed: 1e3 * view.arrow_length(bed),
-            lambda bed, length: view.scale_arrows(bed, 1e-3 * length), LENGTH,
-        ),
+        soft_min=10.0, soft_max=1000.0, precision=1, step=1000, **_in_nodes(ARROW_LENGTH, LENGTH),
     )  # fmt: skip
     overlay: flag(
         "Overlay", "While a session runs, show force and state in a corner of the 3D view", default=True,
@@ -152,7 +143,7 @@ def display(sidebar: Any, context: Any) -> None:
     column = layout.column()
     column.enabled = drawn
     skin = column.column()
-    skin.enabled = form.can_show_skin(bed)
+    skin.enabled = view.can_show_skin(bed)
     draw_property(skin, shown, "form")
     draw_property(skin, shown, "skin", shown.form != "pins", expand=True)
     draw_property(column, shown, "color", expand=True)

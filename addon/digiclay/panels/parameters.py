@@ -9,13 +9,14 @@ from ..core.base.quantity import list_quantities
 from ..core.control.methods import list_methods
 from ..core.scene.schema import NEEDS, OPTIONAL, import_parameters
 from ..core.scene.toml_table import PRESETS
+from ..roles import bed_of, is_edited
 from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import WHOLE, title
 from ..settings.groups import method_of, method_property
 from ..settings.properties import part_group
 from ..ui_text import localize
-from .base import Panel, bed_of, draw_lines, is_edited, menu, panel
+from .base import Panel, draw_lines, menu, panel
 
 #: Kinds of properties whose label stands beside the field.
 BESIDE = {"ENUM", "STRING"}

@@ -7,10 +7,11 @@ from typing import Any
 from ..live import bed_state, follow
 from ..overlay.sections import error_message
 from ..recorded import bake, takes
+from ..roles import bed_of
 from ..sessions import running
 from ..sessions.running import Running
 from ..ui_text import localize
-from .base import bed_of, draw_lines, panel
+from .base import draw_lines, panel
 
 
 @panel("DIGICLAY_PT_session", "Session", 10, closed=False)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ..exchange import formed_bed
-from .base import bed_of, is_edited, panel
+from ..roles import bed_of, is_edited
+from .base import panel
 
 #: Property of a bed that holds the list of its features; the operator that lists them writes it.
 LISTED = "digiclay_features"

@@ -28,6 +28,7 @@ from ..core.files.run_folder import name_unfinished
 from ..core.session.render_settings import Film, Moving, Turntable, name_frame
 from ..device import view
 from ..device.instant import Instant
+from ..roles import fingertip_of
 from . import stage
 from .legend import SHARE, draw_force_plot
 from .still import add_picture_scene, apply_style, failure_reason, render_picture, use_fast_settings
@@ -143,7 +144,7 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
         use_fast_settings(scene)
         bed = view.build(instant, scene.collection)
         apply_style(bed, looks)
-        tip = view.fingertip_of(bed)
+        tip = fingertip_of(bed)
         if tip is not None and not looks.fingertip:
             for part in (*tip.children_recursive, tip):
                 bpy.data.objects.remove(part)

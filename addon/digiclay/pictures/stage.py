@@ -12,7 +12,7 @@ from .. import bridge
 from ..compat import bpy, shader_nodes
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
-from ..device import view
+from ..device import parts, view
 from ..device.instant import Instant
 from .legend import Front, write_force_legend, write_mode_legend
 
@@ -44,7 +44,7 @@ def set_up(
         _floor(scene, floor, 60.0 * span)
     _lights(scene)
     front = Front.before(scene, camera, half_frame(scene))
-    if view.color_source(bed) == "force":
+    if view.shows_force(bed):
         write_force_legend(front)
     else:
         write_mode_legend(front, instant.modes if modes is None else modes)
@@ -117,7 +117,7 @@ def _floor(scene: Any, height: float, size: float) -> None:
     square = np.array([[-size, -size], [size, -size], [size, size], [-size, size]])
     square = np.column_stack([square, np.full(4, height)])
     mesh = bridge.mesh("Digital Clay Floor", (square, [(0, 1, 2, 3)]))
-    mesh.materials.append(view.material("floor", FLOOR, roughness=0.9))
+    mesh.materials.append(parts.material("floor", FLOOR, roughness=0.9))
     scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
 
 

@@ -13,7 +13,7 @@ from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.layout import Grid, make_grid
 from ..core.surface.pointing import find_ray, intersect_surface
-from ..device import view
+from ..roles import is_bed
 from ..sessions import running
 from ..settings import properties
 from .occlusion import find_hider, shown_stretch
@@ -47,7 +47,7 @@ def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any |
     """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any."""
     target, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
-        if not view.is_bed(bed):
+        if not is_bed(bed):
             continue
         try:
             cells, height = read_surface(bed)

@@ -9,8 +9,8 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.model.fingertip import Fingertip
-from ..device import view
 from ..live import beds
+from ..roles import bed_of, is_bed
 from ..settings import finger_size
 from ..strokes.stroke import Brush
 from ..ui_text import localize
@@ -93,10 +93,10 @@ def find_bed(context: Any, uid: int) -> Any | None:
 def bed_in_use(context: Any) -> Any | None:
     """Return the bed that the tool's settings are about: active, in a session, or the only one seen."""
     active = beds.active_session(context)
-    bed = view.bed_of(context) or (active and active[0])
+    bed = bed_of(context) or (active and active[0])
     if bed is not None:
         return bed
-    seen = [thing for thing in context.visible_objects if view.is_bed(thing)]
+    seen = [thing for thing in context.visible_objects if is_bed(thing)]
     return seen[0] if len(seen) == 1 else None
 
 

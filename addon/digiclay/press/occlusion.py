@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..device import view
+from ..roles import ROLE, is_bed
 from ..ui_text import localize
 
 #: Objects that may have a surface.
@@ -70,7 +71,7 @@ def list_surfaces(context: Any, bed: Any) -> Iterator[tuple[Any, Any]]:
     for thing in context.visible_objects:
         if _belongs(thing, bed):
             continue
-        if _instances(thing) and not view.is_bed(thing):
+        if _instances(thing) and not is_bed(thing):
             instancers.add(thing)
         if _hides(thing):
             yield thing, thing.matrix_world
@@ -97,7 +98,7 @@ def _hides(thing: Any) -> bool:
 def _belongs(thing: Any, bed: Any) -> bool:
     """Return whether an object is a bed or a part of it; what a user has parented to it is none."""
     while thing is not None and thing != bed:
-        thing = thing.parent if view.ROLE in thing else None
+        thing = thing.parent if ROLE in thing else None
     return thing is not None
 
 
@@ -143,7 +144,7 @@ def find_free_place(context: Any, bed: Any) -> tuple[Floats, str]:
         return [row for row in surfaces if (row[2] < place + high).all() and (row[3] > place + low).all()]
 
     def hider(place: Floats, among: list[Any]) -> Any:
-        beds = [row[0] for row in overlapping(place) if view.is_bed(row[0])]
+        beds = [row[0] for row in overlapping(place) if is_bed(row[0])]
         return beds[0] if beds else _find_hider(context, bed, place, (low, high), [row[:2] for row in among])
 
     there = overlapping(cursor)
@@ -152,7 +153,7 @@ def find_free_place(context: Any, bed: Any) -> tuple[Floats, str]:
         return cursor, ""
     first, last = np.min([row[2] for row in there], axis=0), np.max([row[3] for row in there], axis=0)
     middle, gap = (first + last) / 2.0, GAP * (high - low)
-    places = [] if view.is_bed(hides) else [(np.array([*middle[:2], last[2]]), ON_TOP)]
+    places = [] if is_bed(hides) else [(np.array([*middle[:2], last[2]]), ON_TOP)]
     for axis in (0, 1):
         for edge in (last[axis] - low[axis] + gap[axis], first[axis] - high[axis] - gap[axis]):
             place = cursor.copy()

@@ -15,9 +15,9 @@ from ..core.base.modes import COLORS, Mode
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid, Layout
 from ..core.surface.pointing import find_contact_outline
-from ..device import view
 from ..device.instant import find_ellipsoid
 from ..overlay.picture import Color, Line, Words
+from ..roles import fingertip_of
 from ..sessions import running
 from ..settings import finger_size
 from ..strokes.stroke import SYMMETRIES, Brush
@@ -98,7 +98,7 @@ def touch_outline(
     bed: Any, cells: Grid, height: Floats, place: Floats, depth: float, kind: Brush = Brush.LOWER
 ) -> Floats:
     """Return the rim of what a brush would form at a place, lying on the pins, (k, 3), m."""
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     outline = find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, kind, cells.layout)
     return drape(cells, height, place[:2] + outline)
 
@@ -125,7 +125,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
         words = localize("{} hides the bed", hider.name)
         cursor([], make_label(words, xy, context.preferences.system.ui_scale))
         return
-    if target is None or view.fingertip_of(target.bed) is None:
+    if target is None or fingertip_of(target.bed) is None:
         return
     settings = tool.operator_properties(OPERATOR)
     depth, kind = 1e-3 * settings.depth, _shown_brush(target.bed, settings)
@@ -139,7 +139,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
     amount = 1e-3 * getattr(settings, amount_name(kind))
-    text = describe_brush(bridge.finger_of(view.fingertip_of(target.bed)), kind, amount, settings.strength)
+    text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)
     color = SMOOTHING if kind is Brush.SMOOTH else LIGHT
     label = make_label(text, xy, context.preferences.system.ui_scale)
     cursor(make_lines(shown, width, color), label)

@@ -23,7 +23,7 @@ from ..core.session.take import Take
 from ..device import view
 from ..device.instant import pick_pose
 from ..device.nodes import attribute, enabled, mesh_of, new_tree, node, number, sample, socket, store
-from ..roles import BAKE
+from ..roles import BAKE, ROLE, fingertip_of
 
 #: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
 MOMENT = "Moment"
@@ -128,7 +128,7 @@ def apply(bed: Any, moments: BakedFrames, first: int, finger: Fingertip, *, keyf
     for _, curve in _curves(bed):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     if keyframe_finger and tip is not None:
         tip.animation_data_clear()
         for row, pose in enumerate(moments.pose):
@@ -173,7 +173,7 @@ def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> I
         for row in range(count + 1):
             whole, part = divmod(first + row * period * rate, 1.0)
             scene.frame_set(int(whole), subframe=part)
-            tip = view.fingertip_of(bed)
+            tip = fingertip_of(bed)
             if tip is None:
                 raise DigiclayError(f"{bed.name} has no fingertip: undo its removal.")
             poses[row] = bridge.pose(tip)
@@ -195,7 +195,7 @@ def _source(tree: Any) -> Any | None:
     """Return the object that holds the baked pins a tree plays, or None when it plays none."""
     infos = [item for item in tree.nodes if item.bl_idname == "GeometryNodeObjectInfo"]
     sources = (info.inputs["Object"].default_value for info in infos)
-    return next((source for source in sources if source is not None and source.get(view.ROLE) == BAKE), None)
+    return next((source for source in sources if source is not None and source.get(ROLE) == BAKE), None)
 
 
 def _curves(bed: Any) -> Iterator[tuple[Any, Any]]:
@@ -218,5 +218,5 @@ def _make_source(moments: BakedFrames) -> Any:
         force=moments.force.ravel(),
     )
     made = bpy.data.objects.new(mesh.name, mesh)
-    made[view.ROLE] = BAKE
+    made[ROLE] = BAKE
     return made

@@ -11,8 +11,8 @@ from digiclay import bridge
 from digiclay.core.engine.simulation import begin
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
-from digiclay.device import view
 from digiclay.live import bed_state, handlers, tick
+from digiclay.roles import fingertip_of, is_bed
 from digiclay.sessions import running
 from digiclay.settings import properties
 
@@ -46,7 +46,7 @@ def move(bed: Any, clock: Clock, places: Iterable[tuple[float, float]]) -> list[
     notes = []
     for x, z in places:
         # The semi-axis upwards is 8 mm: the empty is the ellipsoid's center.
-        view.fingertip_of(bed).location = np.array([x, 0.0, z + 8.0]) * 1e-3 * bridge.SCALE
+        fingertip_of(bed).location = np.array([x, 0.0, z + 8.0]) * 1e-3 * bridge.SCALE
         notes += clock.tick()
     return notes
 
@@ -78,7 +78,7 @@ def undone(clock: Clock, times: int = 1) -> None:
 
 def only_bed() -> Any:
     """Return the bed, fetched anew: undo invalidates all references."""
-    (found,) = [thing for thing in bpy.context.scene.objects if view.is_bed(thing)]
+    (found,) = [thing for thing in bpy.context.scene.objects if is_bed(thing)]
     return found
 
 

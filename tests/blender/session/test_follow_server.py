@@ -14,9 +14,9 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.device import view
 from digiclay.live import follow
 from digiclay.live.follow import pack_subscription, parse_address, read_pose
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 
 from tests.blender.session.live import FLOAT32, TICK, Clock, exact, started
@@ -73,7 +73,7 @@ def test_bed_and_fingertip_follow_the_poses(bed: Any, clock: Clock, server: sock
         assert clock.tick() == []
     assert pose_of(bed) == list(PRESS)
     # The empty is the ellipsoid's center, 8 mm above its lowest point.
-    assert view.fingertip_of(bed).location.z == pytest.approx(0.45, abs=10 * FLOAT32)
+    assert fingertip_of(bed).location.z == pytest.approx(0.45, abs=10 * FLOAT32)
     assert exact(bed).min() < 39.9e-3
 
 
@@ -129,7 +129,7 @@ def test_the_fingertip_is_the_hands_again_afterwards(bed: Any, clock: Clock, ser
     arrived(server, address, state(*PRESS))
     clock.tick(3)
     bpy.ops.digiclay.leave_server()
-    view.fingertip_of(bed).location.z = 0.6
+    fingertip_of(bed).location.z = 0.6
     clock.tick(3)
     assert pose_of(bed)[2] == pytest.approx(0.052, abs=FLOAT32)
 

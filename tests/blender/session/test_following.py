@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.core.session import snapshot
-from digiclay.device import view
 from digiclay.live import bed_state
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 
 from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
@@ -58,7 +58,7 @@ def drive(tip: Any, how: str) -> None:
 
 @pytest.mark.parametrize("how", ["animation", "driver", "constraint"])
 def test_the_bed_follows_a_fingertip_moved_by_other_means(bed: Any, clock: Clock, how: str) -> None:
-    tip = view.fingertip_of(bed)
+    tip = fingertip_of(bed)
     drive(tip, how)
     bpy.context.scene.frame_set(1)
     started(bed)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
-from digiclay.device import view
 from digiclay.live import beds, tick
 from digiclay.operators.session_loop import LoopMixin
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 
 from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
@@ -26,7 +26,7 @@ def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:
     assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
     np.testing.assert_allclose(exact(bed), formed, rtol=0, atol=1e-5)  # pins were still coming to rest
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
-    assert bridge.pose(view.fingertip_of(bed))[2] > 45e-3
+    assert bridge.pose(fingertip_of(bed))[2] > 45e-3
     assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
     assert (exact(bed) == 40e-3).all()
     assert not bpy.ops.digiclay.session_rewind.poll()
@@ -55,7 +55,7 @@ def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed: Any, clock:
     np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
     assert (exact(bed) == 40e-3).all()
     bpy.context.view_layer.update()
-    assert bridge.pose(view.fingertip_of(bed))[2] > 45e-3
+    assert bridge.pose(fingertip_of(bed))[2] > 45e-3
 
 
 def test_a_single_step_pauses_and_is_one_control_period(bed: Any, clock: Clock) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import bpy
 import pytest
 from digiclay import operators
-from digiclay.device import view
 from digiclay.live import tick
+from digiclay.roles import fingertip_of
 
 from tests.blender.session.live import Clock, press, started
 
@@ -80,7 +80,7 @@ def test_in_edit_mode_and_without_a_bed_nothing_can_be_changed(bed: Any, clock: 
     press(bed, clock)
     tick.stop(bed.session_uid)
     bpy.ops.object.mode_set(mode="EDIT")
-    bpy.context.view_layer.objects.active = view.fingertip_of(bed)
+    bpy.context.view_layer.objects.active = fingertip_of(bed)
     assert bpy.context.mode == "OBJECT"
     assert refused("digiclay.session_reset") == "Go back to Object Mode first"
     bpy.context.view_layer.objects.active = bed

@@ -8,8 +8,8 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay.device import view
 from digiclay.live import bed_state, handlers, tick
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.sessions.stroke_queue import queue_stroke
 
@@ -21,7 +21,7 @@ def test_a_session_waits_for_a_deleted_fingertip_and_goes_on_with_undo(bed: Any,
     press(bed, clock)
     bpy.ops.ed.undo_push(message="Formed")
     clock.tick()
-    bpy.data.objects.remove(view.fingertip_of(bed))
+    bpy.data.objects.remove(fingertip_of(bed))
     bpy.ops.ed.undo_push(message="Deleted")
     waits(bed, clock, words="fingertip is deleted")
     bpy.ops.ed.undo()
@@ -60,7 +60,7 @@ def edit_through_a_linked_duplicate(bed: Any) -> None:
         (lambda bed: lay_out(bed, 14), "169 pins, not 182", lambda bed: lay_out(bed, 13)),
         (lambda bed: bed.data.vertices.add(1), "170 pins now instead of 169", None),
         (lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]), "no longer that of", None),
-        (lambda bed: view.fingertip_of(bed).scale.zero(), "scaled to nothing", None),
+        (lambda bed: fingertip_of(bed).scale.zero(), "scaled to nothing", None),
     ],
 )
 def test_a_session_waits_while_it_is_hindered(
