@@ -97,11 +97,18 @@ def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(
     assert page.count("start of its process") == page.count("data:image/png;base64,") == 2
 
 
-def test_finished_jobs_are_kept_and_changed_or_half_written_ones_are_done_again() -> None:
+def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_ones_are_done_again(
+    here: Path,
+) -> None:
     jobs(TWO)
     assert main(["batch", "two.toml", "--prepare", "--quiet"]) == 0
-    for name in ("quick", "slow"):  # in this process: others take seconds to start
-        assert main(["job", f"two/jobs/tap-{name}", "--quiet"]) == 0
+    assert runs() == []
+    far = here.parent / "a farm"
+    shutil.copytree("two/jobs/tap-quick", far / "jobs" / "tap-quick")
+    for folder in (far / "jobs/tap-quick", "two/jobs/tap-slow"):  # in this process: others take seconds
+        assert main(["job", str(folder), "--quiet"]) == 0
+    shutil.copytree(far / "runs" / "tap-quick", "two/runs/tap-quick")
+    shutil.rmtree("two/jobs")
     before = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
     jobs(TWO.replace("0.2", "0.3"))
     shutil.copytree("two/runs/tap-quick", f"two/runs/.tap-quick.{dead()}.part")
@@ -149,21 +156,6 @@ def test_when_a_batch_is_killed_its_processes_end_and_a_process_that_dies_is_tol
     wait_until(lambda: list(Path("two/runs").glob(".*.part")))
     worker.kill()
     assert worker.read_error().startswith("The process ended with signal 9")
-
-
-def test_a_job_can_be_done_elsewhere_from_its_files_alone(here: Path) -> None:
-    jobs(TWO)
-    assert main(["batch", "two.toml", "--prepare", "--quiet"]) == 0
-    assert runs() == []
-    far = here.parent / "a farm"
-    shutil.copytree("two/jobs/tap-slow", far / "jobs" / "tap-slow")
-    assert main(["job", str(far / "jobs" / "tap-slow"), "--quiet"]) == 0
-    shutil.copytree(far / "runs" / "tap-slow", "two/runs/tap-slow")
-    assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 0
-    shutil.rmtree("two/jobs")
-    assert main(["batch", "two.toml", "--quiet"]) == 0
-    # Its time says that it was not done again.
-    assert json.loads(Path("two/runs/tap-slow/timing.json").read_text(encoding="utf-8"))["start_up"] is None
 
 
 @pytest.mark.parametrize(

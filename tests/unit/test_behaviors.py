@@ -232,19 +232,6 @@ def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height
     assert given.target[12] - REST == pytest.approx(dragged * 1e-3)
 
 
-def test_a_pin_let_go_stays_where_it_was_let_go() -> None:
-    behavior = control("push_pull", release_time=0.02)
-    still = seen(behavior, height=middle(-0.5))
-    memory, target = behavior.begin(), still.target
-    for _ in range(12):
-        now = still._replace(target=target)
-        memory, _ = behavior.locate(memory, now)
-        memory, given = behavior.command(memory, now)
-        target = given.target
-    assert target[12] == pytest.approx(REST - 0.5e-3)
-    assert given.mode[12] == Mode.HOLD
-
-
 def test_a_listening_pin_goes_down_as_fast_as_up_also_under_unlike_reservoirs() -> None:
     behavior = control("push_pull")
     up, down = cycle(behavior, seen(behavior)).command, orders(behavior, seen(behavior)).command
@@ -260,18 +247,6 @@ def test_a_listening_pin_goes_down_as_fast_as_up_also_under_unlike_reservoirs() 
 # Shape display
 
 
-@pytest.mark.parametrize(
-    ("refresh", "moves"),
-    [
-        ("one_time", [(row, row, 1.0) for row in range(5)]),
-        ("gradual", [(row, row, share) for share in (0.5, 1.0) for row in range(5)]),
-        ("approximate_gradual", [(0, 4, 0.5), (0, 4, 1.0)]),
-    ],
-)
-def test_a_refresh_is_a_series_of_moves(refresh: str, moves: list[tuple[int, int, float]]) -> None:
-    assert [tuple(move) for move in control("shape_display", refresh=refresh, surfaces=2).moves] == moves
-
-
 # The pyramid's first row is at rest already; 11 periods of 5 ms are the first to be longer than 52.5 ms.
 @pytest.mark.parametrize(("patience", "starts"), [(0.0525, [0, 11, 22, 33]), (0.05, [0, 10, 20, 30])])
 def test_a_move_of_blocked_pins_waits_for_its_patience(patience: float, starts: list[int]) -> None:
@@ -281,13 +256,6 @@ def test_a_move_of_blocked_pins_waits_for_its_patience(patience: float, starts: 
         memory, _ = behavior.command(memory, blocked)
         moves.append(memory.move)
     assert np.flatnonzero(np.diff([0, *moves])).tolist() == starts
-
-
-def test_heights_are_read_from_a_file(tmp_path: Path) -> None:
-    heights = np.linspace(30e-3, 50e-3, 25).reshape(5, 5)
-    np.save(tmp_path / "mine.npy", heights)
-    shown = control("shape_display", shape=str(tmp_path / "mine.npy"))
-    assert np.array_equal(shown.heights, heights.ravel())
 
 
 # Their parts

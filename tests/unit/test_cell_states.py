@@ -78,12 +78,6 @@ def test_the_neighbors_of_a_following_cell_become_its_blister_and_its_edge(low, 
     assert {Mode(int(m)) for m in modes[[low < distance(c) < high for c in range(BED.count)]]} == {mode}
 
 
-def test_a_blister_cell_follows_at_a_lower_force_than_one_at_rest() -> None:
-    first = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE + 1: Mode.BLISTER}
-    mode = ordered(seen({MIDDLE: 0.05, MIDDLE + 1: 0.016}, first))[1].mode
-    assert mode[MIDDLE + 1] == Mode.FORCE_FOLLOW
-
-
 def test_a_critical_cell_is_given_up_after_the_time_out() -> None:
     measured, memory, periods = seen({}, {MIDDLE: Mode.CRITICAL}), Patch(felt=True), 0
     while measured.mode[MIDDLE] == Mode.CRITICAL:
@@ -107,11 +101,6 @@ def test_giving_up_the_last_cell_and_a_jump_farther_than_r_vm_count_as_losses() 
     memory, _ = CONTROL.command(Patch(felt=True), measured)
     assert (memory.losses, memory.felt) == (1, False)
     assert CONTROL.locate(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))[0].losses == 1
-
-
-def test_without_any_following_cell_no_cell_is_left_in_a_blister() -> None:
-    modes = {MIDDLE + 1: Mode.BLISTER, MIDDLE + 2: Mode.FROZEN, MIDDLE + 3: Mode.EDGE}
-    assert set(ordered(seen({}, modes))[1].mode.tolist()) == {int(Mode.REST)}
 
 
 def test_the_blister_stands_a_rise_above_its_following_cells_and_falls_off_to_the_edge() -> None:
@@ -153,12 +142,41 @@ def test_the_blister_s_edge_is_the_mean_height_of_the_ring_ahead_and_abeam(towar
     assert memory.edge == pytest.approx(measured.height[ahead].mean(), abs=1e-15)
 
 
-@pytest.mark.parametrize(("flat", "mode"), [(2.9e-3, Mode.FROZEN), (3.1e-3, Mode.BLISTER)])
-def test_only_cells_beyond_the_flat_top_freeze_behind_the_finger(flat: float, mode: Mode) -> None:
-    control = replace(CONTROL, blister=replace(BLISTER, flat_radius=flat))
-    measured = seen({MIDDLE: 0.04}, {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE - 1: Mode.BLISTER})  # 3 mm behind
-    _, orders = control.command(Patch(heading=Heading(0.0, 0.0, 1.0, 0.0), felt=True), measured)
-    assert orders.mode[MIDDLE - 1] == mode
+FF, PATCH = Mode.FORCE_FOLLOW, Mode.BLISTER
+#: With sensors whose noise hides forces below 25 mN; with a flat top short of a pin 3 mm away, and beyond it.
+NOISY = replace(CONTROL, floor=25e-3)
+SHORT, WIDE = (replace(CONTROL, blister=replace(BLISTER, flat_radius=flat)) for flat in (2.9e-3, 3.1e-3))
+
+
+@pytest.mark.parametrize(
+    ("control", "forces", "before", "after"),
+    [
+        pytest.param(
+            CONTROL, {MIDDLE: 0.05, MIDDLE + 1: 0.016}, {MIDDLE: FF, MIDDLE + 1: PATCH}, {MIDDLE + 1: FF},
+            id="a blister cell follows at a lower force than one at rest",
+        ),
+        pytest.param(
+            CONTROL, {}, {MIDDLE + 1: PATCH, MIDDLE + 2: Mode.FROZEN, MIDDLE + 3: Mode.EDGE},
+            dict.fromkeys(range(BED.count), Mode.REST), id="without a following cell no blister is left",
+        ),
+        pytest.param(
+            SHORT, {MIDDLE: 0.04}, {MIDDLE: FF, MIDDLE - 1: PATCH}, {MIDDLE - 1: Mode.FROZEN},
+            id="beyond the flat top a cell freezes behind the finger",
+        ),
+        pytest.param(
+            WIDE, {MIDDLE: 0.04}, {MIDDLE: FF, MIDDLE - 1: PATCH}, {MIDDLE - 1: PATCH}, id="and none within"
+        ),
+        pytest.param(
+            NOISY, {MIDDLE: 0.1, MIDDLE + 2: 24e-3, MIDDLE - 2: 26e-3},
+            {MIDDLE: FF, MIDDLE + 2: PATCH, MIDDLE - 2: PATCH}, {MIDDLE + 2: PATCH, MIDDLE - 2: FF},
+            id="a force that may be noise makes no blister cell follow",
+        ),
+    ],
+)  # fmt: skip
+def test_what_a_cell_becomes_under_a_finger_that_travels_east(control, forces, before, after):
+    memory = Patch(heading=Heading(0.0, 0.0, 1.0, 0.0), felt=True)
+    mode = control.command(memory, seen(forces, before))[1].mode
+    assert {cell: mode[cell] for cell in after} == after
 
 
 @pytest.mark.parametrize("floor", [0.0, 25e-3])
@@ -179,19 +197,8 @@ def test_thresholds_in_the_wrong_order_are_refused(name: str, value: float, said
         CellStates(**{name: value})
 
 
-#: With sensors whose noise hides forces below 25 mN.
-NOISY = replace(CONTROL, floor=25e-3)
-
-
-def test_a_force_that_may_be_noise_makes_no_blister_cell_follow_and_moves_no_spring() -> None:
-    measured = seen({MIDDLE: 0.1, MIDDLE + 2: 24e-3, MIDDLE - 2: 26e-3}, {MIDDLE + 2: Mode.BLISTER})
-    measured.mode[[MIDDLE, MIDDLE - 2]] = Mode.FORCE_FOLLOW, Mode.BLISTER
-    mode = NOISY.command(NOISY.begin(), measured)[1].mode
-    assert [mode[MIDDLE + 2], mode[MIDDLE - 2]] == [Mode.BLISTER, Mode.FORCE_FOLLOW]
+def test_a_force_that_may_be_noise_moves_no_spring_but_counts_where_a_cell_follows() -> None:
     assert NOISY.command(NOISY.begin(), seen({MIDDLE: 24e-3}))[1].command[MIDDLE] == 0.0
-
-
-def test_a_following_cell_counts_to_the_patch_with_what_it_reads() -> None:
     # A finger that rises presses with less than the noise hides; where it is shows nevertheless.
     following = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE + 1: Mode.CRITICAL}
     measured = seen({MIDDLE: 10e-3, MIDDLE + 1: 10e-3, MIDDLE + 3: 24e-3}, following)

@@ -31,8 +31,6 @@ from digiclay.core.files.run_folder import (
 from tests.other_process import PROGRAM, dead, finish, start
 from tests.timeouts import TIMEOUT, wait_until
 
-#: A session of hours.
-HOURS = ["--set", "simulation.duration=1e4", "--set", "recorder.every=1000", "--quiet"]
 #: What the second process says.
 REFUSED = "o is being {} by another digiclay: choose another place with --out, or wait.\n"
 JOBS = 'scenes = ["my.toml"]\nerrors = false\n'
@@ -76,15 +74,6 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
         assert main(["export", "older", "--out", "elsewhere", "--quiet"]) == 0
     assert names(Path("older")) == before
     assert main(["export", "older", "--quiet"]) == 0
-
-
-def test_a_session_of_hours_keeps_its_folder_until_it_is_killed(refused: Any) -> None:
-    with running("run", "my.toml", "--out", "o", *HOURS, sign=".o.lock"):
-        refused(["run", "my.toml", "--out", "o", "--quiet"], REFUSED.format("written"))
-        assert not Path("o").exists()
-    # The process was killed, and nothing is in the way of the next one.
-    assert main(["run", "my.toml", "--out", "o", "--quiet"]) == 0
-    assert names() == ["my.toml", "o"]
 
 
 @pytest.mark.parametrize("line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"])

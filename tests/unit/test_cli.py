@@ -18,12 +18,8 @@ from digiclay.core.base.errors import BEGINNING, END, one_line
 
 from tests.other_process import PROGRAM, finish, start
 from tests.scene_files import left
-from tests.timeouts import wait_until
 
 pytestmark = pytest.mark.usefixtures("here")
-
-#: A session of hours: what is refused of it is refused before any work.
-LONG = ["run", "my.toml", "--set", "simulation.duration=1e4", "--set", "recorder.every=1000", "--quiet"]
 
 
 def test_a_run_is_written_to_a_folder_called_like_the_scene_and_says_so(
@@ -64,7 +60,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "surface": (["run", "my.toml", "--set", "layout.rows=1", "--export", "stl"], "at least 2 x 2 cells"),
     "no record": (["run", "my.toml", "--set", "recorder=absent", "--plots"], "--plots needs a recorder"),
     "folder": (["run", "my.toml", "--out", "my.toml"], "my.toml is a file"),
-    "full folder": ([*LONG, "--out", "d.png"], "d.png is not empty"),
+    "full folder": (["run", "my.toml", "--out", "d.png"], "d.png is not empty"),
     "older form": (["form", "dome", "--out", "d.png", "--quiet"], "replace the run in it with --overwrite."),
     "no command": ([], "the following arguments are required: COMMAND"),
     "command": (["walk"], "invalid choice: 'walk'"),
@@ -317,32 +313,6 @@ def test_a_job_of_a_batch_exports_without_any_library(here: Path) -> None:
     code, _, err = finish(start(missing + PROGRAM, "job", "jobs/jobs/my"))
     assert code == 0, err
     assert {"surface.stl", "surface.3mf"} <= {path.name for path in (here / "jobs/runs/my").iterdir()}
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_a_signal_keeps_an_incomplete_run_that_can_be_exported_and_exits_with_130(here: Path) -> None:
-    # SIGTERM as farms send it; Ctrl-C is that of test_extras.
-    ready = here / "ready"
-    script = (
-        "import itertools, pathlib\n"
-        "from digiclay.commands import run\n"
-        "begin, period = run.run, itertools.count()\n"
-        "def told(*given, stopped, **more):\n"
-        "    def asked():\n"
-        "        if next(period) == 20:\n"
-        f"            pathlib.Path({str(ready)!r}).touch()\n"
-        "        return stopped()\n"
-        "    return begin(*given, stopped=asked, **more)\n"
-        "run.run = told\n"
-    )
-    started = start(script + PROGRAM, *LONG)
-    wait_until(lambda: ready.exists() or started.poll() is not None)
-    ready.unlink()
-    started.send_signal(signal.SIGTERM)
-    code, _, err = finish(started)
-    metrics = json.loads((here / "my" / "metrics.json").read_text(encoding="utf-8"))
-    assert (code, err, metrics["incomplete"], left(here)) == (130, "", True, ["my"])
-    assert main(["export", "my", "--quiet"]) == 0
 
 
 def test_a_warning_of_numpy_is_an_error_in_the_processes_that_tests_start() -> None:

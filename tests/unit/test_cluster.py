@@ -21,13 +21,15 @@ from distributed import Client, LocalCluster
 
 from tests.other_process import finish as run_process
 from tests.other_process import start
+from tests.scene_files import left
 from tests.timeouts import wait_until
 
 ROOT = Path(__file__).parents[2]
 #: Two batches, and no pictures of three axes.
 AXES = ["control.force_gain=1,2", "control.dead_band=1e-5,2e-5", "layout.rows=3,4"]
 SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis)), "--quiet"]
-Found = dict[int, Any]
+VARIED = "--vary control.force_gain=1:2 --vary control.position_gain=100:900 --population 4 --generations 2"
+TUNING = ["tune", "my.toml", *VARIED.split(), "--metric", "rfd,highest", "--quiet"]
 
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -63,22 +65,15 @@ def never() -> bool:
     return False
 
 
-def test_a_sweep_on_a_cluster_comes_to_the_table_of_this_machine(here: Path, address: str) -> None:
-    assert main([*SWEEP, "--workers", "1", "--out", "own"]) == 0
-    assert main([*SWEEP, "--scheduler", address, "--out", "far"]) == 0
-    assert (here / "far/sweep.csv").read_bytes() == (here / "own/sweep.csv").read_bytes()
-    assert len(list((here / "far/points").iterdir())) == 8
-
-
-def test_a_tuning_on_a_cluster_comes_to_the_tables_of_this_machine(here: Path, address: str) -> None:
-    varied = ["--vary", "control.force_gain=1:2", "--vary", "control.position_gain=100:900"]
-    size = ["--population", "4", "--generations", "2"]
-    words = ["tune", "my.toml", *varied, *size, "--metric", "rfd,highest", "--quiet"]
+@pytest.mark.parametrize(("words", "tables"), [(SWEEP, 1), (TUNING, 2)], ids=["sweep", "tuning"])
+def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(
+    words: list[str], tables: int, here: Path, address: str
+) -> None:
     assert main([*words, "--workers", "1", "--out", "own"]) == 0
     assert main([*words, "--scheduler", address, "--out", "far"]) == 0
     own, far = ({path.name: path.read_bytes() for path in (here / at).glob("*.csv")} for at in ("own", "far"))
-    assert len(own) == 2
-    assert own == far
+    assert (len(own), own) == (tables, far)
+    assert left(here / "far/points") == left(here / "own/points") != []
 
 
 def test_after_a_stop_no_task_is_left_in_the_cluster(address: str) -> None:
@@ -123,7 +118,7 @@ def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(
 def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done: Found = {}
+    done: dict[int, Any] = {}
     with open_cluster(address, lambda: False, silent) as cluster:
         finish(submit(cluster, invert, [0, 1, 2], stopped=never), done.__setitem__, done.__setitem__)
         assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}

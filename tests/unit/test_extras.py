@@ -17,6 +17,7 @@ from digiclay.commands import run as run_command
 from digiclay.commands.extras import plan_meshes
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session.finished_run import find_row
+from digiclay.core.session.run_scene import RunRecording
 
 from tests.scene_files import left
 
@@ -33,12 +34,12 @@ def plain_relief(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("digiclay.plots.bed.fit_relief", lambda *given: None)
 
 
-def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> None:
-    """Send Ctrl-C when a command comes to a step."""
+def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, number: int = signal.SIGINT) -> None:
+    """Send Ctrl-C, or another signal, when a command comes to a step."""
     step: Callable[..., Any] = getattr(module, name)
 
     def interrupted(*given: Any, **known: Any) -> Any:
-        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(number)
         return step(*given, **known)
 
     monkeypatch.setattr(module, name, interrupted)
@@ -48,9 +49,9 @@ def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> None
 def stopped(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
     """Give a way to stop a command before a step; it returns the commands on stderr by their files."""
 
-    def run(module: Any, name: str, *arguments: str) -> dict[str, list[str]]:
+    def run(module: Any, name: str, *arguments: str, number: int = signal.SIGINT) -> dict[str, list[str]]:
         with monkeypatch.context() as patched:
-            stop_before(patched, module, name)
+            stop_before(patched, module, name, number)
             assert main([*arguments, "--out", OUT]) == 130
         said = capsys.readouterr().err.splitlines()
         pairs = (line.removeprefix("Stopped before ").split("; to have it: ") for line in said)
@@ -111,9 +112,14 @@ def test_a_run_stopped_before_its_errors_are_estimated_says_so(here: Path, stopp
     assert left(here) == [OUT]
 
 
-def test_a_run_stopped_within_its_session_can_be_exported_as_it_says(here: Path, stopped: Any) -> None:
-    commands = stopped(run_command, "run", "run", "my.toml", "--quiet", "--export", "ply")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "as farms stop"])
+def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says(
+    number: int, here: Path, stopped: Any
+) -> None:
+    arguments = ("run", "my.toml", "--quiet", "--export", "ply")
+    commands = stopped(RunRecording, "observe", *arguments, number=number)
     assert list(commands) == ["surface.ply"]
+    assert json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
     assert main(commands["surface.ply"]) == 0
     assert (here / OUT / "surface.ply").is_file()
 

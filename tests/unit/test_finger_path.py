@@ -69,15 +69,6 @@ HISTORY = {
 SUMS = sum_cells(HISTORY)
 
 
-def test_the_sums_are_those_of_the_cells() -> None:
-    # 0.3 N at 1 mm and 0.1 N at 4 mm; 0.3 N at 2 mm and 0.1 N at 6 mm; rounding.
-    assert [SUMS.x[1], SUMS.y[1]] == pytest.approx([0.7e-3, 1.2e-3], rel=1e-12)
-    assert SUMS.height == pytest.approx([0.0, 0.3 * 51e-3 + 0.1 * 53e-3], rel=1e-12)
-    np.testing.assert_array_equal(SUMS.strongest, [0.0, 0.3])
-    np.testing.assert_array_equal(SUMS.following, [0, 1])
-    np.testing.assert_array_equal([SUMS.first, SUMS.last], [[50e-3, 52e-3], [51e-3, 53e-3]])
-
-
 def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
     # 0.3 N at 51 mm and 0.1 N at 53 mm: 51.5 mm, over a finger at 50 mm.
     assert measure_surface_under(SUMS, TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)

@@ -114,16 +114,6 @@ def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
     assert np.array_equal(interpolate_poses(poses, parts), alone)
 
 
-def test_a_path_gives_the_same_states_however_many_periods_are_done_at_a_time() -> None:
-    drag = interpolate_path(pose(z=0.035), pose(0.01, 0.035), 50)
-    poses = np.concatenate([interpolate_path(pose(), pose(z=0.035), 40), drag[1:]])
-    *_, together = simulate_path(SYSTEM, begin(SYSTEM), poses)
-    state = begin(SYSTEM)
-    for first in range(0, 90, 7):
-        *_, state = simulate_path(SYSTEM, state, poses[first : first + 8])
-    assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, together)
-
-
 def test_a_finger_stays_where_a_finger_can_be() -> None:
     (at,) = pose()
     for given, wanted in (
