@@ -263,18 +263,3 @@ def test_every_picture_is_shown_and_has_a_row_of_the_table() -> None:
     shown = {(page.parent / target).resolve() for page, target in targets}
     assert sorted(_pictures()) == sorted(path.name for path in shown)
     assert sorted(set((ROOT / "docs" / "pictures").iterdir()) - shown) == []
-
-
-def test_what_makes_a_picture_exists() -> None:
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for name, cell in _pictures().items():
-        command = next(iter(re.findall(r"`([^`]+)`", cell)), "")
-        if command.startswith("python tools/"):
-            source = (ROOT / command.split()[1]).read_text(encoding="utf-8")
-            assert f'"{name}"' in source, command
-        elif command.startswith("make "):
-            assert f"\n{command.removeprefix('make ')}:" in makefile
-        elif not command:  # a page has the command
-            assert re.search(r"\]\(docs/\w+\.md#|same section", cell), name
-        else:  # tests.form.test_pages.py checks the arguments
-            assert command.startswith(("python -m benchmarks ", "digiclay "))

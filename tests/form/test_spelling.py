@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 
-import pytest
-
 from tests.form.test_architecture import ROOT, tracked
 
 BRITISH = re.compile(
@@ -45,19 +43,6 @@ def test_no_word_is_spelled_the_british_way() -> None:
     ]
     found = {str(path.relative_to(ROOT)): british_words(path.read_text(encoding="utf-8")) for path in files}
     assert {name: words for name, words in found.items() if words} == {}
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("Mode Colours", ["Colour"]),
-        ("the centred neighbours", ["centre", "neighbour"]),
-        ("quantised, otherwise a rise in noise", ["quantised"]),
-        ('{"colour": "color"}', []),
-    ],
-)
-def test_the_check_finds_british_words_and_them_alone(text: str, found: list[str]) -> None:
-    assert british_words(text) == found
 
 
 def test_no_module_has_the_name_of_its_package_or_of_another_module() -> None:

@@ -13,26 +13,18 @@ from digiclay import translations
 
 ROOT = Path(digiclay.__file__).parent
 FOLDERS = ("operators", "panels", "press", "overlay", "live")
-#: Its texts are of the parameters in files of strokes, which are English like scene files.
-DATA = {ROOT / "live" / "recorded_strokes.py"}
 WORD = re.compile(r"[A-Za-z]{3,}")
 #: Beginnings of what is no language: names of Blender, lines of a preset, features as files name them.
 NAMES = (
     "3D View", "Object Mode", "Error: ", "wm = ", "settings", "DIGICLAY_PT_part_", "use_",
     "session:", "shape:", ", crest ", "    {} mm²", "Lengths in ",
 )  # fmt: skip
-#: Properties that Blender does not show.
-HIDDEN = (
-    "Exclude beds without a session, so that the key cannot reset them by accident",
-    "Only While It Runs",
-    "Length, width and height of the fingertip that the Press tool is about, in mm",
-)
 
 
 def source() -> Iterator[tuple[str, ast.Module]]:
     """Yield what users see, file by file."""
     for folder in FOLDERS:
-        for path in sorted({*(ROOT / folder).glob("*.py")} - DATA):
+        for path in sorted((ROOT / folder).glob("*.py")):
             yield f"{folder}/{path.name}", ast.parse(path.read_text(encoding="utf-8"))
 
 
@@ -40,11 +32,6 @@ def inner(tree: ast.AST, *kinds: type[ast.AST]) -> set[int]:
     """Return the identities of all nodes inside nodes of some kinds."""
     found = (node for node in ast.walk(tree) if isinstance(node, kinds))
     return {id(one) for node in found for one in ast.walk(node)}
-
-
-def docstrings(tree: ast.AST) -> set[int]:
-    """Return the identities of docstrings."""
-    return {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
 
 
 def join(node: ast.JoinedStr) -> str:
