@@ -178,9 +178,7 @@ def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Pa
         ("late worker", "A worker of {} lacks digiclay. What is done is kept"),
     ],
 )
-def test_a_place_without_digiclay_is_named_in_one_line(
-    place: str, line: str, here: Path, start: Start
-) -> None:
+def test_a_place_without_digiclay_is_named_in_one_line(place, line, here, start):
     bare = {"addon": LIBRARIES, "bare": True}
     _, address = start_scheduler(start, here, **(bare if place == "scheduler" else {}))
     start_worker(start, address, "--no-nanny", **(bare if place == "worker" else {}))

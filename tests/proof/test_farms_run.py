@@ -34,9 +34,7 @@ def openjd(*arguments: str | Path) -> str:
     return told(sys.executable, "-m", "openjd", *arguments)
 
 
-def test_openjd_checks_a_template_and_runs_its_steps_in_order(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("my film.toml").write_text(JOBS, encoding="utf-8")
     out = tmp_path / "das Büro's Laufwerk"

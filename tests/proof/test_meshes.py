@@ -76,9 +76,7 @@ def test_admesh_does_find_a_fault(meshes: Path, tmp_path: Path, harm: str) -> No
 
 @pytest.mark.parametrize("ending", FORMATS)
 @pytest.mark.parametrize("stem", ["surface", "skin", "pins", "features"])
-def test_assimp_reads_every_triangle_and_each_feature_as_a_mesh_of_its_own(
-    meshes: Path, stem: str, ending: str
-) -> None:
+def test_assimp_reads_every_triangle_and_each_feature_as_a_mesh_of_its_own(meshes, stem, ending):
     found = read(meshes / "bilinear" / f"{stem}.{ending}")
     assert int(found["Faces"]) == len(trimesh.load_mesh(meshes / "bilinear" / f"{stem}.stl").faces)
     if stem == "features" and ending not in ("stl", "ply"):  # formats of one mesh

@@ -78,9 +78,7 @@ def test_the_data_of_the_surfaces_are_the_final_heights(folder: Path, numbers: d
         assert len(heights) == 625
 
 
-def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_rim(
-    numbers: dict[str, Any],
-) -> None:
+def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_rim(numbers):
     known = numbers["sections"]
     assert [name for name, one in known["virtual_master"].items() if not one["meets"]] == []
     mound = known["cell_states"]["along ridge and mound"]
@@ -110,9 +108,7 @@ def test_method_two_deviates_more_than_method_one(numbers: dict[str, Any]) -> No
     assert {name: ratio for name, ratio in ratios.items() if not ratio > 1.5} == {}
 
 
-def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_much(
-    numbers: dict[str, Any],
-) -> None:
+def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_much(numbers):
     # RFD, total force, height. Both windows together: the level of Method II differs between them.
     known = numbers["windows_of_the_paper"]
     for window, ratios in (("both", (4.5, 8.5, 5.5)), ("valley alone", (4.3, 1.5, 1.4))):
@@ -120,9 +116,7 @@ def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_muc
         assert np.array(two) / one == pytest.approx(ratios, abs=0.1)  # two digits are claimed
 
 
-def test_an_older_folder_is_kept_unless_it_may_be_replaced(
-    folder: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_an_older_folder_is_kept_unless_it_may_be_replaced(folder, capfd):
     before = (folder / "paper.md").stat().st_mtime_ns
     assert main(["paper", "--quick", "--out", str(folder)]) == 2
     assert "--overwrite" in capfd.readouterr().err

@@ -114,8 +114,3 @@ def test_no_run_of_the_grid_is_beyond_the_front(scene: Path, grid: Floats, tmp_p
     trials = read_values(tmp_path / "out" / "points.csv")[1:]
     off = np.array([np.min(np.max((one - front) / extent, axis=1)) for one in trials]).reshape(5, 24)
     assert np.median(off[-1]) < np.median(off[0]) / 3.0
-
-
-def test_the_hypervolume_of_a_known_front_is_its_area() -> None:
-    front = np.array([[1.0, 3.0], [2.0, 1.0]])
-    assert measure_hypervolume(front, np.array([4.0, 4.0])) == pytest.approx(3.0 * 1.0 + 2.0 * 2.0)

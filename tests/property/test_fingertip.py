@@ -93,9 +93,7 @@ def pose(spot: tuple[float, ...], turn: tuple[float, ...]) -> Floats:
 
 
 @given(fingers, spots, turns, peaks, st.floats(0.0, 6.3), st.floats(1.0, 3.0))
-def test_beyond_its_reach_the_underside_is_above_the_peak(
-    finger: Fingertip, spot: Spot, turn: tuple[float, ...], peak: float, angle: float, farther: float
-) -> None:
+def test_beyond_its_reach_the_underside_is_above_the_peak(finger, spot, turn, peak, angle, farther):
     outline = finger.outline(pose(spot, turn)[None])
     disc = compute_reach((0.0, 0.0, 0.0, *compute_reaches(outline)[0].tolist()), peak)
     radius = (disc[2] if disc else 0.0) * farther + 1e-9
@@ -105,9 +103,7 @@ def test_beyond_its_reach_the_underside_is_above_the_peak(
 
 
 @given(fingers, spots, turns, st.floats(0.0, 6.3), st.floats(0.0, 0.1))
-def test_no_point_of_the_underside_is_below_the_position(
-    finger: Fingertip, spot: tuple[float, ...], turn: tuple[float, ...], angle: float, radius: float
-) -> None:
+def test_no_point_of_the_underside_is_below_the_position(finger, spot, turn, angle, radius):
     outline = finger.outline(pose(spot, turn)[None])
     # A disc-like finger tilted so far that it stands on its rim: there the paraboloid has taken over.
     dx, dy = spot[0] - outline[0, 0], spot[1] - outline[0, 1]
@@ -118,9 +114,7 @@ def test_no_point_of_the_underside_is_below_the_position(
 
 
 @given(fingers, spots, turns, spots, spots)
-def test_the_window_has_every_cell_the_finger_could_touch_within_a_period(
-    finger: Fingertip, start: Spot, turn: tuple[float, ...], middle: Spot, end: Spot
-) -> None:
+def test_the_window_has_every_cell_the_finger_could_touch_within_a_period(finger, start, turn, middle, end):
     poses = np.array([pose(spot, turn) for spot in (start, middle, end)])
     outline, peak = finger.outline(poses), 40e-3
     disc = compute_reach(trace_finger(finger, poses[None]).at(0).window, peak)

@@ -134,9 +134,7 @@ def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
 
 @settings(max_examples=2)
 @given(jumps, turns, st.sampled_from(PERIODS))
-def test_the_adaptive_stepper_withstands_jumps(
-    spots: list[Spot], turn: tuple[float, ...], period: float
-) -> None:
+def test_the_adaptive_stepper_withstands_jumps(spots, turn, period):
     assert_withstands(Layout(3, 3), spots, turn, period, "adaptive")
 
 
@@ -191,9 +189,7 @@ above = st.tuples(st.sampled_from([1, 5, 20, 50]), far, far, st.integers(1, 20).
 @settings(max_examples=12)
 @given(st.lists(above, min_size=2, max_size=4), st.sampled_from(PERIODS), STEPPERS)
 @example([(5, 0.0, 0.0, 6.0), (5, -30.0, 0.0, 4.0)], 5e-3, "bernoulli")
-def test_a_finger_that_passes_above_all_pins_leaves_nothing_behind(
-    spots: list[Spot], period: float, stepper: str
-) -> None:
+def test_a_finger_that_passes_above_all_pins_leaves_nothing_behind(spots, period, stepper):
     system = make_system(Layout(9, 9), stepper=stepper, period=period, step=period)
     run = jumped(system, way(spots))
     untouched = record(system, path((0.0, 0.0, 0.0, 500.0)), 1).rows[0]

@@ -35,9 +35,7 @@ def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, i
     ("arrangement", "corners", "farthest"),
     [("aligned", True, 1.5), ("aligned", False, 1.1), ("staggered", True, 1.2), ("hexagonal", False, 1.1)],
 )
-def test_neighbors_are_the_nearest_cells_counter_clockwise(
-    arrangement: str, corners: bool, farthest: float
-) -> None:
+def test_neighbors_are_the_nearest_cells_counter_clockwise(arrangement, corners, farthest):
     layout = Layout(5, 6, 3e-3, arrangement)
     x, y = make_grid(layout).positions.T
     for cell, beside in enumerate(layout.find_neighbors(corners=corners)):
@@ -79,9 +77,7 @@ places = st.floats(-40e-3, 40e-3)
 
 
 @given(layouts, places, places, st.floats(0.0, 40e-3))
-def test_a_disc_has_all_cells_within_its_radius_and_bounds_hold_it_closely(
-    layout: Layout, x: float, y: float, radius: float
-) -> None:
+def test_a_disc_has_all_cells_within_its_radius_and_bounds_hold_it_closely(layout, x, y, radius):
     bed = make_grid(layout)
     # On the rim itself rounding may decide either way; a disc widened by 1e-9 has those too.
     distance = np.hypot(bed.x - x, bed.y - y)
@@ -101,9 +97,7 @@ def test_a_disc_has_all_cells_within_its_radius_and_bounds_hold_it_closely(
 
 
 @given(layouts)
-def test_no_two_cells_are_closer_than_a_pitch_and_the_basis_has_the_powers_of_their_positions(
-    layout: Layout,
-) -> None:
+def test_no_two_cells_are_closer_than_a_pitch_and_the_basis_has_the_powers_of_their_positions(layout):
     bed = make_grid(layout)
     gaps = np.hypot(bed.x - bed.x[:, None], bed.y - bed.y[:, None])
     np.fill_diagonal(gaps, 1.0)

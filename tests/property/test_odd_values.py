@@ -58,9 +58,7 @@ def test_a_number_beyond_all_devices_is_refused_with_its_bound(key: str, value: 
         ("", "must increase from waypoint to waypoint by at least 1e-09 s"),
     ],
 )  # fmt: skip
-def test_steps_whose_plan_would_fill_the_memory_and_waypoints_at_one_time_are_refused(
-    settings: str, said: str
-) -> None:
+def test_steps_whose_plan_would_fill_the_memory_and_waypoints_at_one_time_are_refused(settings, said):
     points = [{"time": time, "position": [0, 0, 0.046]} for time in (0.0, 5e-324, 1.0)]
     stepper, _, step = settings.partition(" ")
     simulation = {"simulation": {"stepper": stepper, "physics_step": float(step or 1.0)}}

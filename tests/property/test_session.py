@@ -70,9 +70,7 @@ def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are
 
 @settings(max_examples=5)
 @given(points, st.integers(0, COUNT - 1))
-def test_a_step_leaves_the_state_it_was_given_as_it_was(
-    spots: list[tuple[float, float, float]], when: int
-) -> None:
+def test_a_step_leaves_the_state_it_was_given_as_it_was(spots, when):
     system, path = bed(control=VirtualMaster()), finger(spots)
     state = record(system, path, when).last if when else begin(system)
     kept = state.copy()
@@ -87,9 +85,7 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was(
 
 @settings(max_examples=5)
 @given(points, st.integers(1, COUNT - 1))
-def test_a_session_twice_or_interrupted_is_the_same_session_bit_for_bit(
-    spots: list[tuple[float, float, float]], when: int
-) -> None:
+def test_a_session_twice_or_interrupted_is_the_same_session_bit_for_bit(spots, when):
     system, path = bed(control=VirtualMaster()), finger(spots)
     whole, first = record(system, path, COUNT), record(system, path, when)
     assert np.array_equal(first.rows, whole.rows[: when + 1])  # the same twice, bit for bit

@@ -54,9 +54,7 @@ class Everywhere:
     (-0.2, -1.5, 34.1), (-3.0, -7.9, 49.0), (2.1, 3.0, 45.1), (-3.3, 9.6, 40.6), (-1.3, -5.4, 37.7),
     (-9.1, 12.0, 54.9), (-10.0, 2.3, 49.7),
 ])  # fmt: skip
-def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(
-    spots: list[tuple[float, float, float]],
-) -> None:
+def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(spots):
     trajectory = make_level(np.linspace(0.0, COUNT * BED.period, len(spots)), np.array(spots) * 1e-3)
     fewer = record(BED, trajectory, COUNT)
     all_cells = record(replace(BED, controller=Everywhere(BED.controller)), trajectory, COUNT)
@@ -76,9 +74,7 @@ def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(
         (25, [(0, 0, 0, 45), (0.3, 0, 0, 36)], 60, 21, 15 * 15),
     ],
 )
-def test_only_cells_around_a_touch_are_integrated_until_the_surface_is_at_rest(
-    side: int, way: list[tuple[float, ...]], count: int, least: int, most: int
-) -> None:
+def test_only_cells_around_a_touch_are_integrated_until_the_surface_is_at_rest(side, way, count, least, most):
     run = record(make_system(Layout(side, side), control=VirtualMaster()), path(*way), count)
     assert np.any(run.height[-1] != 40e-3) == (count > 20)
     assert least <= run.last.active.cells.size <= most

@@ -36,9 +36,7 @@ def measure_steps(grid: Grid, height: Floats) -> float:
 
 
 @given(layouts, orders, st.integers(0, 2**32 - 1))
-def test_smoothed_heights_keep_sum_range_and_what_is_outside_and_are_never_rougher(
-    layout: Layout, order: tuple[float, float, float, float], seed: int
-) -> None:
+def test_smoothed_heights_keep_sum_range_and_what_is_outside_and_are_never_rougher(layout, order, seed):
     grid = make_grid(layout)
     height = np.random.default_rng(seed).uniform(0.0, STROKE, grid.count)
     cells, none = np.arange(grid.count), np.zeros(grid.count)

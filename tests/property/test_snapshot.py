@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from digiclay.core.base.errors import StateError
-from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
-from digiclay.core.engine.state import State
-from digiclay.core.model.trajectory import interpolate_poses
+from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
@@ -18,13 +16,6 @@ from tests.assemble import path
 SYSTEM = assemble(resolve({"layout": {"rows": 6, "columns": 10}}))
 *_, LAST = periods(SYSTEM, [path((0, 0, 0, 42), (0.2, 0, 0, 37))], begin(SYSTEM), 50)
 KEPT = snapshot.dump(SYSTEM, LAST)
-FINGER = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1, 1))
-
-
-def goes_on(state: State) -> bool:
-    """Tell whether a state can be simulated and kept again."""
-    (finger,) = trace_fingers(SYSTEM, interpolate_poses(FINGER, SYSTEM.instants / SYSTEM.period))
-    return bool(snapshot.dump(SYSTEM, advance(SYSTEM, state, finger)))
 
 
 def refusals(data: bytes) -> list[str]:
@@ -60,16 +51,3 @@ def test_bytes_that_are_cut_or_added_are_noticed(at: int, some: bytes) -> None:
     assert all(refusals(KEPT[:at])) == (at < len(KEPT))
     assert all(refusals(some))
     assert all(refusals(KEPT[:17] + some))
-
-
-@settings(max_examples=10)
-@given(st.lists(st.tuples(st.integers(-100, 100), st.integers(340, 480)), min_size=2, max_size=5))
-def test_a_state_anywhere_in_a_session_is_taken_up_exactly(spots: list[tuple[int, int]]) -> None:
-    times = np.linspace(0.0, 0.4, len(spots))
-    way = path(*[(t, x / 10, 0, z / 10) for t, (x, z) in zip(times, spots, strict=True)])
-    for state in periods(SYSTEM, [way], begin(SYSTEM), 80):
-        if state.period % 20 == 0:
-            data = snapshot.dump(SYSTEM, state)
-            again = snapshot.load(SYSTEM, data)
-            assert snapshot.dump(SYSTEM, again) == data
-            assert goes_on(again)

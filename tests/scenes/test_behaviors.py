@@ -273,15 +273,6 @@ def test_no_random_session_leaves_a_cell_in_a_mode_for_ever(method: str) -> None
     assert (stuck, touched >= 2) == ({}, True)
 
 
-@pytest.mark.parametrize("method", TOUCHING)
-def test_noisy_sensors_touch_no_cell(method: str) -> None:
-    # A fifth of the force that is felt, and half the dead band.
-    result = run(scene(method, sensors={"force_noise": 1e-3, "height_noise": 5e-6}))
-    assert set(result.history["mode"][-1].tolist()) <= RESTING
-    # 30 µm: the dead band, and four standard deviations of the height when it was left alone.
-    assert heights(result)[-1].max() <= REST + 30e-6
-
-
 @pytest.mark.parametrize("name", SESSIONS)
 def test_each_sample_session_runs_and_comes_to_rest(name: str) -> None:
     made = load(find(name))

@@ -52,9 +52,7 @@ def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method: str, arrangement
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_finger_that_leaves_at_once_leaves_the_clay_where_it_was_and_is_counted_as_lost(
-    method: str,
-) -> None:
+def test_a_finger_that_leaves_at_once_leaves_the_clay_where_it_was_and_is_counted_as_lost(method):
     last = lasting(followed(method, [*LIFT, (3.3, 0, 0, 90), (4.4, 0, 0, 90)]))
     # Pins stood 1.5 mm into the finger; they follow it for some 30 ms, then rise for the loss time of
     # 50 ms, at 24 mm/s at the most: 3.5 mm above the finger's last place, and 1 mm for the servo's lag.

@@ -254,9 +254,7 @@ def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base: type, name
         (1, "def exponent", "def stiffening", "got Pad without exponent"),
     ],
 )
-def test_a_law_that_lacks_what_a_law_has_is_refused_in_a_line(
-    copy: Path, number: int, old: str, new: str, said: str
-) -> None:
+def test_a_law_that_lacks_what_a_law_has_is_refused_in_a_line(copy, number, old, new, said):
     *place, text = PARTS[number]
     add_part(copy, *place, text.replace(old, new))
     make = "from digiclay.core.scene.toml_table import resolve; from digiclay.core.base.errors import *\n"

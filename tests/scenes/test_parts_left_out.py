@@ -50,8 +50,6 @@ def imported(*settings: str) -> set[str]:
         (("sensors.delay=1",), ("sensors.observer=valve",), {"model.observer"}),
     ],
 )  # fmt: skip
-def test_what_a_scene_does_without_is_not_imported(
-    without: tuple[str, ...], with_: tuple[str, ...], modules: set[str]
-) -> None:
+def test_what_a_scene_does_without_is_not_imported(without, with_, modules):
     assert imported(*with_) & modules == modules, "the check could not fail"
     assert imported(*without) & modules == set()

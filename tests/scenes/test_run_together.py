@@ -138,9 +138,7 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
         pytest.param({"simulation.control_period": ("4e-3", "5e-3")}, id="period"),
     ],
 )  # fmt: skip
-def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
-    changes: dict[str, Sequence[str]],
-) -> None:
+def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(changes):
     settings = [[f"{key}={value}" for value in values] for key, values in changes.items()]
     scenes = [sample("tap", "simulation.duration=0.3", *one) for one in zip(*settings, strict=True)]
     assert_all_as_alone(scenes, errors=True)
@@ -160,9 +158,7 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
         ("tap", {"force_gain": (3, 5)}, ("duration=5e-3",), False),  # a single period
     ],
 )  # fmt: skip
-def test_behaviors_and_steppers_do_what_they_do_alone(
-    name: str, keys: dict[str, Sequence[float]], settings: Sequence[str], *, errors: bool
-) -> None:
+def test_behaviors_and_steppers_do_what_they_do_alone(name, keys, settings, *, errors):
     own = ([f"control.{key}={values[run]}" for key, values in keys.items()] for run in (0, 1))
     simulated = [f"simulation.{one}" for one in settings]
     assert_all_as_alone([sample(name, *simulated, *one) for one in own], judge=True, errors=errors)
@@ -178,9 +174,7 @@ def test_behaviors_and_steppers_do_what_they_do_alone(
         ("tap", "actuator.rest_height", (0.01, 0.02), ("simulation.duration=0.1",)),  # nothing is touched
     ],
 )  # fmt: skip
-def test_what_is_recorded_and_judged_of_a_run_is_that_of_the_run_alone(
-    name: str, key: str, values: Sequence[float], settings: Sequence[str]
-) -> None:
+def test_what_is_recorded_and_judged_of_a_run_is_that_of_the_run_alone(name, key, values, settings):
     pace = 0.3 if name == "plastic_press" else 1.0
     known = (sample(name, *settings, f"{key}={value}") for value in values)
     assert_all_as_alone([moved(one, 0.0, 0.0, pace=pace) for one in known], judge=True)
@@ -219,9 +213,7 @@ def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
     ],
     ids=["without a finger or a controller", "from a shape"],
 )
-def test_a_bed_that_stands_still_or_shapes_itself_does_so_as_alone(
-    name: str, settings: Sequence[str], lasting: float
-) -> None:
+def test_a_bed_that_stands_still_or_shapes_itself_does_so_as_alone(name, settings, lasting):
     known = sample(name, *settings)
     assert_all_as_alone([moved(known, 0.7e-3 * i, -0.5e-3 * i, lasting, 0.5) for i in range(2)])
 
@@ -261,9 +253,7 @@ def test_a_stack_without_recorder_has_no_history_shares_its_time_and_can_be_stop
 
 
 @pytest.mark.parametrize(("every", "errors"), [(1, False), (2, True)], ids=["not asked for", "no commands"])
-def test_without_all_commands_or_unasked_a_run_is_judged_without_errors_or_history(
-    every: int, errors: bool
-) -> None:
+def test_without_all_commands_or_unasked_a_run_is_judged_without_errors_or_history(every, errors):
     (only,) = judged([sample("tap", f"recorder.every={every}", "simulation.duration=0.05")], errors=errors)
     assert only.history == {}
     assert "height_error" not in only.metrics
@@ -317,9 +307,7 @@ def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method: st
         ("elastic", ("observer=valve", "height_step=1e-6"), False),
     ],
 )
-def test_readings_that_are_rounded_late_or_estimated_are_those_of_the_run_alone(
-    method: str, sensors: Sequence[str], *, noise: bool
-) -> None:
+def test_readings_that_are_rounded_late_or_estimated_are_those_of_the_run_alone(method, sensors, *, noise):
     settings = [f"control.method={method}", *(f"sensors.{one}" for one in sensors)]
     known = noisy("slow_press", *settings) if noise else [sample("slow_press", *settings)] * 3
     assert_all_as_alone([moved(one, 0.7e-3 * i, -1e-3 * i, 0.25, 0.3) for i, one in enumerate(known)])

@@ -87,9 +87,7 @@ def is_well(door: socket.socket, number: int) -> None:
     assert state[1] == number
 
 
-def test_the_examples_of_the_page_run(
-    server: Server, door: socket.socket, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_examples_of_the_page_run(server, door, monkeypatch, capsys):
     page = (Path(__file__).parents[2] / "docs" / "serve.md").read_text(encoding="utf-8")
     by_websocket, by_osc = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     monkeypatch.chdir(server.report.parent)

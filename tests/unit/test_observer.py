@@ -127,9 +127,7 @@ def test_the_force_is_found_where_the_flow_is_turbulent() -> None:
     # The simulation averages the flow over 1 ms steps, the observer over the period: 18 µN between them.
     [({}, 5e-5), ({"height_noise": 1e-6}, 0.0), ({"height_step": 5e-6}, 0.0)],
 )
-def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(
-    inexact: dict[str, float], most: float
-) -> None:
+def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(inexact, most):
     sensors = {"observer": "valve", **inexact}
     assert watched(scene(AWAY, sensors=sensors), down_and_up)[1].max() <= most
     read = watched(scene(sensors=sensors), down_and_up)[1]
@@ -183,9 +181,7 @@ def test_noise_of_the_heights_is_noise_of_two_readings() -> None:
 
 
 @pytest.mark.parametrize("gap", [(13,), (13, 14, 15, 16, 17)])
-def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_had(
-    gap: Sequence[int],
-) -> None:
+def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_had(gap):
     sensors = assemble(scene(sensors={"observer": "valve", "height_noise": 1e-6, "delay": 2})).sensors
     # Ten periods are 25 time constants of the valve: less than 1e-9 open, it counts as shut.
     command, results = [0.0, 0.5, 0.5, *[0.0] * 15, -0.5, -0.5, -0.5, 0.0, 0.0], []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -242,9 +241,7 @@ def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns: list[Co
 
 
 @pytest.mark.usefixtures("here")
-def test_a_sweep_over_two_axes_leaves_pictures_and_over_three_a_table_only(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_over_two_axes_leaves_pictures_and_over_three_a_table_only(here, capsys):
     sweep = ["sweep", "slow_press", "--set", "simulation.duration=0.1", "--metric", "rfd,highest"]
     two = ["--vary", "valve_lag.time_constant=1 ms,2 ms", "--vary", "delay.dead_time=0,0.001"]
     assert main([*sweep, *two, "--out", "out", "--quiet"]) == 0

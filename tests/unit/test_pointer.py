@@ -57,9 +57,7 @@ TURNED = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
         ((0.0, 0.0), ABOVE, (0.0, 0.0)),
     ],
 )
-def test_a_pen_leans_over_the_bed_as_over_the_tablet(
-    tilt: tuple[float, float], seen: np.ndarray, lean: tuple[float, float]
-) -> None:
+def test_a_pen_leans_over_the_bed_as_over_the_tablet(tilt, seen, lean):
     assert find_lean(tilt, seen) == pytest.approx((FULL_TILT * lean[0], FULL_TILT * lean[1]))
 
 

@@ -11,15 +11,10 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.quantity import Parameters, find_nearest_name, parse, quantity
-from digiclay.core.model.actuator import Supply
-from digiclay.core.model.contact import Contact
-from digiclay.core.model.delay import Delay
-from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.model.sensors import Sensing
 from digiclay.core.model.trajectory import Trajectory
-from digiclay.core.model.valve import Valve
 
 
 @dataclass(frozen=True)
@@ -43,9 +38,7 @@ class Lever(Parameters):
         ({"notches": [0, 0.5]}, "notches", tuple, (0.0, 0.5)),
     ],
 )
-def test_a_valid_value_has_the_type_of_its_default(
-    given: dict[str, Any], field: str, kind: type, value: object
-) -> None:
+def test_a_valid_value_has_the_type_of_its_default(given, field, kind, value):
     found = getattr(Lever(**given), field)
     assert (type(found), found) == (kind, value)
 
@@ -72,9 +65,7 @@ def test_a_valid_value_has_the_type_of_its_default(
         ({"notches": (0.1, "x")}, "Lever.notches must be a number (got 'x')."),
     ],
 )
-def test_a_broken_rule_is_one_line_with_owner_field_rule_and_value(
-    given: dict[str, object], line: str
-) -> None:
+def test_a_broken_rule_is_one_line_with_owner_field_rule_and_value(given, line):
     with pytest.raises(ParameterError) as caught:
         Lever(**given)
     assert str(caught.value) == line
@@ -123,12 +114,7 @@ def path(times: Any, positions: Any = None) -> Trajectory:
 @pytest.mark.parametrize(
     ("part", "given", "said"),
     [
-        (Fingertip, {"width": 0.0}, "width must be above 0 m (got 0 m)."),
         (Layout, {"rows": 10_000, "columns": 10_000}, "rows * columns must have at most 20 million"),
-        (Contact, {"exponent": 0.0}, "exponent must be above 0 1/m (got 0 1/m)."),
-        (Delay, {"dead_time": -1e-3}, "dead_time must be at least 0 s (got -0.001 s)."),
-        (Valve, {"gap": "slit"}, "gap must be one of stroke, opening (got 'slit')."),
-        (Supply, {"high": -5e4}, "high must be above Supply.low (got -50000 Pa"),
         (Relaxation, {"weights": (0.0,) * 4}, "weights must not all be 0"),
         (Relaxation, {"times": (0.0, 0.07, 1.4)}, "times must be at least 1e-09 s (got 0 s)."),
         (Relaxation, {"weights": (1.0,)}, "weights must have one value more than times, 4 (got 1)."),
@@ -137,7 +123,6 @@ def path(times: Any, positions: Any = None) -> Trajectory:
         (Sensing, {"observer": "valve", "force_noise": 1e-3}, "force_noise must be 0 N with observer"),
         (Sensing, {"observer": "valve", "force_step": 1e-3}, "force_step must be 0 N with observer"),
         (Sensing, {"height_step": 1e-15}, "height_step must be 0 m, or at least 1e-12 m (got 1e-15 m)."),
-        (path, {"times": [0.0, 1.0, 1.0]}, "times must increase from waypoint to waypoint (got "),
         (path, {"times": [0.0, 1.0, 1.0 + 1e-12]}, "times must increase from waypoint to waypoint by"),
         (
             path, {"times": [0.0, 1.0], "positions": [[0, 0, 0], [0, np.nan, 0]]},

@@ -61,9 +61,7 @@ def ridge() -> Running:
         return form(begin(), ALONG, Brush.RAISE)
 
 
-def test_a_line_is_raised_by_15_mm_with_the_section_of_the_blister_and_no_harder_than_a_press(
-    ridge: Running,
-) -> None:
+def test_a_line_is_raised_by_15_mm_with_the_section_of_the_blister_and_no_harder_than_a_press(ridge):
     np.testing.assert_allclose(along(ridge), 15.0, rtol=0, atol=1.0)
     assert ridge.trace.force.max() < 2.0
     blister = ridge.scene.blister

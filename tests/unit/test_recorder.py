@@ -67,9 +67,7 @@ def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, lis
         ((3, 9, 4), "command", [301.0, 304.0, 0.0]),
     ],
 )
-def test_a_row_is_the_state_at_its_time_and_what_was_commanded_from_then_on(
-    session: tuple[int, ...], name: str, wanted: list[float]
-) -> None:
+def test_a_row_is_the_state_at_its_time_and_what_was_commanded_from_then_on(session, name, wanted):
     assert recorded(*session)[name] == wanted
 
 

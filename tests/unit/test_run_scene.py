@@ -108,9 +108,7 @@ def fill(folder: Path, word: str) -> None:
     (folder / MARK).write_text(word, encoding="utf-8")
 
 
-def test_a_folder_appears_with_all_that_was_written_and_not_before_nor_after_a_failure(
-    tmp_path: Path,
-) -> None:
+def test_a_folder_appears_with_all_that_was_written_and_not_before_nor_after_a_failure(tmp_path):
     with pytest.raises(ZeroDivisionError), write_folder(tmp_path / "a" / "b", overwrite=False) as staged:
         raise ZeroDivisionError((staged / "x").touch())
     assert list(tmp_path.iterdir()) == []
@@ -146,9 +144,7 @@ def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tm
         ("file", "file/run", False, "cannot be made"),
     ],
 )
-def test_a_folder_that_could_not_be_used_is_refused_before_any_work(
-    tmp_path: Path, there: str, out: str, overwrite: bool, message: str
-) -> None:
+def test_a_folder_that_could_not_be_used_is_refused_before_any_work(tmp_path, there, out, overwrite, message):
     (tmp_path / there).parent.mkdir(exist_ok=True)
     (tmp_path / there).touch()
     with pytest.raises(OutputError, match=message):

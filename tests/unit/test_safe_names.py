@@ -76,9 +76,7 @@ def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts: list[str]) 
         ("...toml", "scene"),
     ],
 )
-def test_a_scene_has_the_name_of_its_file_or_of_its_real_folder(
-    path: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scene_has_the_name_of_its_file_or_of_its_real_folder(path, name, tmp_path, monkeypatch):
     folder = tmp_path / "above" / "here"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
@@ -88,9 +86,7 @@ def test_a_scene_has_the_name_of_its_file_or_of_its_real_folder(
 ODD = ["../scene.toml", "..", ".", "scene.toml", "my.toml", "ü b .toml", "con.toml", "-x.toml", "MY.toml"]
 
 
-def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsys):
     for name in ("scene.toml", "ü b .toml", "con.toml", "-x.toml", "MY.toml", "x" * 200 + ".toml"):
         Path(name).write_text(SCENE, encoding="utf-8")
     absolute = str(here.parent / "scene.toml")
@@ -138,9 +134,7 @@ def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(folder: str, here
     assert list((here / "away").iterdir()) == []
 
 
-def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(
-    here: Path, refused: Any
-) -> None:
+def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(here, refused):
     sweep = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
     (here / "away").mkdir()
     (here / "o").symlink_to(here / "away")

@@ -11,7 +11,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
-from digiclay.sessions import running, sculpting
+from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 
 from tests.hand import SCENE, SIZES, Hand, heights, pose, started
@@ -52,15 +52,6 @@ def test_rewinding_takes_back_one_gesture_after_the_other() -> None:
     assert np.array_equal(heights(back), rest)
     assert sculpting.rewind(back) is back
     assert len(hand.press(back).gestures) == 1  # it goes on
-
-
-def test_a_finger_that_moves_on_after_a_rest_makes_another_gesture() -> None:
-    hand, session = Hand(), started()
-    session = hand.move(session, [(0.0, z) for z in np.linspace(46, 38, 20)])
-    assert len(session.gestures) == 1
-    session = hand.move(session, [(0.0, 38.0)] * 30 + [(x, 38.0) for x in np.linspace(0, 5, 10)])
-    assert len(session.gestures) == 2
-    assert len(hand.move(session, [(5.0, 38.0)] * 30).gestures) == 2
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-6])
@@ -178,20 +169,6 @@ class Bed:
         self.session_uid = uid
 
 
-def test_a_session_is_found_by_its_bed_until_it_is_dropped() -> None:
-    session = started()
-    running.put(session)
-    try:
-        assert running.find(Bed(7)) is session
-        assert running.list_sessions() == (session,)
-        assert running.find(Bed(8)) is None
-        assert running.find(None) is None
-    finally:
-        assert running.drop(7) is session
-    assert running.list_sessions() == ()
-    assert running.drop(7) is None
-
-
 def plays(session: Running) -> bool:
     """Return whether the recording of a session gives its state again bit for bit."""
     keep = session.recording
@@ -237,18 +214,13 @@ def test_a_long_recording_copies_itself_seldom() -> None:
     assert len(arrays) < 12
 
 
-def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:
+def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is_rewound() -> None:
     hand = Hand()
-    session = hand.press(started())
-    (gesture,) = session.gestures
-    session = hand.press(sculpting.set_recording(session, True), 6.0)
-    assert sculpting.restore_gesture(session, gesture).recording is None
-
-
-def test_a_recording_ends_with_a_reset_that_is_rewound() -> None:
+    begun = hand.press(started())
+    session = hand.press(sculpting.set_recording(begun, True), 6.0)
+    assert sculpting.restore_gesture(session, *begun.gestures).recording is None
     # Periods are counted anew from a reset on: those before it are not the recording's.
-    hand = Hand()
-    session = sculpting.set_recording(sculpting.reset(hand.press(started())), True)
+    session = sculpting.set_recording(sculpting.reset(begun), True)
     session = hand.press(hand.press(session), 6.0)
     for _ in range(3):
         session = sculpting.rewind(session)

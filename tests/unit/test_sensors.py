@@ -129,9 +129,7 @@ def test_readings_are_late_by_whole_periods_and_begin_with_that_of_the_start(lat
 
 @pytest.mark.parametrize("late", [1, 3])
 @pytest.mark.parametrize("gap", [(6,), (6, 7), (6, 7, 8), (6, 7, 8, 9, 10, 11, 12), (1, 2), (1, 6, 9)])
-def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(
-    late: int, gap: Sequence[int]
-) -> None:
+def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(late, gap):
     level, truths = 40e-3, []
     for i in range(20):
         level += 0.0 if i in gap or i == 0 else 1e-3 * i

@@ -46,9 +46,7 @@ def room_for(size: int) -> Iterator[None]:
 
 @pytest.mark.parametrize("name", COMMANDS)
 @pytest.mark.parametrize("size", [0, 40])
-def test_a_series_that_found_the_disk_full_goes_on_when_there_is_room(
-    name: str, size: int, here: Path, refused: Any
-) -> None:
+def test_a_series_that_found_the_disk_full_goes_on_when_there_is_room(name, size, here, refused):
     with room_for(size):
         refused(COMMANDS[name], f"Cannot write {Path('o', f'{name}.json')}: ")
     assert left(here) == ["jobs.toml"]
@@ -67,9 +65,7 @@ def test_a_series_that_found_the_disk_full_goes_on_when_there_is_room(
 
 @pytest.mark.parametrize("name", COMMANDS)
 @pytest.mark.parametrize("content", ["", '{\n "digiclay": "0.1', "[]", None])
-def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(
-    name: str, content: str | None, here: Path
-) -> None:
+def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(name, content, here):
     # What an older version, or a machine that lost its power, left of a full disk.
     for folder in ("points",) if name == "sweep" else ("jobs", "runs", "logs"):
         (here / "o" / folder).mkdir(parents=True)

@@ -15,7 +15,6 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, from_bytes, make_take, replay
 
-from benchmarks.processes import ENDS, sum_bins
 from digiclay_serve.doors import Order, make_slot, open_slot, pack_order, unpack_order
 from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token
 from digiclay_serve.real_time_loop import Schedule, TimeCounts
@@ -81,14 +80,6 @@ def pressed(session: Session, count: int = 20) -> Session:
     return session
 
 
-def test_the_session_follows_a_pose_and_tells_its_number() -> None:
-    frame = make_frame(pressed(begin_session(STILL)))
-    assert (frame.period, frame.number, frame.pose.tolist()) == (20, 3, DOWN.tolist())
-    assert frame.total_force == pytest.approx(frame.forces.sum(), rel=1e-6)
-    assert frame.total_force > 0.0
-    assert frame.heights.min() < 0.04
-
-
 @pytest.mark.parametrize(
     ("most", "height", "flags"),
     [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)],
@@ -120,12 +111,6 @@ def test_the_fingertip_has_a_largest_speed(place: Any, turn: Any, way: float, co
         session, turns = follow(session, np.array(place + turn), 3, count), turns + 1
         assert np.linalg.norm(session.pose[:3] - before) <= each * (1.0 + 1e-9)  # rounding
     assert (session.pose.tolist(), turns) == (place + turn, np.ceil(way / each - 1e-9))
-
-
-def test_a_reset_session_is_the_one_that_began() -> None:
-    again, first = reset(pressed(begin_session(STILL))), begin_session(STILL)
-    assert snapshot.dump(again.system, again.state) == snapshot.dump(first.system, first.state)
-    assert (again.pose.tolist(), again.state.period) == (first.pose.tolist(), 0)
 
 
 def test_a_session_that_diverges_goes_back_and_does_not_go_there_again() -> None:
@@ -282,8 +267,3 @@ def test_what_cannot_be_opened_is_told_in_a_line(here: Path, refused: Any) -> No
         command = ["serve", *FEW_PINS, "--osc-port", "0", "--port", port, "--out", "take"]
         refused(command, f"Port {port} of 127.0.0.1 cannot be opened: ")
     assert left(here) == []
-
-
-def test_the_times_of_the_benchmark_are_summed_below_each_end() -> None:
-    bins = [(0.0, 1), (0.00024, 2), (0.00025, 4), (0.00099, 8), (0.001, 16), (0.2, 32)]
-    assert sum_bins(bins, ENDS) == [3, 4, 0, 8, 16, 0, 0, 0, 0, 32]

@@ -71,9 +71,7 @@ def test_a_sharp_edge_stays() -> None:
         (Brush.RAISE, -5e-3, STYLUS, False),
     ],
 )
-def test_what_the_fingers_own_form_leaves_below_the_path_stays(
-    brush: Brush, by: float, finger: Fingertip, stays: bool
-) -> None:
+def test_what_the_fingers_own_form_leaves_below_the_path_stays(brush, by, finger, stays):
     assert (find(stroke(brush), spiked(BELOW, by), finger) is None) == stays
 
 
@@ -100,7 +98,6 @@ def test_a_pin_is_compared_with_its_own_neighbors(arrangement: str) -> None:
         assert measure_excess_heights(grid, height)[cell] == 0.0
 
 
-@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("rows", [1, 2])
 def test_a_bed_of_few_pins_has_no_spikes_without_neighbors(rows: int) -> None:
     grid = make_grid(Layout(rows, 1))

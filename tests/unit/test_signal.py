@@ -115,9 +115,7 @@ def test_what_follows_its_moving_average_does_not_oscillate(values: Any, rows: A
         *((force, (0.15, 0.27)) for force in (0.01, 0.4, math.nextafter(BORDER, 0.0))),
     ],
 )
-def test_a_jnd_is_7_to_10_percent_from_half_a_newton_on_and_15_to_27_below(
-    force: float, fractions: tuple[float, float]
-) -> None:
+def test_a_jnd_is_7_to_10_percent_from_half_a_newton_on_and_15_to_27_below(force, fractions):
     assert find_weber_fractions(force) == fractions
 
 

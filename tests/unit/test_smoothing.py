@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.drive import DriveParameters
-from digiclay.core.control.exchange import make_exchange
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.smoothing import find_fault, order_periods
 from digiclay.core.control.virtual_master import Master, Phase
@@ -80,17 +79,6 @@ def test_each_stroke_makes_a_spike_and_a_ridge_less_rough_and_keeps_the_volume(a
     assert np.diff(rough).max() < 0.0
 
 
-def test_pins_outside_the_ring_stay_exactly_where_they_are() -> None:
-    system = bed("hexagonal")
-    relief = np.random.default_rng(1).uniform(-5e-3, 5e-3, system.grid.count)
-    state = heighten(system, relief)
-    before = state.row(0)
-    after = smooth(system, state, make_orders(60, 0.0, 0.0, 0.0, RADIUS))[-1]
-    outside = np.hypot(system.grid.x, system.grid.y) >= RADIUS
-    np.testing.assert_array_equal(after[outside], before[outside])
-    assert np.abs(after - before)[~outside].max() > 1e-3
-
-
 @pytest.mark.parametrize(("period", "swing"), [(5e-3, 1e-9), (20e-3, BAND)])
 def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period: float, swing: float) -> None:
     system = bed(period=period)
@@ -106,19 +94,6 @@ def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period: flo
     speed, limit = np.diff(heights, axis=0) / system.period, find_speeds(system.cell)
     assert speed.max() <= limit.rise * (1.0 + 1e-9)
     assert limit.fall * (1.0 + 1e-9) <= speed.min() < 0.5 * limit.fall
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_strokes_over_edge_and_corners_stay_finite_and_keep_the_volume(arrangement: str) -> None:
-    system = bed(arrangement, "absent", 6)
-    relief = np.random.default_rng(2).uniform(-5e-3, 5e-3, system.grid.count)
-    state = heighten(system, relief)
-    first, edge = state.row(0), float(system.grid.x.max())
-    for y in (-edge, edge, 3.0 * edge):
-        orders = make_orders(30, -1.5 * edge, 1.5 * edge, y, RADIUS, 100)
-        *_, state = simulate_path(system, state, stay_away(len(orders)), orders)
-    assert abs((state.row(0) - first).sum()) <= BAND * first.size
-    assert measure_roughness(system.grid, state.row(0)) < measure_roughness(system.grid, first)
 
 
 def test_pins_are_in_the_mode_blister_until_they_have_arrived_and_then_hold_or_rest() -> None:
@@ -165,18 +140,6 @@ def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more
     (a, b, one), (c, d, other) = discs
     least = (np.hypot(a - c, b - d) + one + other) / 2.0
     assert whole == pytest.approx(least if held is None else (one, other)[held])
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_the_neighbors_of_all_pins_in_the_disc_take_part(arrangement: str) -> None:
-    system = bed(arrangement, "absent")
-    reach = order(system, 1e-3, 2e-3, RADIUS).locate(None, measure(system, np.empty(0, np.intp)))[1]
-    assert reach is not None
-    there = set(system.grid.disc(*reach).tolist())
-    smoothed = system.grid.disc(1e-3, 2e-3, RADIUS)
-    for one, others, _ in make_exchange(system.grid, 1e-5, 5e-3).find_pairs(np.arange(system.grid.count)):
-        for start, goal in ((one, others), (others, one)):
-            assert set(goal[np.isin(start, smoothed)].tolist()) <= there
 
 
 @pytest.mark.parametrize("method", [*METHODS, "absent"])

@@ -9,20 +9,9 @@ import pytest
 from digiclay.core.base.modes import COLORS, MEANINGS, Mode
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.state import Rows
 from digiclay.core.model.layout import Layout
 
 from tests.assemble import make_system, one_cell, path, record
-
-
-@pytest.mark.parametrize("owners", [(1, 1), (5, 2), (4, 7), (5, 2, 3, 1)])
-def test_every_row_has_one_owner(owners: tuple[int, ...]) -> None:
-    rows = Rows(*owners)
-    all_rows = range(rows.count)
-    parts = [*all_rows[rows.commands], *all_rows[rows.controlled], *all_rows[rows.sensed]]
-    owned = [*range(rows.physics), *parts, rows.target, rows.force]
-    assert sorted(owned) == list(range(rows.count))
-    assert rows.command == all_rows[rows.commands][-1]
 
 
 def test_a_copy_a_row_and_the_modes_share_no_array_with_a_state_that_has_active_cells() -> None:
@@ -59,9 +48,7 @@ def test_a_part_that_is_left_out_owns_no_row(absent: tuple[str, ...], rows: int)
     [((3, -6, 5), True), ((5, -6, 5), True), ((3, -8, 5), True), ((3, -6, 7), True), ((3, -6, 9), False),
      ((6.1, -6, 5), False), ((3, -2.9, 5), False), ((-6, 3, 5), False)],
 )  # fmt: skip
-def test_an_active_set_serves_while_the_controlled_disc_is_within_a_pitch_around_it(
-    disc: tuple[float, ...], serves: bool
-) -> None:
+def test_an_active_set_serves_while_the_controlled_disc_is_within_a_pitch_around_it(disc, serves):
     system = make_system(Layout(11, 11))
     select, (x, y) = system.selection, system.grid.positions.T
     first = select.update(begin(system), None, (3e-3, -6e-3, 5e-3)).active

@@ -61,9 +61,7 @@ def solved(e: float, bow: float, slip: float, decay: float, pulp: float) -> tupl
     ("e", "slip", "decay", "pulp"),
     [(-1.0, 2.0, 1.5, 1.0), (-0.5, 2.0, 0.8, 1.4), (0.8, -2.0, 1.5, 1.0), (1.2, -2.5, 0.7, 1.3)],
 )
-def test_a_cell_that_meets_or_leaves_on_a_straight_way_is_solved_exactly(
-    e: float, slip: float, decay: float, pulp: float
-) -> None:
+def test_a_cell_that_meets_or_leaves_on_a_straight_way_is_solved_exactly(e, slip, decay, pulp):
     # The sum's own error is of second order in its steps, of first at the one that holds the instant.
     assert solved(e, 0.0, slip, decay, pulp) == pytest.approx(integrated(e, 0.0, slip, decay, pulp), abs=3e-6)
 
@@ -172,9 +170,7 @@ def test_a_cell_thrown_off_is_given_up_the_others_are_moved_on_and_the_force_is_
         (np.nan, 38e-3, 40e-3, np.inf),
     ],
 )
-def test_a_pin_is_given_up_where_neither_finger_nor_valve_can_take_it(
-    height: float, under: float, start: float, left: float
-) -> None:
+def test_a_pin_is_given_up_where_neither_finger_nor_valve_can_take_it(height, under, start, left):
     assert put(Setter(height), [[41e-3], [under]], [start], step=5e-3)[0] == left
 
 
@@ -193,9 +189,7 @@ STROKE, WAY = CELL.actuator.stroke, find_speeds(CELL).rise * 5e-3
         (40e-3, 30e-3, 5e-3, 30e-3, 30e-3 - WAY),  # or the finger can take it
     ],
 )
-def test_richardsons_extrapolation_keeps_to_where_a_pin_can_be(
-    coarse: float, fine: float, period: float, under: float, height: float
-) -> None:
+def test_richardsons_extrapolation_keeps_to_where_a_pin_can_be(coarse, fine, period, under, height):
     reach = find_speeds(CELL).reach(np.full((1, 1), 40e-3), np.full((3, 1, 1), under), np.array([period]))
     fines, coarses = (np.full((CELL.rows + 1, 1, 1), value) for value in (fine, coarse))
     extrapolate(CELL, fines, coarses, reach)

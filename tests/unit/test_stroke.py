@@ -69,6 +69,7 @@ def pressed(poses: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(duration: float) -> None:
     stroke, poses = path(line(duration))
     assert stroke.done
+    assert poses[np.argmax(poses[:, 2] <= 0.036 + 1e-9), 0] == 0.0  # first to its depth
     down = pressed(poses)
     assert (down[0, 0], down[-1, 0]) == pytest.approx((0.0, 0.02), abs=1e-12)
     assert draw(stroke, 9.0, 0.03, 0.0, 4e-3) is stroke, "the hand has let go"
@@ -87,15 +88,6 @@ def test_the_finger_crosses_the_bed_above_all_pins() -> None:
         assert not sideways or before[2] > 0.055 or abs(before[2] - 0.036) < 1e-9
 
 
-def test_the_finger_presses_to_its_depth_before_it_drags_and_no_faster_than_a_finger() -> None:
-    _, poses = path(line(0.3))
-    first = int(np.argmax(poses[:, 2] <= 0.036 + 1e-9))
-    assert poses[first, 0] == 0.0
-    falls = -np.diff(poses[: first + 1, 2])
-    assert falls.max() <= APPROACH * PERIOD + 1e-12
-    assert falls[poses[1 : first + 1, 2] < 0.040 - 1e-9].max() <= SPEED * PERIOD + 1e-12
-
-
 def test_the_finger_keeps_the_hands_times_where_it_can() -> None:
     _, poses = path(line(2.0, moves=100))
     moved = np.diff(pressed(poses)[:, 0])
@@ -104,18 +96,11 @@ def test_the_finger_keeps_the_hands_times_where_it_can() -> None:
     assert len(pressed(poses)) * PERIOD == pytest.approx(2.0 - 0.39, abs=0.05)
 
 
-def test_the_finger_is_never_ahead_of_the_hand() -> None:
-    resting = line(0.2, held=True)
-    stroke, poses = follow(resting, CELLS, HEIGHT, Fingertip(), AT, 600, PERIOD, 0.0)
-    assert not stroke.done
-    assert poses[-1, 0] == pytest.approx(0.02)
-    assert poses[-1, 2] == pytest.approx(0.036)
-
-
-def test_moves_that_are_not_known_yet_are_waited_for_and_not_made_up_for_in_haste() -> None:
-    stroke = replace(line(1.0, moves=100, held=True), known=0.5)
+def test_moves_of_a_hand_that_are_not_known_yet_are_waited_for_and_not_made_up_for_in_haste() -> None:
+    stroke = replace(line(1.0, moves=100, held=True), known=0.5, mirrors=SYMMETRIES["X"])
     stroke, poses = follow(stroke, CELLS, HEIGHT, Fingertip(), AT, 1000, PERIOD, 0.0)
-    assert poses[-1, 0] == pytest.approx(0.01, abs=3e-4)
+    assert (stroke.image, stroke.done) == (0, False)  # its mirror image waits until the hand has let go
+    assert (poses[-1, 0], poses[-1, 2]) == (pytest.approx(0.01, abs=3e-4), pytest.approx(0.036))
     stroke, after = follow(replace(stroke, known=1.0), CELLS, HEIGHT, Fingertip(), poses[-1], 40, PERIOD, 0.0)
     # At the hand's 20 mm/s, not at DRAG.
     assert np.diff(after[:, 0]).max() < 0.3e-3
@@ -137,21 +122,15 @@ def test_moves_that_waited_while_blender_drew_get_back_their_times() -> None:
     stroke = draw(start(1, 0.0, 0.0, 4e-3), 0.1, 0.001, 0.0, 4e-3)
     for count in range(1, 6):
         stroke = draw(stroke, 0.6 + 1e-4 * count, 0.001 * (count + 1), 0.0, 4e-3)
-    np.testing.assert_allclose(
-        [one.time for one in stroke.samples], [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], atol=1e-3
-    )
-
-
-def test_a_hand_that_has_rested_does_not_creep_before_it_goes_on() -> None:
-    stroke = draw(start(1, 0.0, 0.0, 4e-3), 5.0, 0.001, 0.0, 4e-3)
-    stroke = draw(stroke, 5.001, 0.002, 0.0, 4e-3)
-    assert stroke.samples[1].time >= 4.0
+    times = [one.time for one in stroke.samples]
+    np.testing.assert_allclose(times, [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], atol=1e-3)
+    # Nor does a hand that has rested creep before it goes on.
+    rested = draw(draw(start(1, 0.0, 0.0, 4e-3), 5.0, 0.001, 0.0, 4e-3), 5.001, 0.002, 0.0, 4e-3)
+    assert rested.samples[1].time >= 4.0
 
 
 @pytest.mark.parametrize(("bed", "lowest", "end"), [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)])
-def test_a_click_presses_no_deeper_than_the_floor_and_ends_above_all_pins(
-    bed: NDArray[np.float64], lowest: float, end: float | None
-) -> None:
+def test_a_click_presses_no_deeper_than_the_floor_and_ends_above_all_pins(bed, lowest, end):
     click = replace(start(1, 0.01, 0.005, 4e-3), held=False)
     stroke, poses = follow(click, CELLS, bed, Fingertip(), AT, 1000, PERIOD, 0.0)
     assert stroke.done
@@ -186,12 +165,6 @@ def test_the_finger_goes_along_the_path_and_along_each_of_its_mirror_images(symm
     assert np.count_nonzero(np.diff(top.astype(int)) == 1) == 1 + len(SYMMETRIES[symmetry])
 
 
-def test_a_mirror_image_waits_until_the_hand_has_let_go() -> None:
-    held = replace(line(0.2, held=True), mirrors=SYMMETRIES["X"])
-    stroke, _ = follow(held, CELLS, HEIGHT, Fingertip(), AT, 1000, PERIOD, 0.0)
-    assert (stroke.image, stroke.done) == (0, False)
-
-
 def test_a_finger_slows_down_above_the_highest_pin_below_it() -> None:
     beside = np.where(CELLS.x > 5e-3, 0.050, 0.040)  # 1 mm beyond where the surface below the finger counts
     click = replace(start(1, 0.0, 0.0, 4e-3), held=False)
@@ -216,16 +189,6 @@ def test_a_finger_slows_down_above_the_highest_pin_below_it() -> None:
 )
 def test_the_mouse_pulls_a_place_behind_it(place: Place, mouse: Place, string: float, pulled: Place) -> None:
     assert pull(place, mouse, string) == pytest.approx(pulled, rel=1e-12, abs=1e-15)
-
-
-def test_a_shaking_hand_draws_a_smoother_path() -> None:
-    along = np.linspace(0.0, 50e-3, 200)
-    shaking = np.column_stack([along, 1e-3 * np.sin(2.0 * np.pi * along / 3e-3)])
-    places = [(0.0, 0.0)]
-    for x, y in shaking:
-        places.append(pull(places[-1], (float(x), float(y)), 5e-3))
-    drawn = np.array(places)[50:]
-    assert np.abs(drawn[:, 1]).max() < 0.4e-3
 
 
 def test_a_ring_keeps_its_radius_and_is_closed() -> None:
@@ -328,18 +291,12 @@ def tap(session: Running, x: float, y: float) -> Running:
 def test_presses_in_quick_succession_all_form_and_count_one_gesture_each() -> None:
     places = [(-15.0, -15.0), (15.0, -15.0), (0.0, 15.0)]
     session = started()
-    for place in places:
+    for place in places[:2]:
         session = tap(session, *place)
-    done = finish(session)
+    session, number = queue_stroke(session, -15e-3, 15e-3, DEPTH)  # rests, and goes on
+    done = finish(let_go(change_stroke(session, number, lambda s: draw(s, 2.0, 0.0, 15e-3, DEPTH)), number))
     assert max(risen(done, *place) for place in places) < FORMED
     assert (done.finished_strokes, len(done.gestures), done.strokes) == (3, 3, ())
-
-
-def test_a_stroke_that_rests_and_goes_on_is_one_gesture() -> None:
-    session, number = queue_stroke(started(), -9e-3, 0.0, DEPTH)
-    session = change_stroke(session, number, lambda s: draw(s, 2.0, 9e-3, 0.0, DEPTH))
-    done = finish(let_go(session, number))
-    assert len(done.gestures) == 1
 
 
 def test_at_most_one_stroke_ends_in_a_tick_so_that_each_gets_an_undo_step() -> None:

@@ -76,9 +76,7 @@ def test_every_point_is_the_run_with_its_settings(whole: Path) -> None:
 KEYS = (("control.position_gain", "1/m"), ("control.force_gain", "1/N"))
 
 
-def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_before(
-    whole: Path, here: Path
-) -> None:
+def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_before(whole, here):
     shutil.copytree(whole, here / "again")
     for path in [*sorted((here / "again" / "points").iterdir())[3::4], here / "again" / "indices.csv"]:
         path.unlink()
@@ -89,9 +87,7 @@ def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_befo
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_a_study_that_is_stopped_goes_on_from_there(
-    here: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_study_that_is_stopped_goes_on_from_there(here, whole, monkeypatch, capsys):
     with monkeypatch.context() as patch:
         interrupt_after(1, patch)
         assert main([*STUDY, "--second", "--out", "out"]) == 130
@@ -141,9 +137,7 @@ def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is
         ("--method no", "--method: control.method must be one of"),
     ],
 )
-def test_a_mistake_is_told_in_one_line_and_leaves_no_point(
-    words: str, message: str, here: Path, refused: Any
-) -> None:
+def test_a_mistake_is_told_in_one_line_and_leaves_no_point(words, message, here, refused):
     study = QUIET if words else ["study", "my.toml", *GAINS[:2], "--quiet", "--out", "out"]
     refused([*study, *words.split()], message)
     assert len(list(here.glob("out/points/*"))) <= 1
@@ -161,9 +155,7 @@ def test_a_folder_of_another_study_is_refused(whole: Path, here: Path, refused: 
 
 
 @pytest.mark.parametrize(("command", "library"), [("study", "SALib"), ("tune", "optuna")])
-def test_a_missing_library_is_told_with_the_extra_that_has_it(
-    command: str, library: str, monkeypatch: pytest.MonkeyPatch, refused: Any
-) -> None:
+def test_a_missing_library_is_told_with_the_extra_that_has_it(command, library, monkeypatch, refused):
     monkeypatch.setitem(sys.modules, library, None)  # as Python marks what cannot be imported
     said = f"digiclay {command} needs {library}: run 'pip install digiclay[study]'.\n"
     refused([command, "my.toml", *GAINS, "--out", "out"], said)

@@ -96,9 +96,7 @@ def test_tables_and_page_name_their_origin(league: Path) -> None:
     assert 'src="rfd.svg"' in page
 
 
-def test_a_finished_suite_runs_no_trial_again_and_no_other_goes_into_its_folder(
-    league: Path, monkeypatch: pytest.MonkeyPatch, refused: Any
-) -> None:
+def test_a_finished_suite_runs_no_trial_again_and_no_other_goes_into_its_folder(league, monkeypatch, refused):
     monkeypatch.chdir(league.parent)
     said = (
         f"league holds another suite (4 trials, digiclay {__version__}): choose another folder with --out.\n"

@@ -95,9 +95,7 @@ def test_what_cannot_vary_is_told_with_key_rule_and_value(said: str, message: st
         ("--vary layout.rows=11,13 --set recorder=absent", "A sweep needs a recorder, and the scene"),
     ],
 )
-def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(
-    words: str, message: str, here: Path, refused: Any
-) -> None:
+def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here, refused):
     refused(["sweep", "my.toml", "--out", "out", *words.split()], message)
     assert not (here / "out").exists()
 

@@ -54,9 +54,7 @@ def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> 
     return done
 
 
-def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(monkeypatch):
     scene = some()[0].scene
     assert scene is not None
     assert evaluate(scene, stopped=lambda: True) is None

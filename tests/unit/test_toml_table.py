@@ -53,9 +53,7 @@ def test_a_setting_may_leave_a_part_out_and_a_scene_is_called_like_its_file(tmp_
         ("", {"layout__rows": "3\nx = 4"}, "--set: layout.rows must be a whole number (got '3\\nx = 4')."),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_with_the_file_or_the_option(
-    tmp_path: Path, text: str, setting: dict[str, str], said: str
-) -> None:
+def test_a_mistake_is_told_with_the_file_or_the_option(tmp_path, text, setting, said):
     assert refused(tmp_path, text, **setting) == said
 
 
@@ -76,9 +74,7 @@ def test_a_mistake_is_told_with_the_file_or_the_option(
         ),
     ],
 )  # fmt: skip
-def test_a_setting_is_a_value_of_the_scene(
-    tmp_path: Path, text: str, settings: dict[str, str], part: str, key: str, value: object
-) -> None:
+def test_a_setting_is_a_value_of_the_scene(tmp_path, text, settings, part, key, value):
     assert getattr(scene(tmp_path, text, **settings).section(part), key) == value
 
 

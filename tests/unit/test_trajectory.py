@@ -51,9 +51,7 @@ def test_the_smooth_path_has_one_velocity_on_both_sides_of_a_waypoint_and_none_a
         ([1], [3], [0, 9], 3.0),  # at a single one it stays
     ],
 )
-def test_the_smooth_path_of_few_waypoints(
-    times: list[int], heights: list[int], at: object, wanted: float
-) -> None:
+def test_the_smooth_path_of_few_waypoints(times, heights, at, wanted):
     places = np.array(heights, float)[:, None] * [0.0, 0.0, 1.0]
     poses = make_level(np.array(times, float), places).poses(np.atleast_1d(at).astype(float))
     assert poses[:, 2] == pytest.approx(wanted, abs=1e-15)

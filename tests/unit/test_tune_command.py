@@ -92,9 +92,7 @@ def test_the_chosen_scene_is_a_scene_file_that_gives_the_same_metrics(whole: Pat
     assert scene.description.startswith("Chosen by digiclay tune from 32 runs, knee of the front: rfd ")
 
 
-def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(
-    whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(whole, here, capsys):
     shutil.copytree(whole, here / "out")
     assert main([*TUNE[:-1], "--generations", "4", "--choose", "lag"]) == 0
     front = values(here / "out" / "front.csv")
@@ -104,9 +102,7 @@ def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(
-    here: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(here, whole, monkeypatch, capsys):
     with monkeypatch.context() as patch:
         interrupt_after(12, patch)
         assert main([*TUNE[:-1], "--generations", "4"]) == 130
@@ -117,9 +113,7 @@ def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(
     assert files(here / "out") == files(whole)
 
 
-def test_points_of_another_search_are_refused_and_without_any_contact_there_is_no_front(
-    whole: Path, here: Path, refused: Any
-) -> None:
+def test_points_of_another_search_are_refused_and_without_any_contact_there_is_no_front(whole, here, refused):
     shutil.copytree(whole, here / "out")
     one, other = (here / "out" / "points" / f"{index:06d}.json" for index in (12, 13))
     one.write_bytes(other.read_bytes())
@@ -142,9 +136,7 @@ def test_points_of_another_search_are_refused_and_without_any_contact_there_is_n
         ("--vary control.travel=1:nan", "--vary control.travel must have two different finite numbers at LO"),
     ],
 )
-def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(
-    words: str, message: str, here: Path, refused: Any
-) -> None:
+def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here, refused):
     refused([*TUNE, *words.split()], message)
     assert not (here / "out").exists()
 

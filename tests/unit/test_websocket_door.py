@@ -61,9 +61,7 @@ async def press_elsewhere(link: DoorLink) -> None:
             await asyncio.sleep(0.01)
 
 
-def test_a_client_that_answers_no_ping_is_closed_and_leaves_the_fingertip(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_client_that_answers_no_ping_is_closed_and_leaves_the_fingertip(monkeypatch):
     monkeypatch.setattr(websocket_door, "PING", 0.1)
     monkeypatch.setattr(door_link, "LEASE", 1e9)  # nobody else may by silence alone
     link = make_link()
