@@ -126,7 +126,7 @@ BENCHMARKS = {
         "processes.measure_serve", "deadlines of digiclay serve at 1 kHz, with a client", needs="websockets"
     ),
     "methods": Benchmark(
-        "method_figures.measure", "force deviation of Methods I and III over paths and drags"
+        "method_figures.measure", "force deviation of Method III in fast drags and on other devices"
     ),
     "ablation": Benchmark(
         "method_figures.measure_ablation", "Method III with one part left out at a time",
