@@ -23,7 +23,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import Formed
 
-from .report import BLUE, RED, Report, Row, Steps, tabulate
+from .report import Curves, Report, Row, Steps, tabulate
 
 #: Pins along a side of the beds.
 SIDES, EXPORTED = (25, 101, 317, 1001), (25, 100, 316, 1000)
@@ -92,24 +92,15 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     sides, repeats = (SIDES[:3], 1) if arguments.quick else (SIDES, 5)
     sizes = [_time_bed(side, repeats) for side in steps.through(sides, lambda side: f"{side * side} pins")]
 
-    def draw(figure: Any) -> None:
-        panel = figure.subplots()
-        for key, label, color, marker in (
-            ("period", "median", BLUE, "o"),
-            ("mean", "mean, with the fingertip's poses", RED, "s"),
-        ):
-            pins, values = [size["pins"] for size in sizes], [size[key] * 1e6 for size in sizes]
-            panel.semilogx(pins, values, "-", color=color, marker=marker, label=label)
-        panel.set(ylim=(0.0, 1.2e6 * max(size["mean"] for size in sizes)))
-        panel.set(title="The same fingertip, larger beds")
-        panel.set(xlabel="pins of the bed", ylabel="a control period, µs")
-        panel.legend(loc="lower right")
-
-    title = (
-        "\nThe same fingertip, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
-    )
+    lines = {
+        label: [(size["pins"], size[key] * 1e6) for size in sizes]
+        for key, label in (("period", "median"), ("mean", "mean, with the fingertip's poses"))
+    }
+    title = "The same fingertip, larger beds"
+    curves = Curves({title: lines}, "pins of the bed", "a control period, µs", "linear")
+    text = "\nThe same fingertip, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
     rows = [{**size, "ratio": size["period"] / sizes[0]["period"]} for size in sizes]
-    return Report([title, *tabulate(rows, SCALE, left=0)], sizes, draw)
+    return Report([text, *tabulate(rows, SCALE, left=0)], sizes, curves)
 
 
 def formed(side: int) -> Formed:

@@ -24,7 +24,7 @@ Options = Callable[[argparse.ArgumentParser], object]
 #: Recorded strokes of the made things.
 STROKES = Path(__file__).parent / "strokes"
 #: Packages that benchmarks need, and the extra that has them.
-EXTRAS = {"distributed": "cluster", "websockets": "serve"}
+EXTRAS = {"distributed": "cluster", "scipy": "suite", "websockets": "serve"}
 EXAMPLES = """\
 examples:
   python -m benchmarks session
@@ -96,6 +96,7 @@ BENCHMARKS = {
         "error against run time, beside SciPy's solvers",
         ("--quick", "--out results", "--whole-bed --out results"),
         _flag("--whole-bed", "also peers that integrate all cells, on the paper's bed (11 minutes more)"),
+        needs="scipy",
     ),
     "terms": Benchmark(
         "session_parts.measure_terms", "cost and effect of each part of the model",

@@ -32,7 +32,7 @@ from digiclay.core.studies.evaluation import evaluate_bundle, make_bundles
 from digiclay.core.studies.series import finish
 from digiclay.core.studies.sweep_plan import hash_points
 
-from .report import BLUE, RED, Report, Row, Steps, tabulate
+from .report import Report, Row, Steps, tabulate
 
 ROOT = Path(__file__).parents[1]
 #: The paper's session.
@@ -236,8 +236,6 @@ LINES = {
     "lateness": "of which before it is simulated",
     "processor": "processor time of a period",
 }
-#: Upper ends of the histogram's bins, ms.
-ENDS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0, 10.0, 50.0, np.inf)
 #: Mark, version, kind, number, pose; and mark, version, kind, pins, period, number of a frame.
 POSE, HEAD = struct.Struct("<2sBBI7d"), struct.Struct("<2sBBIQI")
 
@@ -246,8 +244,7 @@ def measure_serve(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Serve for a while."""
     figures, frames = _serve(QUICK if arguments.quick else FULL)
     rows = [{"what": name, **{f"{s}_s": figures[name][s] for s in SHARES}} for name in LINES]
-    lines = list(_list_deadlines(figures, rows, frames))
-    return Report(lines, rows, lambda figure: _draw(figure, figures), (7.2, 4.2), packages=("websockets",))
+    return Report(list(_list_deadlines(figures, rows, frames)), rows, packages=("websockets",))
 
 
 def _serve(seconds: float) -> tuple[dict[str, Any], int]:
@@ -294,14 +291,6 @@ def _move(port: int, token: str) -> int:
             return frames
 
 
-def sum_bins(bins: Sequence[tuple[float, int]], ends: Sequence[float]) -> list[int]:
-    """Return how many times lie between one end and the next, ms; `bins`: lower end, s, and count."""
-    starts, counts = np.array([start for start, _ in bins]) * 1e3, np.array([count for _, count in bins])
-    # A narrow bin belongs where its lower end is; rounding must not move it.
-    place = np.searchsorted(np.asarray(ends), starts + 1e-6, side="right")
-    return [int(counts[place == index].sum()) for index in range(len(ends))]
-
-
 def _list_deadlines(figures: Row, rows: Sequence[Row], frames: int) -> Iterator[str]:
     """Give the lines of the report."""
     yield f"\ndigiclay serve {SCENE} --rate {RATE}: 625 pins, a pose from a client after every frame; ms\n"
@@ -309,19 +298,4 @@ def _list_deadlines(figures: Row, rows: Sequence[Row], frames: int) -> Iterator[
     yield from tabulate(named, {"": "what", **{share: f"{share}_s .2f 1e3" for share in SHARES}})
     periods, missed = figures["periods"], figures["missed"]
     yield f"\n{periods} periods; past their deadline of 1 ms: {missed} ({100.0 * missed / periods:.2f} %),"
-    yield f"of them left out: {figures['left_out']}; the client received {frames} frames\n"
-    counts = (map(str, sum_bins(figures[name]["bins"], ENDS)) for name in ("elapsed", "processor"))
-    names = [f"below {end:g} ms" if np.isfinite(end) else "longer" for end in ENDS]
-    yield from table(("", "elapsed", "processor"), list(zip(names, *counts, strict=True)))
-
-
-def _draw(figure: Any, figures: Row) -> None:
-    """Draw the histograms of elapsed and processor time."""
-    panels = figure.subplots(2, 1, sharex=True)
-    for panel, name in zip(panels, ("elapsed", "processor"), strict=True):
-        bins = np.array(figures[name]["bins"])
-        panel.hist(1e3 * bins[:, 0], np.geomspace(0.1, 100.0, 91), weights=bins[:, 1], color=BLUE, log=True)
-        panel.axvline(1e3 * figures["period"], color=RED, linestyle="--", label="deadline")
-        panel.set(title=LINES[name], ylabel="periods")
-        panel.legend(loc="upper right")
-    panels[-1].set(xscale="log", xlabel="ms")
+    yield f"of them left out: {figures['left_out']}; the client received {frames} frames"

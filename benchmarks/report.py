@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
+import numpy as np
 from digiclay.commands.progress import Line, draw_share, table
 from digiclay.core.base.errors import OutputError
 from digiclay.plots.figure import INK, LINES, empty, save
@@ -25,8 +26,46 @@ STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans", "font.size": 10, "axes.titlelocation": "left", "axes.titlesize": 11,
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#E0DED8",
     "grid.linewidth": 0.7, "axes.axisbelow": True, "legend.frameon": False, "figure.dpi": 150,
+    "axes.prop_cycle": f"cycler(linestyle=['-', '--', ':']) * "
+    f"cycler(color={[*LINES]}, marker={[*'os^DvX']})",
 }  # fmt: skip
-__all__ = ["BLUE", "INK", "RED", "Report", "Row", "Steps", "tabulate"]
+#: Size of a panel of `Curves`, and of its legend a line, inches; columns of panels, and of the legend.
+PANEL, LEGEND, COLUMNS = (4.4, 3.6), 0.1, 3
+__all__ = ["BLUE", "INK", "RED", "Curves", "Report", "Row", "Steps", "tabulate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Lines over logarithmic axes, in panels side by side, with one legend for all."""
+
+    panels: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]]
+    """By title the lines, by label their points."""
+    x: str
+    y: str
+    """Labels of the axes."""
+    scale: str = "log"
+    """Of the y axis; a linear one begins at 0."""
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Of the figure, inches."""
+        columns = min(COLUMNS, len(self.panels))
+        return PANEL[0] * columns, PANEL[1] * -(-len(self.panels) // columns) + 1.2
+
+    def __call__(self, figure: Any) -> None:
+        """Draw the panels."""
+        columns = min(COLUMNS, len(self.panels))
+        axes = figure.subplots(-(-len(self.panels) // columns), columns, squeeze=False).ravel()
+        for panel in axes[len(self.panels) :]:
+            panel.set_axis_off()
+        labels = dict.fromkeys(label for lines in self.panels.values() for label in lines)
+        for panel, (title, lines) in zip(axes, self.panels.items(), strict=False):
+            for label in labels:  # also those without points here: a label has one look in all panels
+                panel.plot(*np.reshape(lines.get(label, ()), (-1, 2)).T, label=label)
+            panel.set(title=title, xlabel=self.x, ylabel=self.y, xscale="log", yscale=self.scale)
+            if self.scale == "linear":
+                panel.set_ylim(bottom=0.0)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns)
 
 
 class Steps(Line):
@@ -98,7 +137,8 @@ class Report:
         except OSError as error:
             raise OutputError(f"Cannot write into {out}: {error.strerror or error}.") from None
         if self.draw:
-            with empty(*self.size, STYLE, layout="constrained") as figure:
+            size = self.draw.size if isinstance(self.draw, Curves) else self.size
+            with empty(*size, STYLE, layout="constrained") as figure:
                 self.draw(figure)
                 save(figure, out / f"{name}.png")
 

@@ -15,7 +15,7 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.evaluation import evaluate
 
-from .report import BLUE, RED, Report, Row, Steps, tabulate
+from .report import Curves, Report, Row, Steps, tabulate
 
 #: Runs in one call; a sweep puts 32 to 63 together.
 COUNTS = (1, 4, 16, 32, 64, 128)
@@ -23,6 +23,8 @@ COUNTS = (1, 4, 16, 32, 64, 128)
 DURATION = 4.0
 #: Time between two measurements, s: the linear algebra library keeps its threads busy for a while.
 REST = 0.15
+#: Goal of the runs a second, over those of one run at a time.
+GOAL = 6.0
 #: What varies from run to run: section, key, and from which to which share of its value. The first leaves the
 #: cells alike, the second does not.
 STUDIES: dict[str, tuple[str, str, float, float]] = {
@@ -81,29 +83,21 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     counts, repeats = (COUNTS[:3], 1) if arguments.quick else (COUNTS, 5)
     jobs = [(name, count) for name in STUDIES for count in counts]
     sizes = [_compare(scene, *job, repeats) for job in steps.through(jobs, lambda job: f"{job[1]} runs")]
-    return Report(list(_list_lines(scene, sizes)), sizes, lambda figure: _draw(figure, sizes))
+    panels = {
+        f"{section}.{key} varies": _list_points([size for size in sizes if size["study"] == name])
+        for name, (section, key, _, _) in STUDIES.items()
+    }
+    curves = Curves(panels, "runs in one call", "runs a second, to one at a time")
+    return Report(list(_list_lines(scene, sizes)), sizes, curves)
 
 
-def _draw(figure: Any, sizes: Sequence[Row]) -> None:
-    """Draw the runs a second in a batch over those of one at a time, by the runs of the batch."""
-    panel = figure.subplots()
-    for name, color, marker in zip(STUDIES, (BLUE, RED), "os", strict=True):
-        chosen = [size for size in sizes if size["study"] == name]
-        runs = [size["runs"] for size in chosen]
-        for (alone, stacked), line, label in zip(
-            zip(TIMES[::2], TIMES[1::2], strict=True), ("-", "--", ":"), PAIRS.values(), strict=True
-        ):
-            panel.loglog(
-                runs, [size[alone] / size[stacked] for size in chosen], line, color=color, marker=marker,
-                markerfacecolor=color if line == "-" else "white", label=f"{name} varies, {label}",
-            )  # fmt: skip
-    panel.axhline(6.0, color="#777777", linewidth=1.0, label="the goal")
-    panel.set_xticks(runs, [str(count) for count in runs])
-    panel.set_yticks([1, 2, 4, 6, 10, 20], ["1", "2", "4", "6", "10", "20"])
-    panel.minorticks_off()
-    panel.set(xlabel="runs in one call", ylabel="runs a second, to one at a time")
-    panel.set_title("Many sessions in one call")
-    panel.legend(loc="lower right", fontsize=8.5)
+def _list_points(sizes: Sequence[Row]) -> dict[str, list[tuple[float, float]]]:
+    """Return the runs in one call, and their rate over that of one run alone, by pair of times, and goal."""
+    lines = {
+        label: [(size["runs"], size[alone] / size[stacked]) for size in sizes]
+        for label, alone, stacked in zip(PAIRS.values(), TIMES[::2], TIMES[1::2], strict=True)
+    }
+    return lines | {"goal": [(size["runs"], GOAL) for size in sizes]}
 
 
 def _list_lines(scene: Scene, sizes: Sequence[Row]) -> Iterator[str]:

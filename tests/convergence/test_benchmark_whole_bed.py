@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.peers import LOOP, SOLVERS, loop, peer
-from benchmarks.precision import LEVELS, Beside, Plan, list_beside, run_beside, spread_everywhere
+from benchmarks.precision import EVERYWHERE, LEVELS, Beside, Plan, list_beside, run_beside, spread_everywhere
 from benchmarks.problems import Problem, Solution, Work, problem
 
 PERIODS = 16
@@ -71,32 +71,33 @@ def test_both_forms_of_a_peer_run_at_the_same_settings_to_the_same_errors(
     task: Problem, exact: Solution
 ) -> None:
     # The cells that take no part add no error; their share in a solver's sums is rounding.
-    plan = Plan((), {"bernoulli": (1e-3,)}, {"LSODA": (1e-3, 1e-5)}, {"DOP853": (1e-3,)}, side=13)
-    ran = run_beside(task, exact, plan)
-    told, whole = ([(run.method, run.setting) for run in runs] for runs in (ran.told, ran.whole))
-    assert told == [("LSODA", 1e-3), ("LSODA", 1e-5), (LOOP, 1e-3)]
-    # A solver that is run once goes over the whole bed alone.
-    assert whole == [*told[:2], ("DOP853", 1e-3), told[2]]
-    assert ran.told[0].height_error == pytest.approx(ran.whole[0].height_error, rel=0.02)
-    assert run_beside(task, exact, Plan((), {}, {})).whole == []
+    work = run_beside(task, exact, Plan((), {"bernoulli": (1e-3,)}, {"LSODA": (1e-3, 1e-5)}, side=13))
+    ours, *peers = [(run.method, run.setting) for run in work]
+    assert ours == ("bernoulli", 1e-3)
+    forms = [(f"LSODA{form}", setting) for form in ("", EVERYWHERE) for setting in (1e-3, 1e-5)]
+    assert peers == [*forms, (LOOP, 1e-3), (LOOP + EVERYWHERE, 1e-3)]
+    assert work[1].height_error == pytest.approx(work[3].height_error, rel=0.02)
+    assert [run.method for run in run_beside(task, exact, Plan((), {}, {}))] == [LOOP]
 
 
 def test_over_the_whole_bed_nothing_is_known_of_which_cells_take_part(task: Problem, exact: Solution) -> None:
     # Told a lie, that one cell takes part, the told are wrong; the others are as exact as their setting.
     lied = replace(task, sets=[(cells[:1], 1) for cells, _ in task.sets])
-    ran = run_beside(lied, exact, Plan((), {}, {"LSODA": (1e-3,)}, {"DOP853": (1e-3,)}, side=13))
-    assert min(run.height_error for run in ran.told) > 1e-4
-    assert [run.height_error < 1e-5 for run in ran.whole] == [True, True, True]
+    work = run_beside(lied, exact, Plan((), {}, {"LSODA": (1e-3,)}, side=13))
+    assert [run.height_error > 1e-4 for run in work] == [EVERYWHERE not in run.method for run in work]
+    assert max(run.height_error for run in work if EVERYWHERE in run.method) < 1e-5
 
 
 def test_the_report_sets_the_ratios_of_both_forms_side_by_side(task: Problem) -> None:
     def run(method: str, setting: float, seconds: float, *, peer: bool) -> Work:
         return Work(task.name, method, setting, 1e-10, 0.0, seconds, 0, peer)
 
-    mine = [run("bernoulli", 1e-3, 2.0, peer=False), run("richardson", 5e-3, 1.0, peer=False)]
-    told = [run("LSODA", 1e-3, 5.0, peer=True), run(LOOP, 1e-3, 30.0, peer=True)]
-    whole = [run("LSODA", 1e-3, 20.0, peer=True), run(LOOP, 1e-3, 150.0, peer=True)]
-    lines = list(list_beside([Beside(task, mine, told, whole)], Plan((), {}, {}, side=13)))
+    work = [
+        run("bernoulli", 1e-3, 2.0, peer=False), run("richardson", 5e-3, 1.0, peer=False),
+        run("LSODA", 1e-3, 5.0, peer=True), run(f"LSODA{EVERYWHERE}", 1e-3, 20.0, peer=True),
+        run(LOOP, 1e-3, 30.0, peer=True), run(LOOP + EVERYWHERE, 1e-3, 150.0, peer=True),
+    ]  # fmt: skip
+    lines = list(list_beside([Beside(task, work)], Plan((), {}, {}, side=13)))
     rows = [line.split() for line in lines if line.endswith((" 15.0", " 75.0"))]
     every = len(LEVELS)
     assert rows == [
