@@ -24,7 +24,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.studies.speed_limits import Drag, place_way
 
-from digiclay_study.method_trials import PHASES, Trial, measure_trial, place_trial
+from digiclay_study.method_trials import PHASES, measure_trial, place_trial
 
 from .report import Report, Steps, tabulate
 
@@ -230,7 +230,7 @@ def run_without(part: str, trajectory: str, noise: str) -> Figures:
     if trajectory in PHASES:
         scene, *phase = place_way(scene, *PHASES[trajectory])
     else:
-        scene, _ = place_trial(scene, Trial(trajectory, trajectory))
+        scene, _ = place_trial(scene, trajectory)
     controller = assemble(scene).controller
     assert isinstance(controller, HybridControl)
     if part in PUT_TOGETHER:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from digiclay.core.base.errors import ParameterError
@@ -16,6 +16,7 @@ from digiclay.core.metrics.finger_path import sum_cells
 from digiclay.core.metrics.force import perceive
 from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
 from digiclay.core.metrics.summary import compute_metrics
+from digiclay.core.model.fingertip import require_one
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.schema import Scene
@@ -50,27 +51,23 @@ def with_path(scene: Scene, poses: Sequence[Pose], interpolation: str = "smooth"
         Waypoint(t, (1e-3 * x, 1e-3 * y, rest + 1e-3 * z), _turn(turn, pitch, roll))
         for t, x, y, z, turn, pitch, roll in poses
     )
-    path, timing = Path(interpolation, points), replace(scene.simulation, duration=poses[-1][0])
+    return _follow(scene, Path(interpolation, points))
+
+
+def _follow(scene: Scene, path: Path) -> Scene:
+    """Return a scene with a path of its fingertip, as long as that path."""
+    timing = replace(scene.simulation, duration=path.waypoints[-1].time)
     return scene.with_sections(trajectory=path, simulation=timing)
 
 
 def lift_off(scene: Scene) -> Scene:
     """Return a scene that ends with a quick lift, and a rest in which pins come to their final heights."""
-    fingers = tuple(
-        replace(finger, trajectory=_lift_after(finger.trajectory, scene.actuator.rest_height))
-        for finger in scene.fingers
-    )
-    lasting = max(finger.trajectory.waypoints[-1].time for finger in fingers)
-    return replace(scene, fingers=fingers, simulation=replace(scene.simulation, duration=lasting))
-
-
-def _lift_after(path: Path, rest: float) -> Path:
-    """Return the path with a lift at its end, above the bed at rest, m."""
+    path = require_one(scene.fingers).trajectory
     last = path.waypoints[-1]
-    away = (*last.position[:2], max(last.position[2], rest) + AWAY)
+    away = (*last.position[:2], max(last.position[2], scene.actuator.rest_height) + AWAY)
     end = last.time + LIFTED
     after = tuple(replace(last, time=t, position=away) for t in (end, end + SETTLED))
-    return replace(path, waypoints=(*path.waypoints, *after))
+    return _follow(scene, replace(path, waypoints=(*path.waypoints, *after)))
 
 
 def _turn(turn: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
@@ -177,17 +174,6 @@ OUTCOMES: dict[str, Metric] = {
 }  # fmt: skip
 
 
-class Trial(NamedTuple):
-    """Trial of a method."""
-
-    #: Of its trajectory; a random drag has a number.
-    name: str
-    #: Name by which it is chosen, in `GROUPS`.
-    group: str
-    #: Of a random drag; 0 otherwise.
-    number: int = 0
-
-
 class _StoppedError(Exception):
     """Stop in the middle of a search."""
 
@@ -204,30 +190,26 @@ def read_groups(words: Sequence[str]) -> tuple[str, ...]:
     return tuple(group for group in GROUPS if group in words)
 
 
-def list_trials(groups: Sequence[str], drags: int) -> list[Trial]:
-    """Return the trials of trajectories. `groups`: among `GROUPS`; `drags`: number of random drags."""
-    trials: list[Trial] = []
-    for group in groups:
-        if group == RANDOM:
-            trials += [Trial(f"{RANDOM}-{number + 1}", RANDOM, number) for number in range(drags)]
-        else:
-            trials.append(Trial(group, group))
-    return trials
+def list_trajectories(groups: Sequence[str], drags: int) -> list[str]:
+    """Return the trajectories of `groups`, among `GROUPS`; the random drags are ``random-1`` to `drags`."""
+    random = [f"{RANDOM}-{number}" for number in range(1, drags + 1)]
+    return [name for group in groups for name in (random if group == RANDOM else [group])]
 
 
-def place_trial(scene: Scene, trial: Trial) -> tuple[Scene, Callable[[Scene, Stopped], Record | None]]:
-    """Return a scene with the trajectory of a trial, and what measures it."""
-    if trial.group in LIMITS:
-        way = LIMITS[trial.group]
+def place_trial(scene: Scene, trajectory: str) -> tuple[Scene, Callable[[Scene, Stopped], Record | None]]:
+    """Return a scene with a trajectory, and what measures it."""
+    if trajectory in LIMITS:
+        way = LIMITS[trajectory]
         place_way(scene, way, HIGH)
         return scene, partial(search_limit, way=way)
-    if trial.group in PHASES:
-        placed, start, end = place_way(scene, *PHASES[trial.group])
+    if trajectory in PHASES:
+        placed, start, end = place_way(scene, *PHASES[trajectory])
         return lift_off(placed), partial(measure_trial, phase=(start, end))
     recorded = replace(scene, recorder=Recorder())
-    if trial.group == SESSION:
+    if trajectory == SESSION:
         return recorded, measure_trial
-    drawn = draw_drags(trial.number + 1)[-1] if trial.group == RANDOM else list_paths()[trial.group]
+    group, _, number = trajectory.partition("-")
+    drawn = draw_drags(int(number))[-1] if group == RANDOM else list_paths()[trajectory]
     interpolation, poses = drawn
     return lift_off(with_path(recorded, poses, interpolation)), measure_trial
 

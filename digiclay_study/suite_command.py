@@ -24,7 +24,7 @@ from digiclay.plots.figure import save
 from digiclay.plugins.method_loader import OwnRow
 
 from .league import Table, find_league
-from .method_trials import GROUPS, QUICK, list_trials, place_trial, read_groups
+from .method_trials import GROUPS, QUICK, list_trajectories, place_trial, read_groups
 from .study_plots import draw_measures, draw_rfd
 from .suite_page import (
     Provenance,
@@ -116,7 +116,7 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
     repeats = arguments.repeats or (2 if quick else 5)
     first = 1 if arguments.first_seed is None else arguments.first_seed
     seeds = tuple(range(first, first + repeats))
-    trials = list_trials(groups, _count_drags(arguments))
+    trajectories = list_trajectories(groups, _count_drags(arguments))
     path, settings = find(arguments.scene or SCENE), settings_of(arguments)
     noise = Setting("sensors.force_noise", arguments.noise or "2 mN", "--noise")
     scenes = {
@@ -133,9 +133,9 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
         raise ParameterError("--repeats", "", "must be 1 without noise", str(repeats))
     points: list[Point] = []
     for (method, seed), scene in scenes.items():
-        for trial in trials:
-            placed, measure = place_trial(scene, trial)
-            points.append(Point(len(points), (method, trial.name, str(seed)), placed, measure=measure))
+        for name in trajectories:
+            placed, measure = place_trial(scene, name)
+            points.append(Point(len(points), (method, name, str(seed)), placed, measure=measure))
     strength = sensors.force_noise if sensors else 0.0
     title, identity = find_name(path), identify(points, methods)
     return Plan(tuple(methods), groups, seeds, tuple(points), strength, title, identity)
