@@ -12,7 +12,14 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
-from ..core.files.run_folder import lock_name, read_json, remove_abandoned, resolve_inside, write_whole
+from ..core.files.run_folder import (
+    lock_name,
+    make_folder,
+    read_json,
+    remove_abandoned,
+    resolve_inside,
+    write_whole,
+)
 from ..core.metrics.metric_table import ERRORS, METRICS, RUN
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
@@ -64,14 +71,11 @@ class Folder:
         """Write the files of a job."""
         if job.scene is None:
             return
-        try:
-            self.find_job(job).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{self.find_job(job)} cannot be made: {error.strerror or error}.") from None
-        remove_abandoned(self.find_job(job))
-        write_code(job.scene, self.find_job(job))
-        write_whole(self.find_job(job) / SCENE, format_scene(job.scene).encode())
-        write_whole(self.find_job(job) / JOB, self.batch.outputs.format().encode())
+        folder = make_folder(self.find_job(job))
+        remove_abandoned(folder)
+        write_code(job.scene, folder)
+        write_whole(folder / SCENE, format_scene(job.scene).encode())
+        write_whole(folder / JOB, self.batch.outputs.format().encode())
 
     def read_failures(self) -> dict[str, str]:
         """Return why jobs failed that other processes have done, by their names.
@@ -98,17 +102,7 @@ class Folder:
 
     def write_index(self, failed: Mapping[str, str], summary: str) -> Path:
         """Write the page about all jobs; `failed` has the reasons by name."""
-        cards = []
-        for job in self.batch.jobs:
-            error = failed.get(job.name, "") or job.error
-            if error:
-                log = self.find_log(job)
-                links = [("log", f"{LOGS}/{log.name}")] if log.is_file() else []
-                cards.append(Card(job.name, links=links, error=error))
-            elif self.is_done(job):
-                cards.append(self._make_card(job))
-            else:
-                cards.append(Card(job.name, facts=UNDONE))
+        cards = [self._make_card(job, failed.get(job.name, "") or job.error) for job in self.batch.jobs]
         path = self.path / INDEX
         refresh = AGAIN if any(card.facts == UNDONE for card in cards) else 0
         with lock_name(path, PATIENCE):
@@ -128,19 +122,26 @@ class Folder:
         self.write_index(failed, f"{summary}.")
         return summary
 
-    def _make_card(self, job: Job) -> Card:
-        """Return the content of the page for a finished job."""
+    def _make_card(self, job: Job, error: str) -> Card:
+        """Return the content of the page for a job; `error`: why it has failed, empty if it has not."""
+        if error:
+            log = self.find_log(job)
+            links = [("log", f"{LOGS}/{log.name}")] if log.is_file() else []
+            return Card(job.name, links=links, error=error)
+        if not self.is_done(job):
+            return Card(job.name, facts=UNDONE)
         run = self.find_run(job)
         thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
         metrics, timing = (read_json(run / name) or {} for name in ("metrics.json", TIMING))
-        facts = [("method", str(metrics.get("method", "")))]
-        for name, metric in FACTS.items():
-            facts.append((metric.label, _format_figure(metrics.get(name), metric.factor, metric.shown)))
-        if metrics.get("beyond_a_finger"):
-            facts.append(("not to be trusted", metrics["beyond_a_finger"]))
         took = sum(value for value in timing.values() if isinstance(value, float))
-        facts += [
-            ("start of its process", _format_figure(timing.get("start_up"), 1.0, "s")),
+        facts = [
+            ("method", str(metrics.get("method", ""))),
+            *(
+                (fact.label, _format(metrics.get(name), fact.factor, fact.shown))
+                for name, fact in FACTS.items()
+            ),
+            ("not to be trusted", metrics.get("beyond_a_finger", "")),
+            ("start of its process", _format(timing.get("start_up"), 1.0, "s")),
             ("whole job", format_duration(took)),
         ]
         hidden = {*NAMES, TIMING, JOB}
@@ -210,7 +211,7 @@ def refresh_page(job: Path) -> None:
             series.write_page()
 
 
-def _format_figure(value: Any, factor: float, unit: str) -> str:
+def _format(value: Any, factor: float, unit: str) -> str:
     """Write a figure with its unit; nothing where there is none."""
     if value is None:
         return ""

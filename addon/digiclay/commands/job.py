@@ -92,9 +92,9 @@ def _do_alone(arguments: argparse.Namespace) -> int:
     except DigiclayError as error:
         if not isinstance(error, BusyError):  # another process may still do it
             note_failure(arguments.job, one_line(error))
-        refresh_page(arguments.job)
         raise
-    refresh_page(arguments.job)
+    finally:
+        refresh_page(arguments.job)
     say(arguments, outcome)
     return 0
 

@@ -19,6 +19,7 @@ from ..core.files.run_folder import (
     claim_files,
     format_json,
     lock_name,
+    make_folder,
     read_json,
     remove_abandoned,
     write_whole,
@@ -253,7 +254,7 @@ def make_frames(work: Work, kind: str, text: str) -> bool:
         return False
     refuse_without_blender()
     began = time.perf_counter()
-    with lock_name(_make_folder(folder) / format_range(frames)):
+    with lock_name(make_folder(folder) / format_range(frames)):
         _draw(work, read_run(run, *ARRAYS), looks, kind, frames, folder)
     note_film(run, kind, time.perf_counter() - began, encoded=False)
     return True
@@ -272,7 +273,7 @@ def make_film(work: Work, kind: str) -> bool:
     with claim_files([out], PATIENCE):
         found = read_run(run, *ARRAYS)
         frames = range(looks.count(found.history["time"]))
-        folder = _make_folder(find_frames(run, kind))
+        folder = make_folder(find_frames(run, kind))
         _draw(work, found, looks, kind, frames, folder)
         with scratch():
             encode_film([name_frame(folder, frame) for frame in frames], out, looks)
@@ -293,18 +294,9 @@ def _find_looks(work: Work, kind: str) -> Any:
     return looks
 
 
-def _make_folder(folder: Path) -> Path:
-    """Make the folder of frames in that of the run, and remove what killed processes have left in it."""
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from None
-    remove_abandoned(folder)
-    return folder
-
-
 def _draw(work: Work, run: Run, looks: Any, kind: str, frames: range, folder: Path) -> None:
-    """Draw those frames that are missing."""
+    """Draw those frames that are missing; what killed processes have left of others is removed."""
+    remove_abandoned(folder)
     if not list_missing(folder, frames):
         return
     from ..pictures.film import draw_frames

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..core.base.errors import OutputError
 from ..core.control.methods import METHODS
-from ..core.files.run_folder import write_whole
+from ..core.files.run_folder import make_folder, write_whole
 from ..plugins.method_loader import name_method
 from .arguments import add_command, say
 from .stop import refuse_unwritable
@@ -66,10 +66,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         raise OutputError(f"{path} is there already: choose another name, or --overwrite.")
     name = name_class(arguments.name)
     text = Template(TEMPLATE.read_text(encoding="utf-8")).substitute({"Class": name, "file": path.name})
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{path.parent} cannot be made: {error.strerror or error}.") from None
+    make_folder(path.parent)
     write_whole(path, text.encode())
     say(arguments, f"written to {path}", f"try: digiclay run slow_press --method {path}:{name}")
     return 0

@@ -187,6 +187,15 @@ def resolve_inside(folder: Path, *parts: str) -> Path:
     return path
 
 
+def make_folder(path: Path) -> Path:
+    """Make a folder and those above it, where there are none; OutputError if it cannot be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be made: {error.strerror or error}.") from None
+    return path
+
+
 def find_lock(path: Path) -> Path:
     """Return the lock file for making a file or folder of this name."""
     target = path.resolve()
