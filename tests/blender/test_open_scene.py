@@ -11,7 +11,7 @@ import pytest
 from digiclay import bridge
 from digiclay.core.scene.scene_source import SAMPLES, find, list_samples, load
 from digiclay.core.shapes.source_file import list_shapes
-from digiclay.operators.open_scene import SceneFiles
+from digiclay.operators.add_bed import SceneFiles
 from digiclay.recorded import takes
 from digiclay.roles import fingertip_of, is_bed
 from digiclay.settings import properties

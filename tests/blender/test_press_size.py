@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.scene.assembly import assemble
-from digiclay.operators.press_adjust import AdjustStrength
-from digiclay.operators.press_presets import BrushMenu
+from digiclay.operators.press_adjust import AdjustStrength, BrushMenu
 from digiclay.press import brush
 from digiclay.press.brush import FINGERS, find_kind
 from digiclay.roles import fingertip_of

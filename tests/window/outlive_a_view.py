@@ -39,10 +39,10 @@ def pick(blender: Any) -> Iterator[float | None]:
     yield None
     yield from blender.click(blender.on_the_bed(6, -9))
     blender.SEEN["picked elsewhere"] = list(picked(blender.beds()[0]))
-    blender.SEEN["told in"] = list(blender.part("operators.status")._TOLD)
+    blender.SEEN["told in"] = list(blender.part("operators.action")._TOLD)
     blender.key("RET", blender.middle())
     yield 0.3
-    blender.SEEN["after Enter"] = modal(), list(blender.part("operators.status")._TOLD)
+    blender.SEEN["after Enter"] = modal(), list(blender.part("operators.action")._TOLD)
     blender.window().workspace = home
     yield None
 

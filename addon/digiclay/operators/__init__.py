@@ -9,7 +9,7 @@ import importlib
 import pkgutil
 
 from ..compat import bpy
-from . import add_bed, export_mesh, open_scene, session_loop
+from . import add_bed, export_mesh, session_loop
 
 MODULES = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
 CLASSES: tuple[type, ...] = tuple(
@@ -21,8 +21,8 @@ CLASSES: tuple[type, ...] = tuple(
 #: Entries in Blender's own menus: the menu, and the function that draws the entry.
 MENUS = (
     ("VIEW3D_MT_mesh_add", add_bed.entry),
-    ("VIEW3D_MT_mesh_add", open_scene.samples_entry),
-    ("TOPBAR_MT_file_import", open_scene.import_entry),
+    ("VIEW3D_MT_mesh_add", add_bed.samples_entry),
+    ("TOPBAR_MT_file_import", add_bed.import_entry),
     ("TOPBAR_MT_file_export", export_mesh.entry),
     ("VIEW3D_MT_editor_menus", session_loop.leave_entry),
 )

@@ -1,4 +1,4 @@
-"""Common parts of the operators: polls with a reason, errors, ends in order, file browser, drawing."""
+"""Common parts of the operators: polls with a reason, errors, ends in order, files, timer, status bar."""
 
 # No postponed annotations in this package: Blender reads an operator's properties from them.
 import traceback
@@ -11,7 +11,6 @@ from ..core.base.errors import DigiclayError, one_line
 from ..panels.base import declare
 from ..settings.declared import number
 from ..ui_text import localize
-from . import status
 from .poll_messages import edited
 
 #: Functions of `poll_messages`.
@@ -95,11 +94,11 @@ class Action(Polled):
 
 def action(
     idname: str, label: str, *needs: Callable[[Any], str], options: Iterable[str] = ("REGISTER", "UNDO"),
-    in_any_mode: bool = False, **properties: Any,
+    in_any_mode: bool = False, bases: tuple[type, ...] = (Action,), **properties: Any,
 ) -> Callable[[Callable[[Any, Any], set[str] | None]], Any]:  # fmt: skip
     """Return a decorator that makes an operator, with properties, of its `perform` and its docstring."""
     return declare(
-        (Action, bpy.types.Operator), "perform", idname, label,
+        (*bases, bpy.types.Operator), "perform", idname, label,
         bl_options=set(options), needs=needs, in_any_mode=in_any_mode, __annotations__=properties,
     )  # fmt: skip
 
@@ -110,6 +109,29 @@ class FileAction(Action):
     def invoke(self, context: Any, event: Any) -> set[str]:
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
+
+
+def file_of(pattern: str, *options: str) -> dict[str, Any]:
+    """Declare the properties of a `FileAction`: the path, and which files the browser lists."""
+    return {
+        "filepath": bpy.props.StringProperty(subtype="FILE_PATH", options=set(options)),
+        "filter_glob": bpy.props.StringProperty(default=pattern, options={"HIDDEN"}),
+    }
+
+
+class TimedAction(Action):
+    """Mixin of an action that also goes on by a timer, s, while Blender draws; Esc ends it."""
+
+    def begin(self, context: Any, interval: float) -> set[str]:
+        """Become modal, with a timer."""
+        self.timer = context.window_manager.event_timer_add(interval, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: Any) -> None:
+        """Give back timer and status bar."""
+        context.window_manager.event_timer_remove(self.timer)
+        clear_status()
 
 
 class Drawing(Polled):
@@ -129,7 +151,7 @@ class Drawing(Polled):
 
     def end(self, context: Any, *result: str) -> set[str]:
         """Give back status bar and view; return the result."""
-        status.clear()
+        clear_status()
         if self.handler is not None:
             bpy.types.SpaceView3D.draw_handler_remove(self.handler, "WINDOW")
             self.handler = None
@@ -145,3 +167,28 @@ def millimeters(name: str, default: float, words: str, **limits: Any) -> Any:
     """Declare a length with a default in m as a property in mm."""
     limits = {"precision": 2, "step": 10} | limits
     return number(f"{name} (mm)", words, default=1e3 * default, **limits)
+
+
+#: Text in the status bar by the name of the workspace: Blender keeps it with that, and a modal operator
+#: outlives the one it was started in.
+_TOLD: dict[str, str] = {}
+
+
+def show_status(context: Any, words: str) -> None:
+    """Write words into the status bar, in place of those written before, in whichever workspace."""
+    name = context.workspace.name
+    if _TOLD.get(name) == words:
+        return
+    if name not in _TOLD:
+        clear_status()
+    context.workspace.status_text_set(words)
+    _TOLD[name] = words
+
+
+def clear_status() -> None:
+    """Take the words away wherever they stand; Blender's own come back."""
+    for name in _TOLD:
+        workspace = bpy.data.workspaces.get(name)
+        if workspace is not None:
+            workspace.status_text_set(None)
+    _TOLD.clear()

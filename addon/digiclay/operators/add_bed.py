@@ -1,27 +1,37 @@
-"""Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip; Rebuild: a bed from its settings."""
+"""Beds that are added: at rest, by scene files, samples, recorded runs; Rebuild: a bed by its settings."""
 
 from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from .. import bridge, preferences
 from ..compat import bpy
 from ..core.control.methods import METHODS
 from ..core.model.layout import ARRANGEMENTS, Layout
+from ..core.model.trajectory import sample_poses
+from ..core.scene.scene_source import find, list_samples, load
 from ..core.scene.schema import Scene
-from ..core.scene.toml_table import PRESETS
+from ..core.scene.toml_table import PRESETS, resolve
+from ..core.shapes.request import Shape
+from ..core.shapes.source_file import list_shapes
+from ..core.studies.job_table import embed_heights
 from ..device import palettes, view
-from ..device.instant import Instant, find_ellipsoid
+from ..device.instant import Instant, find_ellipsoid, pick_pose, read
+from ..exchange import shape_show
 from ..live import bed_state
+from ..panels.base import menu
 from ..press.occlusion import find_free_place
+from ..recorded import takes
 from ..roles import BALL, FINGER, HOUSING, ROLE, bed_of, fingertip_of
 from ..sessions import running
 from ..settings import own_presets, properties
-from ..settings.declared import choice, integer, number, title
+from ..settings.declared import choice, flag, integer, number, title
 from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, action, millimeters
+from .action import Action, FileAction, action, file_of, millimeters
 from .poll_messages import baked, edited, inside_edit, no_bed, session_runs
 
 DEFAULT = Layout()
@@ -239,3 +249,137 @@ def _remove(objects: Iterable[Any]) -> None:
 def entry(menu: Any, context: Any) -> None:
     """Draw the entry in Add > Mesh."""
     menu.layout.operator(AddBed.bl_idname, icon="MESH_GRID")
+
+
+@action(
+    "import_scene.digital_clay_run", "Import Digital Clay Run", bases=(Placed, FileAction),
+    options=("REGISTER", "UNDO", "PRESET"), **file_of("*.npz", "SKIP_PRESET"),
+    row=integer("Row", "Recorded row to show: 0 is the first, -1 the last", default=-1),
+)  # fmt: skip
+def import_run(operator: Any, context: Any) -> None:
+    """Show one instant of a Digital Clay run as a bed of pins"""
+    path = Path(bpy.path.abspath(operator.filepath))
+    instant, scene = read(path, operator.row), load(path.with_name("scene.toml"))
+    operator.place(context, add_shown(context, scene, instant))
+
+
+class AddSceneAction(Placed, Action):
+    """Mixin of operators that add the bed of a scene, as Add > Mesh > Digital Clay does."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    needs = (inside_edit,)
+
+    take: flag(
+        "Simulate as a Take", "Simulate the session of the scene and keep it as a take, for replay or bake",
+        default=True,
+    )  # fmt: skip
+
+    def add_scene(self, context: Any, scene: Scene) -> None:
+        """Add the bed of a scene, its fingertip where its path begins."""
+        scene = embed_heights(scene)
+        taken = takes.simulate(scene) if self.take else None
+        bed = add(context, scene)
+        bed.name = scene.name
+        start = pick_pose(sample_poses(scene.trajectories(), takes.START)[0])
+        bridge.place_fingertip(fingertip_of(bed), start, find_ellipsoid(scene))
+        words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
+        if taken is not None:
+            takes.add(bed, taken, scene.name)
+            words += localize(" Its session is the take {!r}.", scene.name)
+        elif self.take:
+            words += localize(" Its session is too long to be simulated here: use 'digiclay run'.")
+        self.report({"INFO"}, words)
+        self.place(context, bed)
+
+
+class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
+    """Add the bed of a Digital Clay scene file"""
+
+    bl_idname = "digiclay.open_scene"
+    bl_label = "Open Digital Clay Scene"
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Open the file browser, unless a file was dropped."""
+        return self.execute(context) if self.filepath else super().invoke(context, event)
+
+    def perform(self, context: Any) -> None:
+        self.add_scene(context, load(Path(bpy.path.abspath(self.filepath))))
+
+
+@action(
+    "digiclay.add_sample", "Digital Clay Sample", inside_edit, bases=(AddSceneAction,),
+    sample=choice(
+        "Sample", items=[
+            *((f"session:{name}", title(name), "A session") for name in list_samples()),
+            *((f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins") for name in list_shapes()),
+        ],
+    ),
+)  # fmt: skip
+def add_sample(operator: Any, context: Any) -> None:
+    """Add a bed with a sample session or shape of Digital Clay"""
+    kind, _, name = operator.sample.partition(":")
+    if kind == "session":
+        operator.add_scene(context, load(find(name)))
+        return
+    bed = add(context, resolve({}, name))
+    bed.name = title(name)
+    context.view_layer.update()
+    laid, _ = shape_show.show_file(bed, replace(Shape(), file=name))
+    operator.report({"INFO"}, laid.describe())
+    operator.place(context, bed)
+
+
+def _list_samples(layout: Any, kind: str, names: Iterable[str]) -> None:
+    """Draw an entry for each sample of a kind."""
+    for name in names:
+        layout.operator(add_sample.bl_idname, text=title(name)).sample = f"{kind}:{name}"
+
+
+@menu("DIGICLAY_MT_session_samples", "Sessions")
+def session_samples(entries: Any, context: Any) -> None:
+    """Sample sessions of Digital Clay"""
+    _list_samples(entries.layout, "session", list_samples())
+
+
+@menu("DIGICLAY_MT_shape_samples", "Shapes")
+def shape_samples(entries: Any, context: Any) -> None:
+    """Sample shapes of Digital Clay, displayed on a bed"""
+    _list_samples(entries.layout, "shape", list_shapes())
+
+
+@menu("DIGICLAY_MT_samples", "Digital Clay Samples")
+def samples(entries: Any, context: Any) -> None:
+    """Sample sessions and shapes of Digital Clay"""
+    entries.layout.menu(session_samples.bl_idname, icon="CON_TRACKTO")
+    entries.layout.menu(shape_samples.bl_idname, icon="RNDCURVE")
+    entries.layout.separator()
+    entries.layout.operator_context = "INVOKE_DEFAULT"
+    entries.layout.operator(OpenScene.bl_idname, text="Scene File...", icon="FILE_FOLDER")
+
+
+class SceneFiles(bpy.types.FileHandler):
+    """Drop of a scene file into the 3D view."""
+
+    bl_idname = "DIGICLAY_FH_scene"
+    bl_label = "Digital Clay Scene"
+    bl_import_operator = OpenScene.bl_idname
+    bl_file_extensions = ".toml"
+
+    @classmethod
+    def poll_drop(cls, context: Any) -> bool:
+        """Only a 3D view can take a bed."""
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def samples_entry(parent: Any, context: Any) -> None:
+    """Draw the submenu in Add > Mesh."""
+    parent.layout.menu(samples.bl_idname, icon="MESH_GRID")
+
+
+def import_entry(parent: Any, context: Any) -> None:
+    """Draw the entries in File > Import."""
+    parent.layout.operator(import_run.bl_idname, text="Digital Clay run (.npz)")
+    parent.layout.operator(OpenScene.bl_idname, text="Digital Clay scene (.toml)")

@@ -1,18 +1,205 @@
-"""File > Export > Digital Clay: the formed surface of a bed as a mesh file."""
+"""Formed surface as mesh objects, as a mesh file, and as a list of features."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from .. import bridge
 from ..compat import bpy
-from ..core.mesh_io.export_model import make_bodies
+from ..core.base.errors import OutputError
+from ..core.base.quantity import list_quantities
+from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, find_forward
+from ..core.surface.features import Finding, summarize
+from ..core.surface.skins import SKINS
 from ..exchange import formed_bed
 from ..panels.base import menu
+from ..panels.shape_exchange import LISTED
 from ..roles import bed_of
-from ..settings.declared import choice, flag
+from ..settings.declared import choice, flag, integer
+from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .make_mesh import SurfaceOptions, chosen_bed, sentence
+from .action import Action, action, millimeters
+from .add_bed import select_only
+from .poll_messages import from_rest, no_surface
+
+MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
+#: Space between the bed and what is put beside it, in widths of the bed.
+GAP = 0.35
+#: Marks what was made here, so that what is made next is put elsewhere.
+MADE = "digiclay_made"
+
+
+def sentence(text: str) -> str:
+    """Return a text as a tooltip: with a capital letter."""
+    return text[:1].upper() + text[1:]
+
+
+class FindingOptions(Action):
+    """Criteria of a feature."""
+
+    needs = (no_surface,)
+
+    threshold: millimeters(
+        "Threshold", Finding().threshold, sentence(FINDING["threshold"].doc) + ", in mm",
+        min=0.001, max=100.0, precision=3,
+    )  # fmt: skip
+    smallest: integer(
+        "Smallest (pins)", sentence(FINDING["smallest"].doc), default=Finding().smallest, min=1,
+        max=1_000_000, soft_max=100,
+    )  # fmt: skip
+
+    def finding(self) -> Finding:
+        """Return what counts as a feature."""
+        return Finding(threshold=to_si(self.threshold, 3), smallest=self.smallest)
+
+
+class SurfaceOptions(FindingOptions):
+    """Kind of mesh and skin."""
+
+    kind: choice(
+        "Mesh", "Kind of mesh made of the formed surface",
+        items=[(name, sentence(name), sentence(words)) for name, words in KINDS.items()],
+        default=Model().kind,
+    )  # fmt: skip
+    skin: choice(
+        "Skin", "Interpolation of the surface between the pins",
+        items=[(name, sentence(name), sentence(words)) for name, words in SKINS.items()],
+        default=Model().skin,
+    )  # fmt: skip
+    resolution: integer(
+        "Points a Pitch", sentence(MODEL["resolution"].doc), default=0, min=0, max=64, soft_max=16
+    )
+    base_thickness: millimeters(
+        "Base", Model().base_thickness, sentence(MODEL["base_thickness"].doc) + ", in mm",
+        min=0.01, max=1000.0, soft_max=50.0,
+    )  # fmt: skip
+
+    def model(self, bed: Any) -> Model:
+        """Return what is to be made of a bed."""
+        base = to_si(self.base_thickness, 3)
+        return formed_bed.model(
+            bed, kind=self.kind, skin=self.skin, resolution=self.resolution, base_thickness=base
+        )
+
+    def draw_surface(self, layout: Any) -> None:
+        """Draw the properties; those without effect on what is made are grayed out."""
+        layout.prop(self, "kind")
+        column = layout.column()
+        column.active = self.kind != "pins"
+        column.prop(self, "skin")
+        column.prop(self, "resolution")
+        row = layout.row()
+        row.active = self.kind in ("solid", "pins")
+        row.prop(self, "base_thickness")
+        column = layout.column(heading="Features")
+        column.prop(self, "threshold")
+        column.prop(self, "smallest")
+
+
+def chosen_bed(context: Any) -> Any:
+    """Return the bed to work on, or refuse where it has gone since the operator was called."""
+    bed = bed_of(context)
+    if bed is None:
+        raise OutputError("There is no bed any more: select one, or its fingertip.")
+    return bed
+
+
+class MakeMesh(SurfaceOptions, bpy.types.Operator):
+    """Make a mesh object of the formed surface of the active bed, with its features as vertex groups"""
+
+    bl_idname = "mesh.digital_clay_make"
+    bl_label = "Make Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    beside: flag("Beside the Bed", "Place the mesh beside the bed instead of on its surface", default=True)
+
+    def draw(self, context: Any) -> None:
+        self.layout.use_property_split = True
+        self.draw_surface(self.layout)
+        self.layout.prop(self, "beside")
+
+    def perform(self, context: Any) -> None:
+        bed = chosen_bed(context)
+        formed = formed_bed.read_formed(bed)
+        bodies = make_bodies(formed, self.model(bed), self.finding())
+        width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
+        where = _beside(context, bed, width) if self.beside else bed.matrix_world.copy()
+        things = []
+        for body in bodies:
+            name = f"{bed.name} {body.name if self.kind == 'features' else self.kind}"
+            new = formed_bed.make_object(body, name, smooth=self.kind != "pins")
+            new[MADE] = True
+            context.collection.objects.link(new)
+            new.matrix_world = where
+            things.append(new)
+        select_only(context, things[0])
+        for new in things[1:]:
+            new.select_set(True)
+        groups = bodies[0].groups
+        words = localize(" with vertex groups {}", ", ".join(groups)) if groups else ""
+        self.report({"INFO"}, localize("Made {}{}", ", ".join(new.name for new in things), words))
+
+
+def _beside(context: Any, bed: Any, width: float) -> Any:
+    """Return a matrix: the first place beside a bed, as wide as its pins, without a mesh made before."""
+    step, half = (1.0 + GAP) * width, width / 2
+    to_bed = np.array(bed.matrix_world.inverted_safe(), np.float64)
+    place = 1
+    for low, high in sorted(_spans(context, to_bed, half)):
+        if low < place * step + half and place * step - half < high:
+            place = int((high + half) // step) + 1
+    where = bed.matrix_world.copy()
+    where.translation += where.to_3x3() @ where.translation.__class__((place * step, 0.0, 0.0))
+    return where
+
+
+def _spans(context: Any, to_bed: Any, half: float) -> Iterator[tuple[float, float]]:
+    """Give from where to where along a bed's x axis the meshes made before stand that lie beside it."""
+    for thing in context.scene.objects:
+        if not thing.get(MADE):
+            continue
+        corners = np.column_stack([np.array(thing.bound_box, np.float64), np.ones(8)])
+        x, y = (corners @ (to_bed @ np.array(thing.matrix_world, np.float64)).T)[:, :2].T
+        if np.isfinite(x).all() and y.min() < half and y.max() > -half:
+            yield float(x.min()), float(x.max())
+
+
+class FindFeatures(FindingOptions, bpy.types.Operator):
+    """Find the bosses and creases of the active bed and list them in the panel"""
+
+    bl_idname = "digiclay.find_features"
+    bl_label = "List Features"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def perform(self, context: Any) -> None:
+        bed = chosen_bed(context)
+        features = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
+        lines = [summarize(features)]
+        for feature in features:
+            extreme = f"{feature.extreme * 1e3:.1f} mm {'high' if feature.kind == 'boss' else 'deep'}"
+            crest = f", crest {feature.crest_length * 1e3:.0f} mm" if feature.crests else ""
+            area, volume = feature.area * 1e6, feature.volume * 1e9
+            lines.append(f"{feature.name}: {extreme}{crest}, {feature.form}")
+            lines.append(f"    {area:.0f} mm², {volume:.0f} mm³, {len(feature.pins)} pins")
+        bed[LISTED] = "\n".join(lines)
+        self.report({"INFO"}, lines[0])
+
+
+@action("digiclay.keep_surface", "Measure from Here", no_surface)
+def keep_surface(operator: Any, context: Any) -> None:
+    """Measure features from the current surface"""
+    formed_bed.set_reference(chosen_bed(context))
+
+
+@action("digiclay.forget_surface", "Measure from Rest", no_surface, from_rest)
+def forget_surface(operator: Any, context: Any) -> None:
+    """Measure features from the bed at rest again"""
+    formed_bed.clear_reference(chosen_bed(context))
+
 
 #: Entries of the menu: words, icon, and the properties they stand for.
 ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (

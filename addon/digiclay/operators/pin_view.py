@@ -11,8 +11,7 @@ from ..overlay import views
 from ..press import aim
 from ..roles import bed_of
 from ..ui_text import localize
-from . import status
-from .action import Polled, action
+from .action import Polled, action, clear_status, show_status
 from .poll_messages import linked, no_bed, no_pins, no_skin, no_view
 
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
@@ -43,22 +42,22 @@ class PickPins(Polled, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         self.changed = False
-        status.show(context, localize(KEYS))
+        show_status(context, localize(KEYS))
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under a click; any other event is passed to the view."""
-        status.show(context, localize(KEYS))
+        show_status(context, localize(KEYS))
         if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
-            status.clear()
+            clear_status()
             return {"FINISHED"} if self.changed else {"CANCELLED"}
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             return self._click(context, event)
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Any) -> None:
-        status.clear()
+        clear_status()
 
     def _click(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under the mouse; a click beside the bed is passed to what lies there."""

@@ -1,30 +1,38 @@
-"""Actions on takes: record, keep, export as a scene file, remove; recorded strokes are played."""
+"""Takes: record, keep, export, remove, replay, bake; recorded strokes are played."""
 
+import time
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from .. import bridge, preferences
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
+from ..core.engine.simulation import begin
+from ..core.engine.state import State
 from ..core.files.run_folder import write_whole
+from ..core.model.fingertip import LEVEL
+from ..core.scene.assembly import assemble
 from ..core.scene.toml_table import format_scene
-from ..core.session.take import to_scene
-from ..live import handlers, tick
-from ..recorded import takes
+from ..core.session import snapshot
+from ..core.session.live_session import Clock, periods_due, simulate_path
+from ..core.session.take import MOST_PARTS, Take, refine, to_scene
+from ..device import view
+from ..device.instant import find_ellipsoid, pick_pose
+from ..live import bed_state, handlers, tick
+from ..recorded import bake, takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
-from ..roles import bed_of
+from ..roles import bed_of, fingertip_of
 from ..sessions import running, sculpting
-from ..settings.declared import text
+from ..settings import properties
+from ..settings.declared import choice, integer, text
 from ..ui_text import localize
-from .action import FileAction, action
-from .poll_messages import baked, cannot_record, linked, no_bed, no_recording, no_take, session_runs
+from .action import FileAction, TimedAction, action, file_of, show_status
+from .poll_messages import baked, cannot_record, linked, no_bake, no_bed, no_recording, no_take, session_runs
 
 TAKE = text("Take", "Number of the take; empty: the last one")
-
-
-class ChosenTake:
-    """Mixin of an operator on one take of the active bed."""
-
-    take: TAKE
 
 
 @action("digiclay.take_record", "Record Take", cannot_record)
@@ -55,7 +63,7 @@ def keep_take(operator: Any, context: Any) -> set[str] | None:
     return None
 
 
-class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
+class ExportTake(FileAction, bpy.types.Operator):
     """Write a take as a scene file for `digiclay run`"""
 
     bl_idname = "digiclay.take_export"
@@ -63,6 +71,7 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
     bl_options = {"REGISTER"}
     needs = no_bed, no_take
 
+    take: TAKE
     filepath: bpy.props.StringProperty(subtype="FILE_PATH")
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
@@ -90,29 +99,251 @@ def remove_take(operator: Any, context: Any) -> None:
     takes.remove(bed_of(context), takes.find(bed_of(context), operator.take).number)
 
 
-class PlayStrokes(FileAction, bpy.types.Operator):
+@action(
+    "digiclay.play_strokes", "Play Strokes", no_bed, session_runs, linked, baked, bases=(FileAction,),
+    **file_of("*.toml"),
+)  # fmt: skip
+def play(operator: Any, context: Any) -> None:
     """Form recorded strokes of the Press tool on the bed, from a file, as fast as they can be simulated"""
+    recorded = read_strokes(Path(bpy.path.abspath(operator.filepath)))
+    bed = bed_of(context)
+    for note in tick.start(context, bed):
+        operator.report({note.level}, note.message)
+    try:
+        session = running.find(bed)
+        assert session is not None  # it has just been started
+        *_, session = play_strokes(session, recorded.strokes)
+        tick.show(bed, session)
+        tick.place_finger(context, bed, session)
+    finally:  # when a stroke fails, the bed stays as it was
+        tick.stop(bed.session_uid)
+    operator.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))
 
-    bl_idname = "digiclay.play_strokes"
-    bl_label = "Play Strokes"
+
+class ReplayTake(TimedAction, bpy.types.Operator):
+    """Replay a take at its recorded speed. Esc stops and restores the bed"""
+
+    _states: Iterator[State]
+    _clock: Clock
+    _at: int
+
+    bl_idname = "digiclay.take_replay"
+    bl_label = "Replay Take"
     bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, session_runs, linked, baked
+    needs = no_bed, session_runs.reworded("Stop the session on this bed first"), no_take
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH")
-    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+    take: TAKE
+    parts: integer(
+        "Finer Steps", "Number of parts of each physics step: 1 replays the take bit for bit", default=1,
+        min=1, max=MOST_PARTS,
+    )  # fmt: skip
 
     def perform(self, context: Any) -> None:
-        """Play them in a session of their own; when one of them fails, the bed stays as it was."""
-        recorded = read_strokes(Path(bpy.path.abspath(self.filepath)))
+        """Play it without showing anything but its end."""
+        self._begin(context)
+        for state in self._states:
+            self._state, self._at = state, self._at + 1
+        self._finish(context)
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        self._begin(context)
+        return self.begin(context, 1.0 / preferences.get(context).redraw_rate)
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Continue by the wall clock."""
+        if event.type == "ESC" and event.value == "PRESS":
+            return self._restore(context)
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
         bed = bed_of(context)
-        for note in tick.start(context, bed):
-            self.report({note.level}, note.message)
+        if bed is None or bed.session_uid != self._uid:
+            return self._restore(context)
+        if bridge.find_fault(bed.data):  # it continues when it can be drawn again
+            self._clock = self._clock.stopped()
+            return {"PASS_THROUGH"}
+        period = self._system.period
+        count, self._clock = periods_due(
+            self._clock, time.perf_counter(), period, preferences.get(context).most_periods
+        )
+        for _ in range(min(count, self._take.periods - self._at)):
+            self._state = next(self._states)
+            self._at += 1
+        if self._at == self._take.periods:
+            self.cancel(context)
+            return self._finish(context)
+        view.show_state(bed, self._system, self._state)
+        self._place(bed)
+        seconds, whole = self._at * period, self._take.duration
+        show_status(context, localize("Replay: {:.1f} of {:.1f} s     Esc: stop", seconds, whole))
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context: Any) -> None:
+        """Give back what the replay needs of Blender, and the states to come."""
+        self._states = iter(())
+        super().cancel(context)
+
+    def give_up(self, context: Any, words: str) -> None:
+        """Show the bed as it was before."""
+        self._restore(context)
+
+    def _begin(self, context: Any) -> None:
+        """Read the take and put everything to its start."""
+        bed = bed_of(context)
+        self._uid = bed.session_uid
+        tip = fingertip_of(bed)
+        # The fingertip's pose now: it may have been moved since the last session.
+        self._stood = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
+        self._take: Take = takes.read(bed, self.take)
+        self._system = assemble(refine(self._take.scene, self.parts))
+        if self._system.grid.count != len(bed.data.vertices):
+            here, there = len(bed.data.vertices), self._system.grid.count
+            raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
+        self._state = snapshot.load(self._system, self._take.start)
+        take = self._take
+        self._states = simulate_path(self._system, self._state, take.poses, take.smoothing)
+        self._clock, self._at = Clock(), 0
+
+    def _place(self, bed: Any) -> None:
+        """Put the fingertip to where the take has it; one that is animated follows its animation."""
+        tip = fingertip_of(bed)
+        if tip is not None:
+            finger = find_ellipsoid(self._take.scene)
+            bridge.place_fingertip(tip, pick_pose(self._take.poses[self._at]), finger)
+
+    def _finish(self, context: Any) -> set[str]:
+        """Leave the bed in the final state of the take, and report the comparison."""
+        bed, system = bed_of(context), self._system
+        state = snapshot.dump(system, self._state)
+        self._place(bed)
+        # The session that would go on from here.
+        uid, pose, tick_count = bed.session_uid, pick_pose(self._take.poses[-1]), bed_state.read_tick(bed)
+        begun = sculpting.begin_session(uid, bed.name, self._take.scene, pose, state, tick_count)
+        bed_state.write(bed, begun[0])
+        view.show_state(bed, system, self._state)
+        seconds = f"{self._take.duration:.1f} s"
+        if state == self._take.end:
+            self.report({"INFO"}, localize("Replayed {}: it ends in the same state, bit for bit", seconds))
+            return {"FINISHED"}
+        recorded = snapshot.load(self._system, self._take.end)
+        away = 1e6 * float(np.abs(self._state.row(0) - recorded.row(0)).max())
+        if self.parts == 1:
+            words = localize("Replayed {}: it ends {:.3g} µm away, as another version may", seconds, away)
+            self.report({"WARNING"}, words)
+        else:
+            words = localize("steps {} times finer end {:.3g} µm away", self.parts, away)
+            self.report({"INFO"}, localize("Replayed {}: {}", seconds, words))
+        return {"FINISHED"}
+
+    def _restore(self, context: Any) -> set[str]:
+        """Show the bed as it was before."""
+        self.cancel(context)
+        bed = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
+        if bed is not None:
+            try:
+                scene = properties.scene_of(bed)
+                before, _ = sculpting.begin_session(
+                    bed.session_uid, bed.name, scene, self._stood, bed_state.read_snapshot(bed)
+                )
+                view.show_state(bed, before.system, before.state)
+                tick.place_finger(context, bed, before)
+            except DigiclayError as error:
+                self.report({"WARNING"}, str(error))
+        self.report({"INFO"}, localize("Replay stopped: the bed is restored"))
+        return {"CANCELLED"}
+
+
+#: Time between two looks at the user's keys, s, and the share of it that is worked.
+TICK, SHARE = 0.05, 0.9
+SOURCES = (
+    ("FINGERTIP", "Animated Fingertip", "The fingertip as it moves in the frames of the scene"),
+    ("TAKE", "Take", "The fingertip as it was recorded in a session"),
+)
+
+
+class Bake(TimedAction, bpy.types.Operator):
+    """Make an ordinary animation of the bed from a session; it plays and renders without simulation"""
+
+    bl_idname = "digiclay.bake"
+    bl_label = "Bake Session"
+    bl_options = {"REGISTER", "UNDO"}
+    needs = no_bed, session_runs.reworded("Stop the session on this bed first")
+
+    take: TAKE
+    source: choice("Source", "Source of the fingertip path", items=SOURCES, default="FINGERTIP")
+    first: integer("First Frame", "First frame of the session", default=1)
+    last: integer("Last Frame", "Last frame of the session; a take has its own length", default=250)
+
+    def perform(self, context: Any) -> None:
+        for _ in self.work(context):
+            pass
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Take the scene's frames where none are asked for, and begin; work goes on while Blender draws."""
+        if not self.properties.is_property_set("first"):
+            self.first = context.scene.frame_start
+        if not self.properties.is_property_set("last"):
+            self.last = context.scene.frame_end
+        self._steps = self.work(context)
+        context.window_manager.progress_begin(0.0, 100.0)
+        return self.begin(context, TICK)
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Work for a moment, unless the user has had enough."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self.cancel(context)
+            self.report({"INFO"}, localize("{}: stopped, nothing was changed", localize(self.bl_label)))
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        until = time.perf_counter() + SHARE * TICK
         try:
-            session = running.find(bed)
-            assert session is not None  # it has just been started
-            *_, session = play_strokes(session, recorded.strokes)
-            tick.show(bed, session)
-            tick.place_finger(context, bed, session)
-        finally:
-            tick.stop(bed.session_uid)
-        self.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))
+            share = next(self._steps)
+            while time.perf_counter() < until:
+                share = next(self._steps)
+        except StopIteration:
+            self.cancel(context)
+            return {"FINISHED"}
+        context.window_manager.progress_update(100.0 * share)
+        show_status(context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share))
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: Any) -> None:
+        """Take back what shows the progress."""
+        self._steps.close()
+        context.window_manager.progress_end()
+        super().cancel(context)
+
+    def work(self, context: Any) -> Generator[float, None, None]:
+        """Read the path, simulate it and write the bake, which Esc leaves out; yield the share done."""
+        bed, scene = bed_of(context), context.scene
+        recorded = self.source == "TAKE"
+        if recorded:
+            take = takes.read(bed, self.take)
+        else:
+            made = properties.scene_of(bed)
+            period = made.simulation.control_period
+            poses = np.empty((0, 1, 7))
+            for step in bake.sample_path(scene, bed, self.first, self.last, period):
+                if isinstance(step, float):
+                    yield 0.3 * step
+                else:
+                    poses = step
+            system = assemble(made)
+            # How the path ends is unknown before its simulation, and nothing asks for it.
+            take = Take(made, snapshot.dump(system, begin(system)), poses, b"")
+        rate = scene.render.fps / scene.render.fps_base
+        for part in bake.simulate_frames(take, rate):
+            if isinstance(part, float):
+                yield 0.3 + 0.7 * part
+            else:
+                moments = part
+        bake.apply(bed, moments, self.first, find_ellipsoid(take.scene), keyframe_finger=recorded)
+        count = len(moments.height)
+        last = self.first + count - 1
+        self.report({"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, last))
+
+
+@action("digiclay.bake_free", "Free Bake", no_bed, no_bake)
+def free_bake(operator: Any, context: Any) -> None:
+    """Remove the bake: the bed shows its own state again. Keyframes of the fingertip stay"""
+    bake.free(bed_of(context))
