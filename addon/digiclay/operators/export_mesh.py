@@ -168,25 +168,20 @@ def _spans(context: Any, to_bed: Any, half: float) -> Iterator[tuple[float, floa
             yield float(x.min()), float(x.max())
 
 
-class FindFeatures(FindingOptions, bpy.types.Operator):
+@action("digiclay.find_features", "List Features", no_surface, bases=(FindingOptions,))
+def list_features(operator: Any, context: Any) -> None:
     """Find the bosses and creases of the active bed and list them in the panel"""
-
-    bl_idname = "digiclay.find_features"
-    bl_label = "List Features"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def perform(self, context: Any) -> None:
-        bed = chosen_bed(context)
-        features = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
-        lines = [summarize(features)]
-        for feature in features:
-            extreme = f"{feature.extreme * 1e3:.1f} mm {'high' if feature.kind == 'boss' else 'deep'}"
-            crest = f", crest {feature.crest_length * 1e3:.0f} mm" if feature.crests else ""
-            area, volume = feature.area * 1e6, feature.volume * 1e9
-            lines.append(f"{feature.name}: {extreme}{crest}, {feature.form}")
-            lines.append(f"    {area:.0f} mm², {volume:.0f} mm³, {len(feature.pins)} pins")
-        bed[LISTED] = "\n".join(lines)
-        self.report({"INFO"}, lines[0])
+    bed = chosen_bed(context)
+    features = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), operator.finding())
+    lines = [summarize(features)]
+    for feature in features:
+        extreme = f"{feature.extreme * 1e3:.1f} mm {'high' if feature.kind == 'boss' else 'deep'}"
+        crest = f", crest {feature.crest_length * 1e3:.0f} mm" if feature.crests else ""
+        area, volume = feature.area * 1e6, feature.volume * 1e9
+        lines.append(f"{feature.name}: {extreme}{crest}, {feature.form}")
+        lines.append(f"    {area:.0f} mm², {volume:.0f} mm³, {len(feature.pins)} pins")
+    bed[LISTED] = "\n".join(lines)
+    operator.report({"INFO"}, lines[0])
 
 
 @action("digiclay.keep_surface", "Measure from Here", no_surface)

@@ -283,22 +283,17 @@ def fingers(entries: Any, context: Any) -> None:
         entries.layout.operator(TakeFinger.bl_idname, text=kind.label).kind = name
 
 
-class ApplyBrush(Action, bpy.types.Operator):
+@action(
+    "digiclay.press_brush", "Brush Preset", no_tool_in_view, no_finger, options=("UNDO", "INTERNAL"),
+    filepath=bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}),
+    menu_idname=bpy.props.StringProperty(default="DIGICLAY_MT_brushes", options={"SKIP_SAVE"}),
+)  # fmt: skip
+def apply_brush(operator: Any, context: Any) -> None:
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""
-
-    bl_idname = "digiclay.press_brush"
-    bl_label = "Brush Preset"
-    bl_options = {"UNDO", "INTERNAL"}
-    needs = no_tool_in_view, no_finger
-
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    menu_idname: bpy.props.StringProperty(default="DIGICLAY_MT_brushes", options={"SKIP_SAVE"})
-
-    def perform(self, context: Any) -> None:
-        try:
-            bpy.ops.script.execute_preset(filepath=self.filepath, menu_idname=self.menu_idname)
-        except RuntimeError as error:  # what Blender says of the file
-            raise DigiclayError(str(error).removeprefix("Error: ").strip()) from None
+    try:
+        bpy.ops.script.execute_preset(filepath=operator.filepath, menu_idname=operator.menu_idname)
+    except RuntimeError as error:  # what Blender says of the file
+        raise DigiclayError(str(error).removeprefix("Error: ").strip()) from None
 
 
 class BrushMenu(bpy.types.Menu):
@@ -307,7 +302,7 @@ class BrushMenu(bpy.types.Menu):
     bl_idname = "DIGICLAY_MT_brushes"
     bl_label = "Presets"
     preset_subdir = brush.SUBFOLDER
-    preset_operator = ApplyBrush.bl_idname
+    preset_operator = apply_brush.bl_idname
     draw = bpy.types.Menu.draw_preset
 
 

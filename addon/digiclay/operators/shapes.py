@@ -1,6 +1,5 @@
 """Shape of a bed: from an object, a file, a sample, or the formed surface; its removal."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from ..settings import properties
 from ..settings.declared import choice, number, title
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, FileAction, Needs, action, millimeters
+from .action import Action, FileAction, action, file_of, millimeters
 from .poll_messages import baked, linked, no_bed, no_shape, session_runs
 
 DEFAULT = Shape()
@@ -36,19 +35,18 @@ RELIEFS = (
 LENGTH = {"soft_min": -100.0, "soft_max": 100.0, "min": -1e5, "max": 1e5, "step": 20}
 
 
+#: Needs of the operators that display a shape.
+NEEDS = (
+    no_bed,
+    session_runs.reworded("Stop the session first: the bed is going to be shaped anew"),
+    baked,
+    linked,
+)
+
+
 class Shaped(Action):
     """Mixin of the operators that display a shape: its placement, and the report."""
 
-    bl_options = {"REGISTER", "UNDO"}
-    needs: Needs = (
-        no_bed,
-        session_runs.reworded("Stop the session first: the bed is going to be shaped anew"),
-        baked,
-        linked,
-    )
-
-    #: Displays the shape on a bed; returns what `shape_show` does.
-    display: Callable[[Any, Any], Any]
     fit: choice("Size", "Placement on the bed", items=FITS, default=DEFAULT.fit)
     scale: number("Times", "Scale of the plan", default=1.0, min=1e-3, max=1e3)
     x: millimeters("Right", DEFAULT.x, "Shift of its middle from the bed's along x", **LENGTH)
@@ -59,11 +57,8 @@ class Shaped(Action):
     )
     foot: millimeters("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest", **LENGTH)
 
-    def perform(self, context: Any) -> None:
-        """Display the shape, and report its parts beyond the bed."""
-        bed = bed_of(context)
-        context.view_layer.update()
-        laid, off = self.display(context, bed)
+    def tell(self, bed: Any, laid: Any, off: float) -> None:
+        """Report what `shape_show` has displayed, and its parts beyond the bed."""
         lost = laid.too_low + laid.too_high + laid.overhanging
         words = localize("{}; displayed to within {:.2g} µm", laid.describe(), off * 1e6)
         running.set_message(words, bed.session_uid)
@@ -79,6 +74,12 @@ class Shaped(Action):
         )  # fmt: skip
 
 
+def _updated_bed(context: Any) -> Any:
+    """Return the active bed, placed as Blender has evaluated it."""
+    context.view_layer.update()
+    return bed_of(context)
+
+
 def _others(context: Any, bed: Any) -> list[Any]:
     """Return the selected objects with a surface that are no part of a bed."""
     return [thing for thing in context.selected_objects if thing != bed and shape_show.has_surface(thing)]
@@ -92,51 +93,42 @@ def _not_two(context: Any) -> str:
     return "" if count else "Select the object first, then the bed with Shift: its upper side is displayed"
 
 
-class ShapeFromObject(Shaped, bpy.types.Operator):
+@action("digiclay.shape_from_object", "Shape from Object", *NEEDS, _not_two, bases=(Shaped,))
+def show_object(operator: Any, context: Any) -> None:
     """Display the upper side of another selected object on the active bed, driving the pins there"""
-
-    bl_idname = "digiclay.shape_from_object"
-    bl_label = "Shape from Object"
-    needs = (*Shaped.needs, _not_two)
-
-    def display(self, context: Any, bed: Any) -> Any:
-        (thing,) = _others(context, bed)
-        relief = shape_show.read_relief(thing, bed, context.evaluated_depsgraph_get())
-        return shape_show.show_relief(bed, relief, self.shape(thing.name, bed))
+    bed = _updated_bed(context)
+    (thing,) = _others(context, bed)
+    relief = shape_show.read_relief(thing, bed, context.evaluated_depsgraph_get())
+    operator.tell(bed, *shape_show.show_relief(bed, relief, operator.shape(thing.name, bed)))
 
 
-class ShapeFromFile(Shaped, FileAction, bpy.types.Operator):
-    """Display a mesh, a picture (bright is high) or a .npy file of heights on the active bed"""
-
-    bl_idname = "digiclay.shape_from_file"
-    bl_label = "Shape from File"
-
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH")
-    filter_glob: bpy.props.StringProperty(default=";".join(f"*{kind}" for kind in KINDS), options={"HIDDEN"})
-    up: choice(
+@action(
+    "digiclay.shape_from_file", "Shape from File", *NEEDS, bases=(Shaped, FileAction),
+    **file_of(";".join(f"*{kind}" for kind in KINDS)),
+    up=choice(
         "Up", "Upward direction of a mesh; automatic: y in a glTF file, else z",
         items=[("auto", "Automatic", ""), *((way, way.upper(), "") for way in UPWARDS)],
-    )  # fmt: skip
-    unit: choice(
+    ),
+    unit=choice(
         "Unit", "Unit of length of a mesh; automatic: meters in a glTF file, else millimeters",
         items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
-    )  # fmt: skip
+    ),
+)  # fmt: skip
+def show_file(operator: Any, context: Any) -> None:
+    """Display a mesh, a picture (bright is high) or a .npy file of heights on the active bed"""
+    bed, path = _updated_bed(context), str(Path(bpy.path.abspath(operator.filepath)))
+    shape = operator.shape(path, bed, up=operator.up, unit=operator.unit)
+    operator.tell(bed, *shape_show.show_file(bed, shape))
 
-    def display(self, context: Any, bed: Any) -> Any:
-        path = str(Path(bpy.path.abspath(self.filepath)))
-        return shape_show.show_file(bed, self.shape(path, bed, up=self.up, unit=self.unit))
 
-
-class ShapeSample(Shaped, bpy.types.Operator):
+@action(
+    "digiclay.shape_sample", "Sample Shape", *NEEDS, bases=(Shaped,),
+    sample=choice("Shape", items=[(name, title(name), "") for name in list_shapes()]),
+)  # fmt: skip
+def show_sample(operator: Any, context: Any) -> None:
     """Display a sample shape of Digital Clay on the active bed"""
-
-    bl_idname = "digiclay.shape_sample"
-    bl_label = "Sample Shape"
-
-    sample: choice("Shape", items=[(name, title(name), "") for name in list_shapes()])
-
-    def display(self, context: Any, bed: Any) -> Any:
-        return shape_show.show_file(bed, self.shape(self.sample, bed))
+    bed = _updated_bed(context)
+    operator.tell(bed, *shape_show.show_file(bed, operator.shape(operator.sample, bed)))
 
 
 @action("digiclay.shape_keep", "Keep Formed as Shape", no_bed, session_runs, options=("UNDO",))
