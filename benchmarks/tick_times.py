@@ -26,12 +26,13 @@ from digiclay.core.session import accuracy, live_session, snapshot
 from digiclay.device import view
 from digiclay.device.instant import Instant, find_ellipsoid
 from digiclay.device.node_tree import MEMBRANE
-from digiclay.live import bed_state, tick
+from digiclay.live import beds as live_beds
+from digiclay.live import tick
 from digiclay.operators.add_bed import add, select_only
 from digiclay.panels import display
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running, sculpting
-from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
 from digiclay.strokes.stroke import draw
@@ -120,7 +121,7 @@ def _time_parts(clock: Callable[[], float]) -> Iterator[defaultdict[str, float]]
         (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"), (accuracy, "note", "monitor"),
         (accuracy, "catch_up", "monitor"), (accuracy, "begin_stretch", "monitor"),
         (snapshot, "dump", "pack"), (tick, "_move_finger", "finger"),
-        (tick, "_evaluate", "evaluate"), (bed_state, "write", "store"), (view, "show_state", "show"),
+        (tick, "_evaluate", "evaluate"), (live_beds, "write", "store"), (view, "show_state", "show"),
     ]  # fmt: skip
     former: list[tuple[Any, str, Any]] = [(module, name, getattr(module, name)) for module, name, _ in places]
     running_parts: set[str] = set()

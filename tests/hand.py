@@ -10,7 +10,7 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.toml_table import resolve
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
-from digiclay.sessions.stroke_queue import change_stroke
+from digiclay.sessions.sculpting import change_stroke
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

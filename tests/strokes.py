@@ -7,7 +7,7 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
-from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.stroke import Brush, draw
 from numpy.typing import NDArray

@@ -15,7 +15,7 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.session.accuracy import Errors
 from digiclay.device import palettes, view
 from digiclay.device.node_tree import ARROW_LENGTH, ARROWS, TOP_FORCE
-from digiclay.live import bed_state
+from digiclay.live import beds
 from digiclay.operators.pin_view import pick_pins
 from digiclay.overlay import views
 from digiclay.overlay.picture import choose_colors
@@ -92,7 +92,7 @@ def test_turning_the_heat_map_on_shows_the_forces_of_now(bed: Any, session: runn
 
 
 def test_arrows_after_a_session_show_the_forces_it_ended_with(bed: Any, session: running.Running) -> None:
-    bed_state.write(bed, session)
+    beds.write(bed, session)
     running.drop(session.uid)
     bed.digiclay_display.arrows = True
     np.testing.assert_allclose(forces(bed), session.state.row(session.system.rows.force), rtol=2.0**-23)

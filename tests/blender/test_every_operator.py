@@ -13,7 +13,7 @@ from digiclay.live import handlers, tick
 from digiclay.press import tool
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
-from digiclay.sessions.stroke_queue import queue_stroke
+from digiclay.sessions.sculpting import queue_stroke
 
 from tests.blender.at_hand import in_the_view, new_bed, select
 from tests.blender.session.live import Clock

@@ -15,7 +15,7 @@ from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.device.node_tree import TOP_FORCE
 from digiclay.exchange import formed_bed
-from digiclay.live import bed_state, tick
+from digiclay.live import beds, tick
 from digiclay.recorded import takes
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
@@ -91,9 +91,9 @@ def test_the_take_replays_to_the_stored_heights() -> None:
 def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip() -> None:
     found = bed("Session")
     pose = bridge.pose(fingertip_of(found))
-    np.testing.assert_allclose(pose, bed_state.read_pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits
+    np.testing.assert_allclose(pose, beds.read_pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
-    assert bed_state.read_snapshot(found) is None
+    assert beds.read_snapshot(found) is None
     assert (exact(found) == 40e-3).all()
     assert running.list_sessions() == ()
 

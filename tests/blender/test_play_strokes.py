@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.live import bed_state
+from digiclay.live import beds
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 
@@ -36,7 +36,7 @@ def test_strokes_are_formed_and_kept_by_the_bed(bed: Any, tmp_path: Path) -> Non
     assert bpy.ops.digiclay.play_strokes(filepath=str(file)) == {"FINISHED"}
     assert heights(bed)[4, 5] > 1.5
     assert running.find(bed) is None
-    assert bed_state.read_snapshot(bed) is not None
+    assert beds.read_snapshot(bed) is not None
     # Its fingertip is above the bed again, of its own size.
     assert bridge.finger_of(fingertip_of(bed)).width == pytest.approx(8e-3)
     assert bridge.pose(fingertip_of(bed))[2] > 40e-3

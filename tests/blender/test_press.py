@@ -14,7 +14,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import make_grid
 from digiclay.press import aim, brush, tool
-from digiclay.press.drape import drape
+from digiclay.press.tool import drape
 from digiclay.roles import fingertip_of
 from digiclay.settings import properties
 from digiclay.strokes.stroke import Brush

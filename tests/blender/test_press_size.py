@@ -15,7 +15,7 @@ from digiclay.operators.press_adjust import AdjustStrength, BrushMenu
 from digiclay.press import brush
 from digiclay.press.brush import FINGERS, find_kind
 from digiclay.roles import fingertip_of
-from digiclay.settings import finger_size, properties
+from digiclay.settings import devices, properties
 
 from tests.blender.at_hand import in_the_view, new_bed
 
@@ -98,7 +98,7 @@ def test_a_blister_that_the_bed_limits_is_the_same_again_with_the_size_before(be
 
 @pytest.mark.parametrize(("asked", "got"), [(-5.0, 1.0), (0.0, 1.0), (1e9, 200.0)])
 def test_a_size_stays_within_what_a_finger_can_have(bed: Any, asked: float, got: float) -> None:
-    finger_size.set_size(bed.digiclay, 1e-3 * asked)
+    devices.set_size(bed.digiclay, 1e-3 * asked)
     assert lengths(bed)[0] == pytest.approx(got, rel=1e-6)
 
 
@@ -157,7 +157,7 @@ def test_each_preset_sets_a_known_finger_and_every_setting(settings: Any, file: 
     assert str(SHIPPED) in bpy.utils.preset_paths(brush.SUBFOLDER)
     bpy.context.object.digiclay.size = 40.0
     apply(file.stem)
-    assert find_kind(finger_size.read_finger(bpy.context.object.digiclay)) in FINGERS.values()
+    assert find_kind(devices.read_finger(bpy.context.object.digiclay)) in FINGERS.values()
     written = {line.split(" = ")[0] for line in file.read_text().splitlines() if " = " in line}
     assert set(brush.preset_values(settings)) <= written
 

@@ -18,7 +18,7 @@ from digiclay.core.scene.scene_source import find, list_samples, load
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
-from digiclay.live import bed_state
+from digiclay.live import beds
 from digiclay.roles import fingertip_of
 from digiclay.settings import properties
 from digiclay.settings.declared import read
@@ -211,7 +211,7 @@ def identity(bed: Any) -> tuple[Any, ...]:
 
 def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_says(bed: Any) -> None:
     view.color_by(bed, "force")
-    bed[bed_state.STATE], before, settings = b"of 48 pins", identity(bed), bed.digiclay
+    bed[beds.STATE], before, settings = b"of 48 pins", identity(bed), bed.digiclay
     settings.layout.rows, settings.layout.columns, settings.layout.arrangement = 9, 20, "hexagonal"
     settings.actuator.rest_height = 30.0
     assert bpy.ops.digiclay.rebuild() == {"FINISHED"}
@@ -220,7 +220,7 @@ def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_sa
     np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
     np.testing.assert_allclose(cells["height"], 0.030, rtol=0, atol=FLOAT32)
     assert set(cells["mode"]) == {Mode.REST}
-    assert (identity(bed), bed_state.read_snapshot(bed), len([*instances(bed)])) == (before, None, 180)
+    assert (identity(bed), beds.read_snapshot(bed), len([*instances(bed)])) == (before, None, 180)
     # The housing is about all of them.
     shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
     housing, pins = (max(vertex.co.x for vertex in one.data.vertices) for one in (shown, bed))

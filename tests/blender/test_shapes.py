@@ -15,7 +15,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
 from digiclay.core.shapes.fitting import unpack as heights_of
 from digiclay.exchange import image_reader
-from digiclay.live import bed_state
+from digiclay.live.beds import read_snapshot
 from digiclay.roles import fingertip_of, is_bed
 from digiclay.settings import properties
 
@@ -73,7 +73,7 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
     assert bridge.pose(fingertip_of(made))[2] > wanted.max()  # the finger is lifted out of it
     # A session goes on from there: its state is in the bed, and the method has taken over.
     system = assemble(scene)
-    state = snapshot.load(system, bed_state.read_snapshot(made))
+    state = snapshot.load(system, read_snapshot(made))
     assert system.controller.is_displayed(state.memory)
     assert np.abs(state.row(0) - wanted).max() <= SHOWN
 
@@ -121,7 +121,7 @@ def test_a_shape_is_taken_back_by_undo() -> None:
     made = beds()[0]
     assert np.ptp(heights(made)) == 0.0
     assert not made.digiclay.use_shape
-    assert bed_state.read_snapshot(made) is None
+    assert read_snapshot(made) is None
 
 
 def test_a_file_is_displayed_without_any_other_library(tmp_path: Path) -> None:

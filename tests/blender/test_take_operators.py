@@ -12,7 +12,7 @@ from digiclay import bridge
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.scene.scene_source import load
 from digiclay.device import view
-from digiclay.live import bed_state, tick
+from digiclay.live import beds, tick
 from digiclay.recorded import bake, takes
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
@@ -66,13 +66,13 @@ def record(bed: Any) -> str:
 
 def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(bed: Any) -> None:
     number = record(bed)
-    kept, drawn = bed_state.read_snapshot(bed), heights(bed)
+    kept, drawn = beds.read_snapshot(bed), heights(bed)
     begin(bed)
     press(bed, deep=11e-3)
     tick.stop(bed.session_uid)
-    assert bed_state.read_snapshot(bed) != kept
+    assert beds.read_snapshot(bed) != kept
     assert bpy.ops.digiclay.take_replay(take=number) == {"FINISHED"}
-    assert bed_state.read_snapshot(bed) == kept == takes.read(bed, number).end
+    assert beds.read_snapshot(bed) == kept == takes.read(bed, number).end
     assert np.array_equal(heights(bed), drawn)
     begin(bed)  # it goes on from there
     assert running.find(bed).state.period == takes.read(bed, number).periods

@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import pytest
 from digiclay.core.session import live_session
-from digiclay.live import bed_state
+from digiclay.live import beds
 from digiclay.sessions import running, sculpting
 
 from benchmarks import tick_times
@@ -24,9 +24,9 @@ BED = (11, 11, 3e-3, 2e-3)
 
 
 def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
-    before, objects = (sculpting.advance, bed_state.write), len(bpy.data.objects)
+    before, objects = (sculpting.advance, beds.write), len(bpy.data.objects)
     timed = draw_circles(*BED, ticks=12)
-    assert (sculpting.advance, bed_state.write, len(bpy.data.objects)) == (*before, objects)
+    assert (sculpting.advance, beds.write, len(bpy.data.objects)) == (*before, objects)
     assert running.list_sessions() == ()
     assert timed.spent.shape == timed.elapsed.shape == (12,)
     for name in ("read", "simulate", "pack", "finger", "store", "show", "evaluate"):

@@ -31,7 +31,7 @@ from digiclay.core.session.live_session import (
 from digiclay.core.session.recent_trace import ROWS
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
-from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import draw
 from numpy.typing import NDArray
 

@@ -12,7 +12,7 @@ from digiclay.core.surface.pointing import (
     find_ray,
     intersect_surface,
 )
-from digiclay.press.drape import drape
+from digiclay.press.tool import drape
 from hypothesis import example, given
 from hypothesis import strategies as st
 

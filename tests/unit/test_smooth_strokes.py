@@ -14,7 +14,7 @@ from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
-from digiclay.sessions.stroke_queue import change_stroke, queue_stroke
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import SYMMETRIES, Brush, draw
 from digiclay.strokes.sweep import find_radius
 

@@ -11,7 +11,7 @@ from digiclay.core.model.fingertip import LEVEL, Fingertip, make_matrices
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
-from digiclay.sessions.stroke_queue import change_stroke, drop_strokes, find_stroke, last_place, queue_stroke
+from digiclay.sessions.sculpting import change_stroke, drop_strokes, find_stroke, last_place, queue_stroke
 from digiclay.strokes.motion import APPROACH, DRAG, SPEED, TURN, follow, lean_finger, mirror_turn, turn_toward
 from digiclay.strokes.stroke import (
     DEEPEST,

@@ -112,7 +112,7 @@ def replayed(blender: Any) -> Iterator[float | None]:
     note(blender, "replay stopped")
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
     end = blender.part("recorded.takes").read(blender.beds()[0], "1").end
-    yield from blender.until(lambda: blender.part("live.bed_state").read_snapshot(blender.beds()[0]) == end)
+    yield from blender.until(lambda: blender.part("live.beds").read_snapshot(blender.beds()[0]) == end)
     yield 1.0
     note(blender, "replayed")
 

@@ -159,7 +159,7 @@ def check(blender: Any) -> None:
         assert height.max() <= session.system.cell.actuator.stroke
         bed = blender.part("live.beds").find_bed(session.uid, session.name)
         if bed is not None and not session.stale:
-            assert blender.part("live.bed_state").read_snapshot(bed) == session.snapshot
+            assert blender.part("live.beds").read_snapshot(bed) == session.snapshot
     for bed in blender.beds():
         if not bed.data.is_editmode:
             assert np.isfinite(blender.part("bridge").read_cells(bed.data)["height"]).all()

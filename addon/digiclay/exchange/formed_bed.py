@@ -19,7 +19,7 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
 from ..core.session import snapshot
 from ..core.surface.formed import Body, Formed
-from ..live import bed_state
+from ..live import beds
 from ..sessions import running
 from ..settings import properties
 
@@ -88,7 +88,7 @@ def _state(bed: Any) -> tuple[System, State] | None:
     session = running.find(bed)
     if session is not None:
         return session.system, session.state
-    data = bed_state.read_snapshot(bed)
+    data = beds.read_snapshot(bed)
     if data is None:
         return None
     try:

@@ -24,7 +24,7 @@ from ..core.shapes.request import Shape
 from ..core.shapes.source_file import fit_shape
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
-from ..live import bed_state
+from ..live import beds
 from ..roles import ROLE, fingertip_of
 from ..sessions import sculpting
 from ..settings import properties
@@ -89,11 +89,11 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     # All that can fail is done: from here on the bed changes.
     properties.write_scene(bed, scene)
     began, problem = sculpting.begin_session(
-        bed.session_uid, bed.name, scene, pose, snapshot.dump(system, state), bed_state.read_tick(bed)
+        bed.session_uid, bed.name, scene, pose, snapshot.dump(system, state), beds.read_tick(bed)
     )
     if problem:
         raise DigiclayError(f"{bed.name}: {problem}")
-    bed_state.write(bed, began)
+    beds.write(bed, began)
     view.show_state(bed, system, began.state)
     tip = fingertip_of(bed)
     if tip is not None:

@@ -14,7 +14,7 @@ from ..overlay import views
 from ..recorded import takes
 from ..sessions import running
 from ..sessions.running import Running
-from ..sessions.stroke_queue import drop_strokes
+from ..sessions.sculpting import drop_strokes
 from ..ui_text import localize
 from . import beds, loop, tick
 from .beds import find_bed

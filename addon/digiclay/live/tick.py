@@ -21,10 +21,10 @@ from ..recorded.bake import is_baked
 from ..roles import fingertip_of
 from ..sessions import running, sculpting
 from ..sessions.running import Running
-from ..sessions.stroke_queue import drop_strokes
+from ..sessions.sculpting import drop_strokes
 from ..settings import properties
 from ..ui_text import localize
-from . import bed_state, follow
+from . import beds, follow
 from .beds import blocking_reason, find_bed
 
 
@@ -51,7 +51,7 @@ def start(context: Any, bed: Any) -> list[Note]:
         raise DigiclayError(f"The session of {bed.name} cannot start: {reason}.")
     begun, fault = sculpting.begin_session(
         bed.session_uid, bed.name, scene, bridge.pose(fingertip_of(bed)),
-        bed_state.read_snapshot(bed), bed_state.read_tick(bed),
+        beds.read_snapshot(bed), beds.read_tick(bed),
     )  # fmt: skip
     show(bed, replace(begun, settings=settings))
     faults = [Note("WARNING", f"{bed.name}: {fault}")] if fault else []
@@ -69,7 +69,7 @@ def stop(uid: int) -> str:
 def show(bed: Any, session: Running) -> None:
     """Make a value the present one of a session, write it into its bed, and show it if its mesh allows."""
     running.put(session)
-    bed_state.write(bed, session)
+    beds.write(bed, session)
     if not bridge.find_fault(bed.data, session.system.grid.count):
         view.show_state(bed, session.system, session.state)
 
@@ -141,7 +141,7 @@ def _advance_session(
     if reason:
         waiting = replace(session, clock=session.clock.stopped(), tick=session.tick + 1)
         running.put(waiting)
-        bed_state.write(bed, waiting, session)
+        beds.write(bed, waiting, session)
         if reason != before.blocking_reason:
             yield "WARNING", localize("The session of {} waits: {}", bed.name, reason)
         return
@@ -159,7 +159,7 @@ def _advance_session(
         yield "ERROR", localize("The session of {} is paused: {}", bed.name, error)
     running.put(later)
     moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
-    bed_state.write(bed, later, before)
+    beds.write(bed, later, before)
     # Drawing costs most: where nothing has changed, nothing is redrawn.
     if before.stale or before.blocking_reason or changes or not np.array_equal(seen, _visible_rows(later)):
         view.show_state(bed, later.system, later.state)
@@ -185,9 +185,9 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
             session, words = _take_settings(bed, session)
             session = replace(session, settings=settings)
         if session.stale:
-            pose = bed_state.read_pose(bed)
+            pose = beds.read_pose(bed)
             pose = session.pose if pose is None else pose
-            back = sculpting.restore(session, bed_state.read_snapshot(bed), pose, bed_state.read_tick(bed))
+            back = sculpting.restore(session, beds.read_snapshot(bed), pose, beds.read_tick(bed))
             if session.recording is not None and back.recording is None:
                 words = localize(
                     "The recording ended: undo went back to before it, or redo to what it did not lead to"

@@ -19,9 +19,9 @@ from ..core.studies.job_table import embed_heights
 from ..device import palettes, view
 from ..device.instant import Instant, find_ellipsoid, pick_pose, read
 from ..exchange import shape_show
-from ..live import bed_state
+from ..live import beds
 from ..panels.base import menu
-from ..press.occlusion import find_free_place
+from ..press.aim import find_free_place
 from ..recorded import takes
 from ..roles import BALL, FINGER, HOUSING, ROLE, bed_of, fingertip_of
 from ..sessions import running
@@ -217,7 +217,7 @@ def rebuild(bed: Any) -> Scene:
         _discard(tree)
     if not old_mesh.users:
         bpy.data.meshes.remove(old_mesh)
-    bed_state.clear(bed)  # the state of a session is of no use to other pins
+    beds.clear(bed)  # the state of a session is of no use to other pins
     return scene
 
 

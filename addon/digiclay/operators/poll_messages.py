@@ -14,7 +14,7 @@ from .. import bridge, preferences
 from ..compat import bpy
 from ..device import view
 from ..exchange import formed_bed
-from ..live import bed_state, follow, loop
+from ..live import beds, follow, loop
 from ..live.beds import active_session, blocking_reason
 from ..press import brush
 from ..recorded import takes
@@ -135,7 +135,7 @@ def nothing_to_reset(context: Any) -> str:
     if active_session(context) is not None:
         return session_waits(context)
     return no_bed(context) or (
-        "The bed is at rest already" if bed_state.read_snapshot(bed_of(context)) is None else ""
+        "The bed is at rest already" if beds.read_snapshot(bed_of(context)) is None else ""
     )
 
 

@@ -18,7 +18,7 @@ from ..panels.base import menu
 from ..press import aim, brush, tool
 from ..press.brush import FINGERS
 from ..roles import fingertip_of
-from ..settings import finger_size
+from ..settings import devices
 from ..settings.declared import choice, number
 from ..strokes.stroke import DEEPEST, SHALLOWEST, Brush
 from ..ui_text import localize
@@ -163,13 +163,13 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
     bl_idname = "digiclay.press_size"
     bl_label = "Fingertip Size"
     bl_options = {"UNDO", "BLOCKING"}
-    low, high, snap = finger_size.SMALLEST, finger_size.LARGEST, 1e-3
+    low, high, snap = devices.SMALLEST, devices.LARGEST, 1e-3
 
     def read(self, bed: Any, settings: Any) -> float:
-        return finger_size.read_size(bed.digiclay)
+        return devices.read_size(bed.digiclay)
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        finger_size.set_size(bed.digiclay, value)
+        devices.set_size(bed.digiclay, value)
 
     def rate(self, context: Any, bed: Any) -> float:
         """Return m a pixel at which the outline's side keeps up with the mouse."""
@@ -247,7 +247,7 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
 def scale_size(operator: Any, context: Any) -> None:
     """Scale the fingertip; its blister follows"""
     bed: Any = brush.bed_in_use(context)
-    finger_size.set_size(bed.digiclay, finger_size.read_size(bed.digiclay) * operator.scalar)
+    devices.set_size(bed.digiclay, devices.read_size(bed.digiclay) * operator.scalar)
 
 
 class TakeFinger(Action, bpy.types.Operator):
@@ -273,7 +273,7 @@ class TakeFinger(Action, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         bed: Any = brush.bed_in_use(context)
-        finger_size.resize(bed.digiclay, FINGERS[self.kind].finger)
+        devices.resize(bed.digiclay, FINGERS[self.kind].finger)
 
 
 @menu("DIGICLAY_MT_fingers", "Finger")

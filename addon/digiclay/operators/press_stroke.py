@@ -16,7 +16,7 @@ from ..live import beds, loop, tick
 from ..press import aim, brush, pointer, tool
 from ..press.pointer import begin_button, read_event
 from ..sessions import running
-from ..sessions.stroke_queue import change_stroke, find_stroke, last_place, queue_stroke
+from ..sessions.sculpting import change_stroke, find_stroke, last_place, queue_stroke
 from ..settings.declared import choice, flag, number, title
 from ..strokes.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw, lay_line, lay_path, lay_ring, pull
 from ..strokes.tracking import find_tracking

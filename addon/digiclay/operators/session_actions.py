@@ -10,7 +10,7 @@ from ..core.engine.simulation import begin
 from ..core.scene.assembly import assemble
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
-from ..live import bed_state, follow, handlers, loop, tick
+from ..live import beds, follow, handlers, loop, tick
 from ..live.beds import active_session
 from ..recorded import takes
 from ..roles import bed_of, fingertip_of
@@ -93,7 +93,7 @@ def _bring_to_rest(bed: Any) -> None:
     """Bring a bed without a session to rest."""
     scene = properties.scene_of(bed)
     system = assemble(scene)
-    bed_state.clear(bed)
+    beds.clear(bed)
     view.show_state(bed, system, begin(system))
     tip = fingertip_of(bed)
     if tip is not None:

@@ -21,7 +21,7 @@ from ..core.session.live_session import Clock, periods_due, simulate_path
 from ..core.session.take import MOST_PARTS, Take, refine, to_scene
 from ..device import view
 from ..device.instant import find_ellipsoid, pick_pose
-from ..live import bed_state, handlers, tick
+from ..live import beds, handlers, tick
 from ..recorded import bake, takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
 from ..roles import bed_of, fingertip_of
@@ -216,9 +216,9 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         state = snapshot.dump(system, self._state)
         self._place(bed)
         # The session that would go on from here.
-        uid, pose, tick_count = bed.session_uid, pick_pose(self._take.poses[-1]), bed_state.read_tick(bed)
+        uid, pose, tick_count = bed.session_uid, pick_pose(self._take.poses[-1]), beds.read_tick(bed)
         begun = sculpting.begin_session(uid, bed.name, self._take.scene, pose, state, tick_count)
-        bed_state.write(bed, begun[0])
+        beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)
         seconds = f"{self._take.duration:.1f} s"
         if state == self._take.end:
@@ -242,7 +242,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             try:
                 scene = properties.scene_of(bed)
                 before, _ = sculpting.begin_session(
-                    bed.session_uid, bed.name, scene, self._stood, bed_state.read_snapshot(bed)
+                    bed.session_uid, bed.name, scene, self._stood, beds.read_snapshot(bed)
                 )
                 view.show_state(bed, before.system, before.state)
                 tick.place_finger(context, bed, before)

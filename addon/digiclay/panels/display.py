@@ -15,7 +15,7 @@ from ..core.session import snapshot
 from ..core.session.recent_trace import PICKED, SPAN
 from ..device import heat, view
 from ..device.node_tree import ARROW_LENGTH, ARROWS, COLOR_BY_FORCE, FORM, LENGTH, MEMBRANE, TOP_FORCE
-from ..live import bed_state
+from ..live import beds
 from ..overlay import views
 from ..roles import bed_of, is_edited
 from ..sessions import running
@@ -42,7 +42,7 @@ SKINS = (
 
 def _write_forces(bed: Any) -> None:
     """Write the forces, which nothing drew until now; those stored last where no session runs."""
-    session, stored = running.find(bed), bed_state.read_snapshot(bed)
+    session, stored = running.find(bed), beds.read_snapshot(bed)
     try:
         if session is not None:
             view.show_state(bed, session.system, session.state)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..live import bed_state, follow
+from ..live import beds, follow
 from ..overlay.sections import error_message
 from ..recorded import bake, takes
 from ..roles import bed_of
@@ -20,7 +20,7 @@ def session_panel(sidebar: Any, context: Any) -> None:
     bed = bed_of(context)
     session, column = running.find(bed), sidebar.layout.column(align=True)
     if session is None:
-        kept = bed_state.read_snapshot(bed) is not None
+        kept = beds.read_snapshot(bed) is not None
         words = "Go On Sculpting" if kept else "Start Sculpting"
         row = column.row(align=True)
         row.scale_y = 1.4

@@ -1,7 +1,8 @@
-"""Aim of the mouse: the bed of a view, and the point on its pins."""
+"""Aim of the mouse: a view's bed, the point on its pins, what hides it; a free place for a new bed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +14,11 @@ from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.layout import Grid, make_grid
 from ..core.surface.pointing import find_ray, intersect_surface
-from ..roles import is_bed
+from ..device import view
+from ..roles import ROLE, is_bed
 from ..sessions import running
 from ..settings import properties
-from .occlusion import find_hider, shown_stretch
+from ..ui_text import localize
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,3 +106,185 @@ def _ray(context: Any, bed: Any, xy: tuple[float, float]) -> tuple[Floats, Float
     screen = 2.0 * np.array(xy) / [region.width, region.height] - 1.0
     origin, way = find_ray(lens, seen, screen)
     return origin / SCALE, way
+
+
+#: Objects that may have a surface.
+SOLID = frozenset({"MESH", "CURVE", "SURFACE", "META", "FONT"})
+#: How an object is displayed that hides nothing.
+OPEN = frozenset({"WIRE", "BOUNDS"})
+#: A surface that ends a ray hides nothing of what it ends at: share of the ray's length.
+NEAR = 1e-6
+
+
+def shown_stretch(context: Any, start: Floats, end: Floats) -> tuple[float, float]:
+    """Return the stretch of a ray that a view shows, 0 its start, 1 its end; first > last: nothing of it."""
+    looking = context.region_data
+    clip = np.array(looking.perspective_matrix, np.float64)
+    planes = [clip[3] + clip[2], clip[3] - clip[2]]
+    if looking.use_clip_planes:
+        planes += [np.array(plane, np.float64) for plane in looking.clip_planes]
+    first, last = 0.0, np.inf
+    for plane in planes:
+        before, after = (float(plane[:3] @ place + plane[3]) for place in (start, end))
+        rising = after - before
+        if rising:
+            crossed = -before / rising
+            first, last = (max(first, crossed), last) if rising > 0.0 else (first, min(last, crossed))
+        elif before < 0.0:
+            return 1.0, 0.0
+    return first, last
+
+
+def find_hider(
+    context: Any, bed: Any, start: Floats, end: Floats, surfaces: Iterable[tuple[Any, Any]] | None = None
+) -> Any | None:
+    """Return the object that the 3D view shows in front of the end of a ray, (3,) in the world; or None."""
+    if _shows_through(context.space_data.shading):
+        return None
+    first, _ = shown_stretch(context, start, end)
+    start = start + first * (end - start)
+    way = end - start
+    for thing, matrix in list_surfaces(context, bed) if surfaces is None else surfaces:
+        # An object in front of others hides what is nearer too; one behind such a bed hides nothing.
+        if bed.show_in_front and not thing.show_in_front:
+            continue
+        reach = np.inf if thing.show_in_front and not bed.show_in_front else 1.0 - NEAR
+        if _meets(thing, matrix, start, way, reach):
+            return thing
+    return None
+
+
+def _shows_through(shading: Any) -> bool:
+    """Return whether a view shows what lies behind surfaces, and so selects it too."""
+    if shading.type == "WIREFRAME":
+        return bool(shading.show_xray_wireframe)
+    return bool(shading.type == "SOLID" and shading.show_xray)
+
+
+def list_surfaces(context: Any, bed: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield the objects that may hide a bed, and their places in the world."""
+    graph, instancers = context.evaluated_depsgraph_get(), set()
+    for thing in context.visible_objects:
+        if _belongs(thing, bed):
+            continue
+        if _instances(thing) and not is_bed(thing):
+            instancers.add(thing)
+        if _hides(thing):
+            yield thing, thing.matrix_world
+    if not instancers:  # a bed of 10 000 pins has as many instances to go through
+        return
+    for instance in graph.object_instances:
+        if instance.is_instance and instance.parent.original in instancers and _hides(instance.object):
+            # A mesh that nodes instance has no original; Blender crashes on an evaluated curve.
+            mesh = instance.object.type == "MESH"
+            yield instance.object if mesh else instance.object.original, instance.matrix_world
+
+
+def _hides(thing: Any) -> bool:
+    """Return whether an object may have a surface, and is displayed with it."""
+    if thing.type not in SOLID or thing.display_type in OPEN:
+        return False
+    if thing.type != "CURVE":
+        return True
+    curve = thing.data
+    filled = curve.dimensions == "2D" and curve.fill_mode != "NONE"
+    return bool(filled or curve.extrude or curve.bevel_depth or curve.bevel_object or thing.modifiers)
+
+
+def _belongs(thing: Any, bed: Any) -> bool:
+    """Return whether an object is a bed or a part of it; what a user has parented to it is none."""
+    while thing is not None and thing != bed:
+        thing = thing.parent if ROLE in thing else None
+    return thing is not None
+
+
+def _instances(thing: Any) -> bool:
+    """Return whether an object may draw others as its instances."""
+    makers = ("NODES", "PARTICLE_SYSTEM")
+    return thing.instance_type != "NONE" or any(modifier.type in makers for modifier in thing.modifiers)
+
+
+def _meets(thing: Any, matrix: Any, start: Floats, way: Floats, reach: float) -> bool:
+    """Return whether a ray in the world meets an object within a reach, in lengths of its way."""
+    placed = np.array(matrix, np.float64)
+    if not np.isfinite(placed).all() or abs(np.linalg.det(placed[:3, :3])) < np.finfo(np.float32).tiny:
+        return False
+    inverse = np.linalg.inv(placed)
+    origin, along = inverse[:3, :3] @ start + inverse[:3, 3], inverse[:3, :3] @ way
+    length = float(np.linalg.norm(along))
+    try:
+        met = thing.ray_cast(origin.tolist(), along.tolist(), distance=min(reach * length, 1e30))
+    except RuntimeError:  # a curve without a surface
+        return False
+    return bool(met[0])
+
+
+#: Share of the pins that may be hidden: what stands among the pins or leans over their edge is left alone.
+HIDDEN = 0.25
+#: Places looked at along each side of the pins, and the gap to what a bed stands beside, of its width.
+SIDE, SPACE = 5, 0.1
+#: Where the eye of a parallel view is taken to be, Blender units: before all that it shows.
+FAR_EYE = 1e5
+ON_TOP = "{} is at the 3D cursor and would hide the bed: it stands on top of it"
+BESIDE = "{} is at the 3D cursor and would hide the bed: it stands beside it"
+NOWHERE = "{} hides the bed, which stands at the 3D cursor: move or hide one of them"
+
+
+def find_free_place(context: Any, bed: Any) -> tuple[Floats, str]:
+    """Return where the middle of a new bed's underside goes (3,), world, and words if not the 3D cursor."""
+    cursor, (low, high) = np.array(context.scene.cursor.location), _box(bed)
+    # Only what reaches into the bed's own box moves it: what stands before it leaves as the view is turned.
+    surfaces = [(thing, matrix, *_bounds(thing, matrix)) for thing, matrix in list_surfaces(context, bed)]
+
+    def overlapping(place: Floats) -> list[Any]:
+        return [row for row in surfaces if (row[2] < place + high).all() and (row[3] > place + low).all()]
+
+    def hider(place: Floats, among: list[Any]) -> Any:
+        beds = [row[0] for row in overlapping(place) if is_bed(row[0])]
+        return beds[0] if beds else _find_hider(context, bed, place, (low, high), [row[:2] for row in among])
+
+    there = overlapping(cursor)
+    hides = hider(cursor, there)
+    if hides is None:
+        return cursor, ""
+    first, last = np.min([row[2] for row in there], axis=0), np.max([row[3] for row in there], axis=0)
+    middle, gap = (first + last) / 2.0, SPACE * (high - low)
+    places = [] if is_bed(hides) else [(np.array([*middle[:2], last[2]]), ON_TOP)]
+    for axis in (0, 1):
+        for edge in (last[axis] - low[axis] + gap[axis], first[axis] - high[axis] - gap[axis]):
+            place = cursor.copy()
+            place[axis] = edge
+            places.append((place, BESIDE))
+    for place, words in sorted(places, key=lambda row: float(np.linalg.norm(row[0] - cursor))):
+        if hider(place, surfaces) is None:
+            return place, localize(words, hides.name)
+    return cursor, localize(NOWHERE, hides.name)
+
+
+def _box(bed: Any) -> Floats:
+    """Return the corners (2, 3) of a bed's housing and pins, from the middle of its underside."""
+    housing: Any = view.housing_of(bed)
+    points = np.array([thing.co for mesh in (housing.data, bed.data) for thing in mesh.vertices])
+    corners = np.array([points.min(axis=0), points.max(axis=0)]) * np.array(bed.scale)
+    return np.asarray(corners - [0.0, 0.0, corners[0, 2]])
+
+
+def _bounds(thing: Any, matrix: Any) -> Floats:
+    """Return the corners (2, 3) of the box about an object in the world."""
+    placed = np.array(matrix, np.float64)
+    corners = np.array(thing.bound_box) @ placed[:3, :3].T + placed[:3, 3]
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+
+def _find_hider(context: Any, bed: Any, place: Floats, box: Any, surfaces: list[Any]) -> Any | None:
+    """Return the object that hides more of the pins of a bed at a place than may be; None without."""
+    (left, front, _), (right, back, top) = box
+    eye, hiders = context.region_data.view_matrix.inverted(), []
+    for x in np.linspace(left, right, SIDE + 2)[1:-1]:
+        for y in np.linspace(front, back, SIDE + 2)[1:-1]:
+            end = place + np.array([x, y, top])
+            parallel = context.region_data.window_matrix[3][3] == 1.0
+            start = end + FAR_EYE * np.array(eye.col[2][:3]) if parallel else np.array(eye.translation)
+            hiders.append(find_hider(context, bed, start, end, surfaces))
+    things = [thing for thing in hiders if thing is not None]
+    return things[len(things) // 2] if len(things) > HIDDEN * len(hiders) else None

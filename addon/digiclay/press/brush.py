@@ -11,7 +11,7 @@ from ..compat import bpy
 from ..core.model.fingertip import Fingertip
 from ..live import beds
 from ..roles import bed_of, is_bed
-from ..settings import finger_size
+from ..settings import devices
 from ..strokes.stroke import Brush
 from ..ui_text import localize
 
@@ -170,7 +170,7 @@ def unregister() -> None:
 def _read_finger() -> tuple[float, float, float]:
     """Return the fingertip's length, width and height, mm; that of a new bed without one."""
     bed = bed_in_use(bpy.context)
-    finger = Fingertip() if bed is None else finger_size.read_finger(bed.digiclay)
+    finger = Fingertip() if bed is None else devices.read_finger(bed.digiclay)
     return 2e3 * finger.length, 2e3 * finger.width, 2e3 * finger.height
 
 
@@ -179,4 +179,4 @@ def _take_finger(axes: Any) -> None:
     bed = bed_in_use(bpy.context)
     if bed is not None and bed.library is None:
         length, width, height = (round(5e-4 * float(axis), 9) for axis in axes)
-        finger_size.resize(bed.digiclay, Fingertip(length, width, height))
+        devices.resize(bed.digiclay, Fingertip(length, width, height))

@@ -1,4 +1,4 @@
-"""Press tool in the 3D view's toolbar: its header, and its patch under the mouse."""
+"""Press tool in the 3D view's toolbar: its header, and its patch under the mouse, draped over the pins."""
 
 from __future__ import annotations
 
@@ -19,13 +19,12 @@ from ..device.instant import find_ellipsoid
 from ..overlay.picture import Color, Line, Words
 from ..roles import fingertip_of
 from ..sessions import running
-from ..settings import finger_size
+from ..settings import devices
 from ..strokes.stroke import SYMMETRIES, Brush
 from ..strokes.sweep import find_radius
 from ..ui_text import localize
 from . import aim
 from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, bed_in_use, describe_brush, find_kind
-from .drape import drape
 
 #: A light line on a dark one is seen on everything.
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
@@ -69,7 +68,7 @@ def draw_header(context: Any, layout: Any, settings: Any) -> None:
         _number(layout, settings, amount_name(Brush(settings.brush)), AMOUNT)
     _number(layout, settings, "strength", STRENGTH)
     if bed is not None:
-        kind = find_kind(finger_size.read_finger(bed.digiclay))
+        kind = find_kind(devices.read_finger(bed.digiclay))
         words = (kind.label if kind else "Finger") if wide else ""
         layout.menu("DIGICLAY_MT_fingers", text=words, icon="NONE" if wide else "VIEW_PAN")
     layout.popover("DIGICLAY_PT_press_stroke", text="Stroke" if wide else "", icon="CURVE_BEZCURVE")
@@ -237,3 +236,23 @@ def _put_down() -> None:
         if tool is not None and tool.idname == PressTool.bl_idname and area is not None:
             with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
                 bpy.ops.wm.tool_set_by_id(name="builtin.select_box", space_type="VIEW_3D")
+
+
+#: Standard deviation of the weights, and how far they reach, in pitches.
+SPREAD, REACH = 1.0, 3
+
+
+def drape(cells: Grid, height: Floats, places: Floats) -> Floats:
+    """Return places (k, 2) with the mean height of the pins about each, (k, 3), m, weighted normally."""
+    plan = cells.layout
+    row, column = np.divmod(cells.at(places[:, 0], places[:, 1]), plan.columns)
+    step = np.arange(-REACH, REACH + 1)
+    rows, columns = row[:, None, None] + step[:, None], column[:, None, None] + step
+    on_bed = (rows >= 0) & (rows < plan.rows) & (columns >= 0) & (columns < plan.columns)
+    pins = np.where(on_bed, rows * plan.columns + columns, 0)
+    square = (cells.x[pins] - places[:, 0, None, None]) ** 2 + (cells.y[pins] - places[:, 1, None, None]) ** 2
+    # Relative to the nearest pin: far beyond the edge all weights would be 0.
+    nearest = np.where(on_bed, square, np.inf).min(axis=(1, 2), keepdims=True)
+    weight = np.where(on_bed, np.exp((nearest - square) / (2.0 * (SPREAD * plan.pitch) ** 2)), 0.0)
+    mean = (weight * height[pins]).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
+    return np.column_stack([places, mean])

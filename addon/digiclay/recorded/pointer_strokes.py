@@ -23,8 +23,7 @@ from ..core.scene.scene_source import read_table
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
 from ..sessions.running import Running
-from ..sessions.sculpting import change_scene, follow_finger
-from ..sessions.stroke_queue import change_stroke, find_stroke, queue_stroke
+from ..sessions.sculpting import change_scene, change_stroke, find_stroke, follow_finger, queue_stroke
 from ..settings.devices import BEDS, change_finger
 from ..strokes.stroke import (
     DEEPEST,

@@ -16,7 +16,7 @@ from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_param
 from ..core.scene.toml_table import PRESETS
 from ..roles import fingertip_of
 from ..ui_text import localize
-from . import finger_size
+from . import devices
 from .declared import WHOLE, Update, choice, fill, flag, group, make_group, number, text, title, whole
 
 #: Blender keeps no reference to the texts of a list that is made on demand: this one does.
@@ -117,7 +117,7 @@ def take_size(fingertip: Any, context: Any) -> None:
     """Show the fingertip in its new size."""
     tip = fingertip_of(fingertip.id_data)
     if tip is not None:
-        bridge.resize_fingertip(tip, finger_size.read_finger(fingertip.id_data.digiclay))
+        bridge.resize_fingertip(tip, devices.read_finger(fingertip.id_data.digiclay))
 
 
 #: What happens after a change, by section and field.
@@ -160,7 +160,7 @@ def whole_axis(field: dataclasses.Field[Any]) -> Any:
     return whole(
         field,
         lambda group: 2.0 * getattr(group, field.name),
-        lambda group, size: finger_size.set_axis(group.id_data.digiclay, field.name, size),
+        lambda group, size: devices.set_axis(group.id_data.digiclay, field.name, size),
     )
 
 
@@ -201,10 +201,10 @@ SETTINGS = make_group(
         "size": number(
             "Size (mm)",
             "Width of the fingertip, in mm; its length and height change in proportion",
-            get=lambda settings: 1e3 * finger_size.read_size(settings),
-            set=lambda settings, value: finger_size.set_size(settings, 1e-3 * value),
-            min=1e3 * finger_size.SMALLEST,
-            max=1e3 * finger_size.LARGEST,
+            get=lambda settings: 1e3 * devices.read_size(settings),
+            set=lambda settings, value: devices.set_size(settings, 1e-3 * value),
+            min=1e3 * devices.SMALLEST,
+            max=1e3 * devices.LARGEST,
             soft_max=60.0,
             step=50,
             precision=1,

@@ -11,7 +11,7 @@ from digiclay import bridge
 from digiclay.core.engine.simulation import begin
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
-from digiclay.live import bed_state, handlers, tick
+from digiclay.live import beds, handlers, tick
 from digiclay.roles import fingertip_of, is_bed
 from digiclay.sessions import running
 from digiclay.settings import properties
@@ -60,7 +60,7 @@ def press(bed: Any, clock: Clock, x: float = 0.0) -> None:
 def exact(bed: Any) -> np.ndarray:
     """Return the pin tops the bed keeps, exactly, m."""
     system = assemble(properties.scene_of(bed))
-    kept = bed_state.read_snapshot(bed)
+    kept = beds.read_snapshot(bed)
     return (begin(system) if kept is None else snapshot.load(system, kept)).row(0)
 
 

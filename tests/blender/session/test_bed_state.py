@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.core.session import snapshot
-from digiclay.live import bed_state, handlers, tick
+from digiclay.live import beds, handlers, tick
 from digiclay.sessions import running, sculpting
 
 from tests.blender.session.live import FLOAT32, Clock, exact, move, only_bed, press, shown, started, undone
@@ -20,10 +20,10 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     bpy.ops.ed.undo_push(message="Start")
     press(bed, clock, -6.0)
     bpy.ops.ed.undo_push(message="First")
-    first = bed_state.read_snapshot(bed)
+    first = beds.read_snapshot(bed)
     press(bed, clock, 6.0)
     bpy.ops.ed.undo_push(message="Second")
-    second = bed_state.read_snapshot(bed)
+    second = beds.read_snapshot(bed)
     undone(clock)
     session = running.find(only_bed())
     assert session is not None
@@ -35,7 +35,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     bpy.ops.ed.redo()
     bpy.ops.ed.redo()
     clock.tick(handlers.STALE)
-    assert bed_state.read_snapshot(only_bed()) == second
+    assert beds.read_snapshot(only_bed()) == second
     press(only_bed(), clock)
     assert exact(only_bed())[6 * 13 + 6] < 39e-3
 
@@ -87,7 +87,7 @@ def test_a_file_of_a_session_goes_on_bit_for_bit(
     # What Blender saves by itself is a copy of the open file as it stands in the last tick.
     started(bed)
     move(bed, clock, [(0.0, 38.0)] * 10)
-    kept, periods = bed_state.read_snapshot(bed), running.find(bed).state.period
+    kept, periods = beds.read_snapshot(bed), running.find(bed).state.period
     path = str(tmp_path / "session.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=recovered)
     if recovered:
@@ -106,7 +106,7 @@ def test_a_file_of_a_session_goes_on_bit_for_bit(
 def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock: Clock, linked: bool) -> None:
     started(bed)
     press(bed, clock)
-    kept = bed_state.read_snapshot(bed)
+    kept = beds.read_snapshot(bed)
     bpy.ops.object.duplicate(linked=linked)
     copy = bpy.context.object
     assert copy != bed
@@ -114,7 +114,7 @@ def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock:
     notes = tick.start(bpy.context, copy)
     assert any("new fingertip" in note.message for note in notes)
     assert any("pins of its own" in note.message for note in notes) is linked
-    assert bed_state.read_snapshot(copy) == kept
+    assert beds.read_snapshot(copy) == kept
     before = exact(bed)
     press(copy, clock, 6.0)
     # Nobody presses the first one: its pins come to rest, 0.07 mm from where they are.
@@ -127,7 +127,7 @@ def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock:
 def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Path) -> None:
     started(bed)
     press(bed, clock)
-    kept, name = bed_state.read_snapshot(bed), bed.name
+    kept, name = beds.read_snapshot(bed), bed.name
     path = str(tmp_path / "library.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -143,9 +143,9 @@ def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Pat
 
 @pytest.mark.parametrize("junk", [b"", b"nothing", "a text", 7, [1.0, 2.0]])
 def test_a_state_somebody_has_broken_begins_at_rest_with_a_message(bed: Any, junk: Any) -> None:
-    bed[bed_state.STATE] = junk
-    bed[bed_state.POSE] = junk
-    bed[bed_state.TICK] = "x"
+    bed[beds.STATE] = junk
+    bed[beds.POSE] = junk
+    bed[beds.TICK] = "x"
     notes = tick.start(bpy.context, bed)
     assert [note.level for note in notes] == ["WARNING"]
     assert (exact(bed) == 40e-3).all()

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.core.session import snapshot
-from digiclay.live import bed_state
+from digiclay.live import beds
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 
@@ -28,8 +28,8 @@ def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_se
     clock.tick(8)
     session = running.find(bed)
     assert session is not None
-    assert bed_state.read_snapshot(bed) == snapshot.dump(session.system, session.state)
-    assert np.array_equal(bed_state.read_pose(bed), session.pose)
+    assert beds.read_snapshot(bed) == snapshot.dump(session.system, session.state)
+    assert np.array_equal(beds.read_pose(bed), session.pose)
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
     assert exact(bed).min() < 39e-3
 

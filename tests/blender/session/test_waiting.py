@@ -8,10 +8,10 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay.live import bed_state, handlers, tick
+from digiclay.live import beds, handlers, tick
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
-from digiclay.sessions.stroke_queue import queue_stroke
+from digiclay.sessions.sculpting import queue_stroke
 
 from tests.blender.session.live import FLOAT32, Clock, goes_on, press, shown, started, waits
 
@@ -103,11 +103,11 @@ def test_a_deleted_bed_or_scene_ends_the_session_with_a_message(bed: Any, clock:
 def test_disabling_the_extension_ends_the_session_and_leaves_the_state(bed: Any, clock: Clock) -> None:
     started(bed)
     press(bed, clock)
-    kept = bed_state.read_snapshot(bed)
+    kept = beds.read_snapshot(bed)
     digiclay.unregister()
     try:
         assert running.list_sessions() == ()
-        assert bed_state.read_snapshot(bed) == kept
+        assert beds.read_snapshot(bed) == kept
         assert handlers.reload_states not in bpy.app.handlers.undo_post
     finally:
         digiclay.register()
