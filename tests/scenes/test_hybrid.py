@@ -10,7 +10,6 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.hybrid import Hybrid
 from digiclay.core.control.virtual_master import Phase
-from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -53,16 +52,6 @@ STROKE = (
 def stroke(method: str, turn: float = 0.0) -> Result:
     """Return the run of the stroke with a method."""
     return run(along(device(method), *STROKE, turn=turn))
-
-
-def test_the_force_deviates_less_than_half_as_much_as_method_i_on_the_paper_s_ridge() -> None:
-    settings = "simulation.duration=10.4", "control.method="
-    one, three = (run(sample("ridge_mound_valley", settings[0], settings[1] + m)).metrics for m in BOTH)
-    # Measured 0.028 and 0.071 N.
-    assert three["rfd"] < 0.5 * one["rfd"]
-    assert three["losses"] == 0
-    assert three["ridge_unevenness"] < one["ridge_unevenness"] + 0.2e-3
-    assert three["max_total_force"] < 0.6
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.2])
@@ -208,9 +197,3 @@ def test_it_holds_a_press_on_other_devices(tables: dict[str, object]) -> None:
     late = found.history["total_force"][int(0.8 / known.simulation.control_period) :]
     # With commands under way for three periods it swings by 0.02 N about 0.44 N, and the trim takes 0.5 s.
     assert late == pytest.approx(0.4, abs=0.08 if "delay" in tables else 0.02)
-
-
-def test_a_bed_without_a_finger_stays_at_rest() -> None:
-    system = assemble(device().with_sections(fingertip=None))
-    *_, last = periods(system, [path((0.0, 0, 0, 41))], begin(system), 20)
-    assert np.all(last.row(0) == REST * 1e-3)

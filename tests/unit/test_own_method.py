@@ -232,12 +232,6 @@ def test_a_series_runs_with_it_in_processes_and_farms_are_told_its_code(jobs: Pa
     assert "--method method.py:SoftPad" in lists
 
 
-def test_a_series_with_a_method_that_cannot_be_loaded_leaves_nothing(jobs, capsys):
-    said = refused(capsys, "batch", "jobs.toml", "--method", "pad.py:Pad")
-    assert said == "--method: pad.py:Pad: the file must have the class Pad (it has pad.py:SoftPad).\n"
-    assert sorted(path.name for path in jobs.iterdir()) == ["jobs.toml", "pad.py"]
-
-
 # The template and the page
 
 PAGE = Path(__file__).parents[2] / "docs" / "own-methods.md"

@@ -9,7 +9,6 @@ import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import MethodError
 from digiclay.core.control.methods import list_added
-from digiclay.core.control.own_method import Pace
 from digiclay.core.session.run_scene import run
 from digiclay.plugins.method_loader import load_method
 
@@ -240,13 +239,6 @@ class Raw:
     said = refusal(text + controller)
     assert said.startswith("bad.py:Bad: command ")
     assert rule in said
-
-
-def test_the_pace_is_the_mean_over_twenty_calls() -> None:
-    pace = Pace()
-    for _ in range(2):
-        assert [pace.add(0.5) for _ in range(19)] == [None] * 19
-        assert pace.add(10.5) == 1.0
 
 
 def test_two_methods_of_one_name_are_refused(here: Path) -> None:

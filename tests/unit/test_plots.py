@@ -125,16 +125,6 @@ def test_a_method_without_a_set_point_has_neither_it_nor_a_deviation_in_the_pict
     assert "RFD" not in words
 
 
-def test_each_of_two_strokes_shows_its_start_middle_and_end():
-    # Lifted for half of the way: what is left of it still gets all six cells, and the air none.
-    case = drag(columns=28)
-    case["total_force"] = np.where((case["time"] > 3.0) & (case["time"] < 7.0), 0.0, case["total_force"])
-    x = case["position"][plots.session_cells(case), 0]
-    expected = np.interp([1, 2, 3, 7, 8, 9], case["time"], case["fingertip"][:, 0])
-    # To the nearest pin, half a pitch, from the nearest row, half a millimeter.
-    np.testing.assert_allclose(x, expected, rtol=0.0, atol=2e-3)
-
-
 def test_the_surface_is_to_scale_and_shows_the_final_heights_and_the_path(surface):
     case, relief, plan = drag(), axes(surface, "relief"), axes(surface, "map")
     extent = [np.ptp(limits) for limits in (relief.get_xlim(), relief.get_ylim(), relief.get_zlim())]

@@ -122,12 +122,6 @@ def test_the_forces_at_the_top_add_up_to_what_is_wanted(wanted, guess, low, high
     assert force is None or total == pytest.approx(wanted)
 
 
-def test_relaxed_pulp_asks_for_a_higher_top() -> None:
-    ends = reach(39e-3, 43e-3)
-    fresh, lost = (find_top(0.4, 41.2e-3, ends, UNDER, np.full(9, n), PULP)[0] for n in (0.0, 0.1))
-    assert lost - fresh > 50e-6
-
-
 @pytest.mark.parametrize(
     ("raised", "top", "expected"), [(True, 55e-3, [55e-3, 53e-3]), (False, 30e-3, [30e-3, 32e-3])]
 )

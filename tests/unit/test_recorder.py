@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import Rows, State, make_initial_state
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording, write
@@ -22,8 +21,6 @@ from digiclay.core.session.memory_limit import (
     refuse_what_cannot_fit,
 )
 from digiclay.core.session.run_scene import run
-
-from tests.assemble import sample
 
 ROWS = Rows(physics=2, queue=2)
 CELLS = 3
@@ -111,26 +108,6 @@ def test_a_history_fits_to_the_byte_or_is_refused_with_the_least_thinning_that_f
         refuse_what_cannot_fit(Recorder(1000), ROWS, 20_000_000, 100, 1_000_000_000)
     # Less than this could not have started the interpreter that runs the test.
     assert measure_available_memory() > 10_000_000
-
-
-@pytest.mark.parametrize("every", [1, 3])
-def test_rows_written_together_are_those_of_the_states_one_by_one(every: int) -> None:
-    scene = sample("tap", "simulation.duration=0.3")
-    system = assemble(scene)
-    start = begin(system)
-    recording = RunRecording(Recorder(every), system.rows, start, scene.periods)
-    told = {"height": [start.row(0)], "force": [start.row(system.rows.force)], "command": [], "mode": []}
-    for state in periods(system, scene.trajectories(), start, scene.periods):
-        recording.observe(state)
-        if (state.period - 1) % every == 0:
-            told["command"].append(state.row(system.rows.command))
-            told["mode"].append(state.mode())
-        if state.period % every == 0:
-            told["height"].append(state.row(0))
-            told["force"].append(state.row(system.rows.force))
-    rows = recording.finish(scene.periods)
-    for name, wanted in told.items():
-        assert np.array_equal(rows[name][: len(wanted)], wanted), name
 
 
 #: Two beds, of which the larger has so many more cells: what is taken once falls out of the difference.

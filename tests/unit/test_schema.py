@@ -73,14 +73,8 @@ def test_periods_cover_the_duration_and_steps_the_period_without_one_more_by_rou
     # 0.3 / 0.1 is 2.9999999999999996 and 0.7 / 0.1 is 6.999999999999999; 0.6 / 0.2 is 2.9999999999999996.
     assert [Simulation(n * 0.1, 0.1).steps for n in range(1, 11)] == list(range(1, 11))
     longest = (5e-3, 1e-2, 1e-3, 2e-3, 4.9e-3, 5e-6)
-    assert [Simulation(control_period=5e-3, physics_step=size).steps for size in longest] == [
-        1,
-        1,
-        5,
-        3,
-        2,
-        1000,
-    ]
+    steps = [Simulation(control_period=5e-3, physics_step=size).steps for size in longest]
+    assert steps == [1, 1, 5, 3, 2, 1000]
 
 
 def refused(table: dict[str, Any]) -> str:
@@ -132,6 +126,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"trajectory": {"waypoints": [{**POINT, "time": time} for time in (0, 2, 1)]}},
      "trajectory.times must increase from waypoint to waypoint (got 1 s after 2 s at waypoint 3)."),
     ({"fluid": {"density": "x" * 10_000}}, "fluid.density must be a number"),
+    ({"shape": {"fit": "squeeze"}}, "shape.fit must be one of contain, cover, stretch, actual, placed"),
+    ({"shape": {"file": ""}}, "shape.file must be a sample shape's name"),
 ]  # fmt: skip
 
 

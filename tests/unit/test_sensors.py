@@ -154,10 +154,3 @@ def test_coarse_height_sensors_change_the_session_and_perfect_ones_do_not() -> N
     plain = heights()
     assert np.abs(heights("sensors.height_step=0.5 mm") - plain).max() > 1e-4
     np.testing.assert_array_equal(heights("sensors.delay=0"), plain)
-
-
-def test_only_a_delay_costs_state_rows() -> None:
-    plain = sample("slow_press")
-    assert (plain.sensors, assemble(plain).rows.sensors) == (None, 0)
-    sensed = (sample("slow_press", f"sensors.{one}") for one in ("seed=1", "force_noise=1 mN", "delay=2"))
-    assert [assemble(one).sensors.rows for one in sensed] == [0, 0, 9]

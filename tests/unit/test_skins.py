@@ -44,26 +44,6 @@ def test_a_skin_passes_through_every_pin_top_to_a_micrometer(skin, arrangement, 
     np.testing.assert_allclose(sheet.height[sheet.pins], formed.height, rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("skin", ["smooth", "bilinear"])
-def test_a_skin_has_no_jump_beside_a_pin(skin, arrangement):
-    # What passes through a pin could still be a needle there: a point away, the skin has moved by no more
-    # than the steepest slope there is, some 60 mm a pitch of the random heights, doubled by overshoot.
-    formed = bed(arrangement)
-    sheet = covered(formed, skin, 60)
-    height = sheet.height.reshape(sheet.rows, sheet.columns)
-    for axis in (0, 1):
-        assert np.abs(np.diff(height, axis=axis)).max() < 2.5 * 0.06 / 60
-
-
-@pytest.mark.parametrize(("skin", "slope"), [("membrane", 0.0), ("bilinear", 1.0), ("smooth", 1.0)])
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_level_or_tilted_bed_has_a_plane_skin(skin, slope, arrangement):
-    place, way = bed(arrangement).position, slope * np.array([0.3, -0.2])
-    sheet = covered(Formed.of(place, 0.04 + place @ way, 0.04, 0.0, 0), skin, 4)
-    np.testing.assert_allclose(sheet.height, 0.04 + sheet.position @ way, rtol=0.0, atol=ROUNDING)
-
-
 def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
     formed = bed()
     sheet = covered(formed, "bilinear", 4)
@@ -148,17 +128,6 @@ def test_the_membrane_lies_on_the_flat_ends_and_is_harmonic_between_them():
     pull = -laplace[free][:, fixed] @ sheet.height[fixed]
     known = spsolve(laplace[free][:, free].tocsc(), pull)
     np.testing.assert_allclose(sheet.height[free], known, rtol=0.0, atol=1e-8)  # it stops at 1 nm a point
-
-
-@pytest.mark.parametrize("skin", SKINS)
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_mirrored_bed_has_the_mirrored_skin(skin, arrangement):
-    formed = bed(arrangement)
-    mirrored = Formed.of(formed.position * (-1.0, 1.0), formed.height, 0.04, 0.0, 0)
-    one, other = covered(formed, skin, 3), covered(mirrored, skin, 3)
-    np.testing.assert_allclose(other.position, one.position * (-1.0, 1.0), rtol=0.0, atol=ROUNDING)
-    # The membrane stops at 1 nm a point.
-    np.testing.assert_allclose(other.height, one.height, rtol=0.0, atol=5e-9)
 
 
 def test_force_is_straight_between_pins_and_a_mode_that_of_the_nearest():

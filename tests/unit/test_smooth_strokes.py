@@ -75,18 +75,6 @@ def test_a_short_stroke_waits_for_its_pins() -> None:
     assert np.abs(heights(go_on(done, 10)) - heights(done)).max() < 10e-6
 
 
-def test_a_smooth_stroke_is_one_gesture_that_is_taken_back_alone() -> None:
-    session = spiked((-12.0, 0.0), (12.0, 0.0))
-    before = heights(session)
-    session = finish(queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0)))
-    once = heights(session)
-    session = finish(queue_smooth(session, (12.0, -6.0), (12.0, 6.0)))
-    assert (session.finished_strokes, len(session.gestures)) == (2, 2)
-    back = sculpting.rewind(session)
-    np.testing.assert_array_equal(heights(back), once)
-    np.testing.assert_array_equal(heights(sculpting.rewind(back)), before)
-
-
 def test_strokes_that_press_and_smooth_are_queued_behind_each_other() -> None:
     session = spiked((-12.0, 0.0))
     session, number = queue_stroke(session, 12e-3, 0.0, 4e-3)

@@ -147,16 +147,3 @@ def test_a_scene_finds_its_shape_beside_itself_whose_first_row_is_at_the_lowest_
     assert scene.shape
     assert Path(scene.shape.file) == (tmp_path / "Formen" / "größe 1.npy").resolve()
     assert np.all(np.diff(heights(scene.shape.file).reshape(13, 13), axis=0) > 0.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ('[shape]\nfit = "squeeze"', "shape.fit must be one of contain, cover, stretch, actual, placed"),
-        ('[shape]\nfile = ""', "shape.file must be a sample shape's name"),
-    ],
-)
-def test_a_wrong_section_is_refused(tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "my.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(DigiclayError, match=re.escape(said)):
-        load(tmp_path / "my.toml")

@@ -29,7 +29,7 @@ from digiclay.strokes.stroke import (
 )
 from numpy.typing import NDArray
 
-from tests.hand import TICK, finish, go_on, heights, let_go, risen, started
+from tests.hand import TICK, finish, let_go, risen, started
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
@@ -307,16 +307,6 @@ def test_at_most_one_stroke_ends_in_a_tick_so_that_each_gets_an_undo_step() -> N
     # Each takes half a second: both would fit into the first tick.
     assert set(np.diff(drawn)) == {0, 1}
     assert drawn[-1] == 2
-
-
-def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the_earlier_ones_be() -> None:
-    once = finish(tap(started(), -15.0, 0.0))
-    before, touched = heights(once).copy(), len(once.gestures)
-    session = go_on(queue_stroke(once, 15e-3, 0.0, DEPTH)[0], 30)
-    assert np.abs(heights(session) - before).max() > 1e-4
-    back = sculpting.withdraw_stroke(session)
-    np.testing.assert_array_equal(heights(back), before)
-    assert (back.strokes, len(back.gestures)) == ((), touched)
 
 
 def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:

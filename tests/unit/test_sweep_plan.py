@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import itertools
 import json
 import re
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +14,10 @@ from digiclay.cli import main
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.batch.packing import Findings, describe_structure
 from digiclay.core.scene.assembly import assemble, count_rows, make_motion
-from digiclay.core.scene.scene_source import Setting, find, list_samples, load
-from digiclay.core.scene.toml_table import format_scene
+from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.accuracy import estimate_errors
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.axes import Axis, Point, make_points, read_axis
-from digiclay.core.studies.sweep_plan import NOTE, hash_points
 
 from tests.scene_files import scene_text
 
@@ -214,21 +210,3 @@ def test_a_point_is_the_scene_with_its_values_in_the_same_batch_whatever_is_know
         assert describe_structure(scene, known) == describe_structure(scene)
         system = assemble(scene)
         assert count_rows(scene, system.grid, make_motion(scene)) == system.rows
-
-
-def test_the_number_of_points_is_that_of_their_scene_files() -> None:
-    scenes = [load(find(name), SHORT) for name in list_samples()]
-    made = [*make_points_of(AXES[:2]), *(Point(0, (), scene) for scene in scenes), Point(1, (), None, "no")]
-    plain = hashlib.sha256()
-    for point in made:
-        plain.update((NOTE.sub("", format_scene(point.scene)) if point.scene else point.error).encode())
-    assert hash_points(made) == plain.hexdigest()
-
-
-def test_points_share_each_part_that_is_not_varied_also_a_duration_taken_from_the_path() -> None:
-    made = make_points(find("slow_press"), [], [read_axis("control.force_gain=1:5:3")])
-    first, *others = (point.scene for point in made)
-    for other in others:
-        names = [one.name for one in fields(first)]
-        apart = {name for name in names if getattr(first, name) is not getattr(other, name)}
-        assert apart - {"fingers"} == {"control"}  # the tuple of fingers is made anew, its parts are shared

@@ -71,15 +71,6 @@ def test_a_tuning_leaves_tables_a_plot_and_a_scene(whole: Path) -> None:
     assert (whole / "front.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_no_point_dominates_the_front_and_the_unchanged_scene_is_one_of_them(whole: Path) -> None:
-    every, front = values(whole / "points.csv"), values(whole / "front.csv")
-    for one in front:
-        assert not np.any(np.all(every <= one, axis=1) & np.any(every < one, axis=1))
-    # Every point is on the front, or not better than some of it.
-    assert all(np.any(np.all(front <= one, axis=1)) for one in every)
-    assert rows(whole / "points.csv")[0]["control.position_gain (1/m)"] == "500.0"
-
-
 def test_the_chosen_scene_is_a_scene_file_that_gives_the_same_metrics(whole: Path) -> None:
     scene = load(whole / "chosen.toml")
     metrics = run(scene).metrics
