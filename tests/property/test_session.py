@@ -1,20 +1,27 @@
-"""What holds in any session: small beds, random fingers, a second or less."""
+"""What holds in any session: small beds, random fingers, a second or less; cells left out; symmetry."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
+from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.engine.simulation import begin, step
 from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.control_interface import Commands, Controller, Measurement
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import Trajectory, make_level
 from digiclay.core.model.valve import Fluid, Valve
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tests.assemble import make_system, one_cell, record, scripted, under, whole
+from tests.assemble import make_system, one_cell, path, record, scripted, under, whole
 
 COUNT = 60
 CELLS = Layout(7, 7, arrangement="staggered")
@@ -118,3 +125,148 @@ def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: di
     assert system.cell.actuator.area * way == pytest.approx(
         volume, abs=1e-3 * system.cell.actuator.area * system.fastest * system.period
     )
+
+
+# Cells that cannot change are not integrated, and nothing is lost by that
+
+PERIODS = 120
+BED = make_system(Layout(9, 9), control=VirtualMaster())
+
+#: Millimeters, to the tenth.
+near = st.integers(-120, 120).map(lambda tenths: tenths / 10)
+visits = st.lists(
+    st.tuples(near, near, st.integers(330, 550).map(lambda tenths: tenths / 10)), min_size=4, max_size=7
+)
+
+
+@dataclass(frozen=True)
+class Everywhere:
+    """A controller that asks for the whole bed, so that every cell takes part in every period."""
+
+    inner: Controller
+
+    name = "everywhere"
+    rows = 0
+
+    def begin(self) -> Any:
+        """Return the inner memory."""
+        return self.inner.begin()
+
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float]]:
+        """Attend as the inner one does, but ask for all cells."""
+        return self.inner.locate(memory, touched)[0], (0.0, 0.0, 1.0)
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Command as the inner one does."""
+        return self.inner.command(memory, seen)
+
+
+@settings(max_examples=4)
+@given(visits)
+@example([  # the finger is felt by one cell, and travels along a row: cells lie exactly abeam of it
+    (-0.2, -1.5, 34.1), (-3.0, -7.9, 49.0), (2.1, 3.0, 45.1), (-3.3, 9.6, 40.6), (-1.3, -5.4, 37.7),
+    (-9.1, 12.0, 54.9), (-10.0, 2.3, 49.7),
+])  # fmt: skip
+def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(spots):
+    trajectory = make_level(np.linspace(0.0, PERIODS * BED.period, len(spots)), np.array(spots) * 1e-3)
+    fewer = record(BED, trajectory, PERIODS)
+    all_cells = record(replace(BED, controller=Everywhere(BED.controller)), trajectory, PERIODS)
+    assert all_cells.last.active.cells.size == BED.grid.count
+    # Rounding: sums in another order. A force grows e-fold in half a millimeter.
+    assert np.abs(fewer.height - all_cells.height).max() < 1e-12
+    assert np.abs(fewer.force - all_cells.force).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("side", "way", "count", "least", "most"),
+    [
+        (9, [(0, 0, 0, 200), (1, 5, 5, 200)], 20, 0, 0),  # far above
+        # At rest. The servo's flow goes with the error squared, so coming to rest takes some 20 s.
+        (9, [(0, 0, 0, 45), (0.3, 0, 0, 36), (0.6, 0, 0, 60)], 6000, 0, 0),
+        # Rows and columns that hold the disc to the edge ring, with a pitch to spare on every side: 15 x 15.
+        (25, [(0, 0, 0, 45), (0.3, 0, 0, 36)], 60, 21, 15 * 15),
+    ],
+)
+def test_only_cells_around_a_touch_are_integrated_until_the_surface_is_at_rest(side, way, count, least, most):
+    run = record(make_system(Layout(side, side), control=VirtualMaster()), path(*way), count)
+    assert np.any(run.height[-1] != 40e-3) == (count > 20)
+    assert least <= run.last.active.cells.size <= most
+
+
+def test_pins_that_rise_into_a_still_finger_meet_it_at_once() -> None:
+    # The finger waits 1 mm above; which cells it may touch was settled before they rose.
+    system = make_system(Layout(9, 9), control=scripted(lambda t, x, y: 1.0))
+    run = record(system, path((0, 0, 0, 41)), 40)
+    touching = run.height[:, 40] > 41e-3
+    assert 5 < touching.sum() < 40
+    assert np.array_equal(run.force[:, 40] > 0.0, touching)
+
+
+# Mirrored and rotated scenes give mirrored and rotated results
+
+#: Press, lift, drag, lift off: off the cells' axes, tilted. Time, x, y, z in mm, then the quaternion.
+WAYPOINTS = np.array(
+    [
+        (0.0, -5.3, 3.1, 42.0, 0.97, 0.1, 0.2, 0.0), (0.25, -5.3, 3.1, 35.5, 0.97, 0.1, 0.2, 0.0),
+        (0.6, -5.3, 3.1, 39.5, 0.97, 0.0, 0.2, 0.1), (1.2, 4.4, -1.7, 40.0, 0.95, -0.1, 0.2, 0.2),
+        (1.4, 4.4, -1.7, 60.0, 0.95, -0.1, 0.2, 0.2),
+    ]
+)  # fmt: skip
+MOVED = 260
+
+
+#: A press in the middle of the bed, of the waypoints.
+MIDDLE = [1, 0, 0, 1, 1, 0, 0, 0]
+#: What a mirror across x, or across y, makes of a waypoint.
+MIRRORED_X, MIRRORED_Y = np.array([1, -1, 1, 1, 1, 1, -1, -1]), np.array([1, 1, -1, 1, 1, -1, 1, -1])
+
+
+def turned(points: Floats) -> Floats:
+    """Return waypoints turned by 90 degrees about z: (x, y) to (-y, x)."""
+    t, x, y, z, *q = points.T
+    half = np.sqrt(0.5)
+    w, qx, qy, qz = q
+    turn = [half * (w - qz), half * (qx - qy), half * (qx + qy), half * (w + qz)]
+    return np.column_stack([t, -y, x, z, *turn])
+
+
+#: Name: arrangement, shape of the bed, what is done to the path, and to rows and columns of cells.
+CASES: dict[str, tuple[str, tuple[int, int], Callable[[Floats], Floats], Callable[[Floats], Floats]]] = {
+    "mirrored": ("aligned", (9, 12), lambda p: p * MIRRORED_X, lambda h: h[:, :, ::-1]),
+    "mirrored, odd": ("aligned", (11, 11), lambda p: p * MIRRORED_X, lambda h: h[:, :, ::-1]),
+    "rotated by 90": ("aligned", (11, 11), turned, lambda h: h.transpose(0, 2, 1)[:, :, ::-1]),
+    "rotated by 180": ("aligned", (9, 12), lambda p: turned(turned(p)), lambda h: h[:, ::-1, ::-1]),
+    "hexagonal, mirrored": ("hexagonal", (11, 12), lambda p: p * MIRRORED_Y, lambda h: h[:, ::-1, :]),
+    "staggered, rotated": ("staggered", (10, 12), lambda p: turned(turned(p)), lambda h: h[:, ::-1, ::-1]),
+}
+
+
+def formed(arrangement: str, shape: tuple[int, int], points: Floats, profile: str) -> tuple[Floats, Floats]:
+    """Return heights and forces, shape (t, rows, columns)."""
+    system = make_system(
+        Layout(*shape, 3e-3, arrangement), control=VirtualMaster(), blister=Blister(profile=profile)
+    )
+    run = record(system, Trajectory(points[:, 0], points[:, 1:4] * 1e-3, points[:, 4:]), MOVED)
+    return run.height.reshape(-1, *shape), run.force.reshape(-1, *shape)
+
+
+@pytest.mark.parametrize(
+    ("case", "points", "profile"),
+    [
+        *((case, WAYPOINTS, "cone") for case in CASES if case != "mirrored, odd"),
+        ("mirrored", WAYPOINTS, "gaussian"),
+        # A press on a cell in the middle: cells lie exactly on the circles of the control here.
+        *(
+            ("mirrored, odd", WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0], profile)
+            for profile in ("cone", "gaussian")
+        ),
+    ],
+)
+def test_a_moved_scene_gives_the_moved_result(case: str, points: Floats, profile: str) -> None:
+    arrangement, shape, points_moved, cells_moved = CASES[case]
+    height, force = formed(arrangement, shape, points, profile)
+    moved_height, moved_force = formed(arrangement, shape, points_moved(points), profile)
+    assert np.ptp(height[-1]) > 1e-3
+    # Rounding of positions, 1e-17 m, through 260 periods of a closed loop; forces grow e-fold in 0.5 mm.
+    assert np.abs(moved_height - cells_moved(height)).max() < 1e-12
+    assert np.abs(moved_force - cells_moved(force)).max() < 1e-10

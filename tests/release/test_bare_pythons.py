@@ -26,7 +26,6 @@ ROOT = Path(__file__).parents[2]
 CORE_ONLY = ("numpy", "trimesh", "pytest", "hypothesis")
 #: Tests whose need of more no import shows.
 NEEDING_MORE = {
-    "test_skin_mesh.py": "SciPy, which trimesh imports for it",
     "test_source_file.py": "Pillow",
     "test_speed_limits.py": "Pillow",
 }

@@ -1,21 +1,29 @@
-"""Sensor models: noise, quantization and delay, and what a session makes of them."""
+"""Sensor models: noise, quantization and delay, what a session makes of them; the observer of the force."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.arrays import Floats
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
 from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, Sensing, draw_normals
 from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import run
+from numpy.typing import NDArray
 
-from tests.assemble import record, sample
+from tests.assemble import record, sample, scripted
 
 CELLS = 500
 PERIODS = 400
@@ -154,3 +162,181 @@ def test_coarse_height_sensors_change_the_session_and_perfect_ones_do_not() -> N
     plain = heights()
     assert np.abs(heights("sensors.height_step=0.5 mm") - plain).max() > 1e-4
     np.testing.assert_array_equal(heights("sensors.delay=0"), plain)
+
+
+# The force observer: what it makes of a pin's motion, beside the force that is there
+
+#: Control period, s.
+PERIOD = 5e-3
+#: A finger that goes down onto the only pin and stays.
+PRESS = [{"time": 0.0, "position": [0, 0, 0.0395]}, {"time": 0.6, "position": [0, 0, 0.036]}]
+AWAY = [{"time": 0.0, "position": [0, 0, 0.09]}, {"time": 0.6, "position": [0, 0, 0.09]}]
+
+
+def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
+    """Return a bed of one pin, its force observed."""
+    table: dict[str, Any] = {
+        "layout": {"rows": 1, "columns": 1},
+        "control": "absent",
+        "sensors": {"observer": "valve"},
+        # The observer is judged here, not the integration: at the default step a run's own force is off by
+        # more than the readings are, as is shown below.
+        "simulation": {"physics_step": 1e-3},
+    }
+    return resolve({**table, "trajectory": {"waypoints": list(waypoints)}, **sections})
+
+
+def watched(known: Scene, command_in: Callable[[int], float], count: int = 120) -> tuple[Floats, Floats]:
+    """Simulate; return the true forces of the pin and what the sensors read, N, shape (count + 1,)."""
+    played = scripted(lambda time, x, y: command_in(round(time / PERIOD)))
+    system = replace(assemble(known), controller=played(PERIOD))
+    true, read = [0.0], [0.0]
+    for state in periods(system, known.trajectories(), begin(system), count):
+        true.append(float(state.row(system.rows.force)[0]))
+        read.append(sensed(system, state))
+    return np.array(true), np.array(read)
+
+
+def sensed(system: System, state: State) -> float:
+    """Return the force the sensors read of the pin, N; they get no true force to look at."""
+    own = np.array([state.row(row) for row in range(system.rows.count)[system.rows.sensed]])
+    hidden = Truth(np.arange(1), state.period, np.array([np.nan]), state.row(0), np.zeros(1))
+    return float(system.sensors.measure(own, hidden)[0][0])
+
+
+def pulled_down(period: int) -> float:
+    """Let the pin sink through a valve that is wide open."""
+    return -0.8
+
+
+def down_and_up(period: int) -> float:
+    """Let the pin sink slowly, then rise, always well open."""
+    return 0.6 * math.cos(2.0 * math.pi * period / 80.0 + math.pi / 2) + (0.25 if period > 60 else 0.15)
+
+
+def half_way(force: Floats) -> Floats:
+    """Return the mean force of each period from those at its ends."""
+    return np.concatenate([[0.0], 0.5 * (force[1:] + force[:-1])])
+
+
+def well_open(command_in: Callable[[int], float], count: int = 120, least: float = 0.2) -> NDArray[np.bool_]:
+    """Return after which periods the valve was well open from end to end."""
+    command = np.array([0.0, *(command_in(period) for period in range(count))])
+    open_now = (np.abs(command) > least) & (np.abs(np.roll(command, 1)) > least)
+    return open_now & (command * np.roll(command, 1) > 0.0)
+
+
+#: The lines to the valve, by the sections of a scene file that differ.
+LINES: list[dict[str, Any]] = [
+    {},
+    {"conduit": "absent"},
+    {"valve_lag": "absent"},
+    {"delay": "absent"},
+    {"delay": {"dead_time": 7.3e-3}},
+    {"delay": {"dead_time": 5e-3}},
+]
+#: A valve in its turbulent branch, and a finger that follows a falling pin.
+NARROW = {"valve": {"orifice_diameter": 0.4e-3, "stroke": 5e-6}, "fluid": {"viscosity": 6.5e-7}}
+FALL = [{"time": 0.0, "position": [0, 0, 0.040]}, {"time": 0.4, "position": [0, 0, 0.010]}]
+PRESSED = slice(30, 68)  # the finger has caught up with the pin, which falls freely at first
+
+
+@pytest.mark.parametrize("sections", LINES)
+def test_the_force_on_a_pressed_moving_pin_is_found_to_three_millinewtons(sections: dict[str, Any]) -> None:
+    true, read = watched(scene(**sections), down_and_up)
+    # At the default step too: the mean of a period is read whatever it is cut into.
+    _, coarse = watched(scene(**sections, simulation={}), down_and_up)
+    known = well_open(down_and_up)
+    assert np.ptp(true[known]) > 0.05, "hardly a force to be found"
+    # The finger loads the pin by some 0.1 N in 100 ms: within a period the force changes by up to 10 mN,
+    # and a mean weighted with the conductance lies off the middle by a part of that.
+    assert np.abs(np.array([read, coarse]) - half_way(true))[:, known].max() < 3e-3
+
+
+def test_the_force_is_found_where_the_flow_is_turbulent() -> None:
+    known = scene(FALL, **NARROW)
+    true, read = watched(known, pulled_down, 75)
+    assert assemble(known).cell.flow.knee / 0.8**2 < 0.5e5, "the flow is laminar"
+    assert true[PRESSED].min() > 0.02, "the finger hardly presses"
+    # The force's change within a period, as above; the flow's regime is settled to 0.1 mN.
+    assert np.abs(read - half_way(true))[PRESSED].max() < 3e-3
+    # At the default step 18 mN off at the ends of the steps, 5 mN in the means that are read: the valve's law
+    # is kept over the whole step, the force at its end is what the heights left of it.
+    own, coarse = watched(scene(FALL, **NARROW, simulation={}), pulled_down, 75)
+    assert np.abs(coarse - half_way(true))[PRESSED].max() < 0.5 * np.abs(own - true)[PRESSED].max()
+
+
+@pytest.mark.parametrize(
+    ("inexact", "most"),
+    # The simulation averages the flow over 1 ms steps, the observer over the period: 18 µN between them.
+    [({}, 5e-5), ({"height_noise": 1e-6}, 0.0), ({"height_step": 5e-6}, 0.0)],
+)
+def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(inexact, most):
+    sensors = {"observer": "valve", **inexact}
+    assert watched(scene(AWAY, sensors=sensors), down_and_up)[1].max() <= most
+    read = watched(scene(sensors=sensors), down_and_up)[1]
+    assert read.min() == 0.0 < read.max()
+
+
+def test_the_last_estimate_is_held_while_the_valve_is_shut_or_the_pin_at_its_stop() -> None:
+    true, read = watched(scene(), lambda period: 0.5 if period < 60 else 0.0)
+    # Five time constants of the valve, and the dead time, after period 60 it is shut.
+    assert true[-1] - true[64] > 0.05, "the force does not change"
+    assert read[64] > 0.05
+    assert np.unique(read[64:]).size == 1
+    # At an end stop too: an open valve and no motion would otherwise mean that the finger holds the high
+    # reservoir, 157 mN. It rises the millimeter in 15 periods.
+    away = [{**point, "position": [0, 0, 0.15]} for point in AWAY]
+    assert watched(scene(away, actuator={"rest_height": 99e-3}), lambda period: 0.8)[1].max() < 1e-3
+
+
+def loading(flow: float, opening: float) -> float:
+    """Return the force that a rise more or less by a height in a period makes at an opening, N."""
+    cell = assemble(scene()).cell
+    conductance = float(cell.flow.laminar_conductance(np.array([opening]))[0])
+    return cell.actuator.area**2 * flow / (PERIOD * conductance)
+
+
+def test_a_coarse_height_costs_no_more_than_a_step_of_flow_and_late_readings_are_those_of_before() -> None:
+    def read(**inexact: float) -> Floats:
+        return watched(scene(sensors={"observer": "valve", **inexact}), down_and_up)[1]
+
+    exact, known = read(), well_open(down_and_up, least=0.4)
+    # Two heights, each half a step off, in one period.
+    error = np.abs(read(height_step=1e-6) - exact)[known]
+    assert 0.05 * loading(1e-6, 0.4) < error.max() <= loading(1e-6, 0.4)
+    np.testing.assert_array_equal(read(delay=3)[3:], exact[:-3])
+
+
+def test_noise_of_the_heights_is_noise_of_two_readings() -> None:
+    exact, noisy = (
+        watched(scene(sensors={"observer": "valve", "height_noise": noise}), lambda period: 0.4)[1]
+        for noise in (0.0, 1e-7)
+    )
+    # Some hundred readings: their standard deviation is known to 7 %, and neighbors share a height.
+    assert abs(np.std((noisy - exact)[10:]) / (math.sqrt(2.0) * loading(1e-7, 0.4)) - 1.0) < 0.3
+
+
+@pytest.mark.parametrize("gap", [(13,), (13, 14, 15, 16, 17)])
+def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_had(gap):
+    sensors = assemble(scene(sensors={"observer": "valve", "height_noise": 1e-6, "delay": 2})).sensors
+    # Ten periods are 25 time constants of the valve: less than 1e-9 open, it counts as shut.
+    command, results = [0.0, 0.5, 0.5, *[0.0] * 15, -0.5, -0.5, -0.5, 0.0, 0.0], []
+    for skipped in ((), gap):
+        own, level, after = np.zeros((sensors.rows, 1)), 40e-3, []
+        for period, now in enumerate(command[1:], 1):
+            level += 1e-5 * now
+            seen = Truth(np.arange(1), period, np.zeros(1), np.array([level]), np.array([now]))
+            if period not in skipped:
+                sensors.update(own, seen)
+            if period > max(gap):
+                after.append(own.copy())
+        results.append(np.array(after))
+    np.testing.assert_array_equal(results[1], results[0])
+
+
+def test_a_bed_at_rest_does_not_feel_the_finger() -> None:
+    # Its valves are shut, and stay shut: there is nothing to tell the force from.
+    history = run(resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})).history
+    assert history["total_force"].max() > 1.0
+    assert np.ptp(history["height"]) == 0.0

@@ -1,13 +1,16 @@
-"""Method I up to its master: locate, control, model; direction of travel and loss."""
+"""Method I: locate, control, model, direction and loss of its master; its blister, freezing, the rim."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
+from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import (
     Master,
     Phase,
@@ -16,11 +19,11 @@ from digiclay.core.control.virtual_master import (
     make_master_cell,
 )
 from digiclay.core.model.conduit import Conduit
-from digiclay.core.model.control_interface import Measurement
-from digiclay.core.model.layout import Layout
+from digiclay.core.model.control_interface import Commands, Measurement
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.valve import Fluid, Valve
 
-from tests.assemble import make_basis, make_system, master
+from tests.assemble import make_basis, make_system, master, path, record
 
 
 def control() -> VirtualMasterControl:
@@ -208,3 +211,219 @@ def test_in_a_period_it_goes_the_way_its_opening_lets_it() -> None:
     flow = one.flow.flow(opening, np.full(2000, one.supply.high))
     # Two Gauss points: the fourth derivative of a square of exponentials over 2.5 time constants.
     assert found - 40e-3 == pytest.approx(period * flow.mean() / one.actuator.area, rel=0.01)
+
+
+# The blister around the master
+
+BED = make_grid(Layout(15, 15))
+#: A little beside a cell, so that no cell lies exactly on a circle.
+BESIDE = {"x": 0.4e-3, "y": 0.2e-3}
+
+
+def bed(height: float = 40.0, mode: Mode = Mode.REST) -> Measurement:
+    """Return a measurement of a whole bed that nobody touches."""
+    level, modes = np.full(BED.count, height * 1e-3), np.full(BED.count, mode, np.int8)
+    cells, free, own = np.arange(BED.count), np.zeros(BED.count), np.empty((0, BED.count))
+    return Measurement(BED.compute_basis(cells), level, free, level.copy(), modes, own, cells)
+
+
+def at(x: float, y: float) -> int:
+    """Return the cell at a place in mm."""
+    return int(np.hypot(BED.x - x * 1e-3, BED.y - y * 1e-3).argmin())
+
+
+def created(memory: Master, seen: Measurement, blister: Blister | None = None) -> tuple[Master, Commands]:
+    """Return what Method I commands."""
+    system = make_system(Layout(15, 15), control=VirtualMaster(), blister=blister)
+    return system.controller.command(memory, seen)
+
+
+# Profiles
+
+CONE, BELL = Blister(), Blister(profile="gaussian")
+
+
+@pytest.mark.parametrize(
+    ("blister", "distance", "profile"),
+    [
+        pytest.param(CONE, [0.0, 3e-3, 6e-3], [1.0, 1.0, 1.0], id="flat on top"),
+        pytest.param(CONE, [8.25e-3, 10.5e-3, 15e-3], [0.75, 0.5, 0.0], id="linear to its radius"),
+        pytest.param(BELL, [0.0, 7e-3, 14e-3], [1.0, np.exp(-0.5), np.exp(-2.0)], id="a Gaussian"),
+    ],
+)
+def test_a_profile_has_its_formula_over_any_surface(blister, distance, profile):
+    places, part = np.array(distance), np.array(profile)
+    assert blister.evaluate_profile(places) == pytest.approx(part, rel=1e-14, abs=1e-15)
+    for edge, top in ((40e-3, 55e-3), (40e-3, 30e-3)):
+        assert blister.interpolate(places, edge, top) == pytest.approx(edge + part * (top - edge), abs=1e-16)
+
+
+@pytest.mark.parametrize(("name", "rule"), [("flat_radius", "below"), ("edge_radius", "above")])
+def test_radii_in_the_wrong_order_are_refused(name: str, rule: str) -> None:
+    with pytest.raises(ParameterError, match=rf"^Blister\.{name} must be {rule} the radius, 0\.015 m"):
+        Blister(**{name: 15e-3})
+
+
+# Blister
+
+
+@pytest.mark.parametrize("profile", ["cone", "gaussian"])
+def test_cells_of_the_blister_are_commanded_to_its_profile(profile: str) -> None:
+    blister = Blister(profile=profile)
+    _, orders = created(master(), bed(), blister)
+    inside = np.hypot(BED.x, BED.y) <= 15e-3
+    expected = 40e-3 + blister.evaluate_profile(np.hypot(BED.x, BED.y)[inside]) * 5e-3
+    # A circle may be widened by a billionth, for the sake of cells exactly on it.
+    assert orders.target[inside] == pytest.approx(expected, abs=1e-10)
+
+
+def test_targets_stay_within_the_stroke_and_outside_the_blister_as_they_are() -> None:
+    outside, seen = np.hypot(BED.x, BED.y) > 15.1e-3, bed()
+    seen.target[outside] = 47e-3
+    assert np.all(created(master(), seen)[1].target[outside] == 47e-3)
+    high = bed()._replace(height=np.full(BED.count, 0.13))
+    assert created(master(height=100e-3, edge=130e-3), high)[1].target.max() == 100e-3
+
+
+@pytest.mark.parametrize(("phase", "mode"), [(Phase.SHAPING, Mode.FORCE_FOLLOW), (Phase.SPRING, Mode.SPRING)])
+def test_cells_under_the_fingertip_show_the_phase(phase: Phase, mode: Mode) -> None:
+    seen = bed()
+    seen.force[at(0, 0)] = 0.1
+    assert created(master(phase=phase), seen)[1].mode[at(0, 0)] == mode
+
+
+def test_cells_just_outside_are_the_edge() -> None:
+    distance = np.hypot(BED.x - BESIDE["x"], BED.y - BESIDE["y"])
+    ring = (distance > 15e-3) & (distance < 18.5e-3)
+    assert np.array_equal(created(master(**BESIDE), bed())[1].mode == Mode.EDGE, ring)
+
+
+@pytest.mark.parametrize(
+    "place", [(15, 0), (-15, 0), (0, 15), (0, -15), (9, 12), (-9, 12), (12, -9), (-12, -9)]
+)
+def test_cells_exactly_on_the_rim_belong_to_the_blister_on_every_side(place: tuple[float, float]) -> None:
+    # Else a bell, which is still a tenth of its height there, would be lopsided by rounding alone.
+    assert created(master(), bed())[1].mode[at(*place)] == Mode.BLISTER
+
+
+def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_side() -> None:
+    ways = EAST, WEST, (0, 1), (0, -1)
+    modes = [created(master(x, y), ridge())[1].mode[at(-6 * x, -6 * y)] for x, y in ways]
+    assert len(set(modes)) == 1
+
+
+def test_at_rest_the_edge_height_is_the_mean_of_the_whole_ring() -> None:
+    seen = bed()
+    seen.height[BED.x > 0] += 2e-3
+    seen.height[BED.x < 0] -= 1e-3
+    ring = np.abs(np.hypot(BED.x - BESIDE["x"], BED.y - BESIDE["y"]) - 16.75e-3) < 1.75e-3
+    assert created(master(**BESIDE), seen)[0].edge == pytest.approx(seen.height[ring].mean(), abs=1e-16)
+
+
+def test_while_moving_only_the_ring_ahead_gives_the_edge_height_or_none_leaves_it() -> None:
+    seen = bed()
+    seen.height[BED.x < -0.1e-3] = 60e-3  # the finished ridge
+    assert created(master(1.0, 0.0), seen)[0].edge == pytest.approx(40e-3, abs=1e-16)
+    assert created(master(1.0, 0.0, x=22e-3, edge=41.5e-3), bed())[0].edge == 41.5e-3
+
+
+# Freezing
+
+
+def ridge(mode: Mode = Mode.BLISTER) -> Measurement:
+    """Return a bed whose cells behind a finger that moves along x stand higher than the profile."""
+    return bed()._replace(target=np.full(BED.count, 44e-3), mode=bed(mode=mode).mode)
+
+
+EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("toward", "before", "place", "force", "after"),
+    [
+        pytest.param(EAST, Mode.BLISTER, (-12, 0), 0.0, Mode.FROZEN, id="behind"),
+        pytest.param(EAST, Mode.BLISTER, (12, 0), 0.0, Mode.BLISTER, id="ahead"),
+        pytest.param(EAST, Mode.BLISTER, (0, 12), 0.0, Mode.BLISTER, id="abeam"),
+        pytest.param(EAST, Mode.BLISTER, (0, -12), 0.0, Mode.BLISTER, id="abeam on the other side"),
+        pytest.param(EAST, Mode.BLISTER, (-3, 0), 0.0, Mode.BLISTER, id="on the flat top"),
+        pytest.param((0.0, 0.0), Mode.BLISTER, (-12, 0), 0.0, Mode.BLISTER, id="before any direction"),
+        pytest.param(WEST, Mode.FROZEN, (-12, 0), 0.0, Mode.FROZEN, id="ahead again after a turn"),
+        pytest.param(EAST, Mode.FROZEN, (-12, 0), 0.019, Mode.FROZEN, id="touched lightly"),
+        pytest.param(EAST, Mode.FROZEN, (-12, 0), 0.02, Mode.FORCE_FOLLOW, id="pressed: freed"),
+        pytest.param(EAST, Mode.FROZEN, (-21, 0), 0.0, Mode.HOLD, id="out of the blister"),
+    ],
+)
+def test_cells_freeze_behind_a_traveling_fingertip(toward, before, place, force, after):
+    seen = ridge(before)
+    seen.force[at(*place)] = force
+    _, orders = created(master(*toward), seen)
+    assert orders.mode[at(*place)] == after
+    assert (orders.target[at(*place)] == 44e-3) == (after in (Mode.FROZEN, Mode.HOLD))
+
+
+@pytest.mark.parametrize(
+    ("height", "target", "after"),
+    [
+        # 12 mm from the master a third of the cone is left: a third of 15 mm up, or of 9 mm down.
+        pytest.param(55e-3, 44e-3, 45e-3, id="a blister"),
+        pytest.param(31e-3, 39e-3, 37e-3, id="a dent"),
+    ],
+)
+def test_what_outgrows_a_frozen_cell_takes_it_along(height: float, target: float, after: float) -> None:
+    seen = ridge(Mode.FROZEN)._replace(target=np.full(BED.count, target))
+    _, orders = created(master(*EAST, height=height), seen)
+    assert orders.mode[at(-12, 0)] == Mode.FROZEN
+    assert orders.target[at(-12, 0)] == pytest.approx(after, abs=1e-9)
+
+
+@pytest.mark.parametrize(("risen", "kept"), [(1.4e-3, False), (1.6e-3, True)])
+def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_of_its_radius(risen, kept):
+    # It has not felt the finger for a period.
+    searching = master(*EAST, height=55e-3)._replace(felt=55e-3 - risen, alone=1)
+    target = created(searching, ridge(Mode.FROZEN))[1].target[at(-12, 0)]
+    assert target == pytest.approx(44e-3 if kept else 45e-3, abs=1e-9)
+
+
+def test_noise_neither_frees_a_frozen_cell_nor_marks_one_as_touched() -> None:
+    noisy = replace(make_system(Layout(15, 15), control=VirtualMaster()).controller, floor=30e-3)
+    seen = ridge(Mode.BLISTER)
+    seen.mode[at(-12, 0)] = Mode.FROZEN
+    seen.force[[at(-12, 0), at(0, 0)]] = 29e-3
+    mode = noisy.command(master(*EAST), seen)[1].mode
+    assert [mode[at(-12, 0)], mode[at(0, 0)]] == [Mode.FROZEN, Mode.BLISTER]
+
+
+def test_a_cell_rests_until_it_is_formed_and_without_a_fingertip_goes_to_its_target() -> None:
+    assert created(master(*EAST), bed())[1].mode[at(-21, 0)] == Mode.REST
+    seen = bed()
+    seen.target[5] += 1e-3
+    _, orders = created(Master(), seen)
+    assert (orders.command[5], orders.mode[5]) == (pytest.approx(0.5), Mode.HOLD)
+
+
+# On the bed
+
+PRESS_AND_LIFT = [(0, 46.0), (0.4, 35.5), (0.6, 35.5), (1.4, 43.0)]
+
+
+@cache
+def formed(x: float, y: float, profile: str = "cone") -> np.ndarray:
+    """Return the final heights (15, 15) after a press at (x, y), mm, and a slow lift."""
+    system = make_system(Layout(15, 15), control=VirtualMaster(), blister=Blister(profile=profile))
+    run = record(system, path(*((t, x, y, z) for t, z in PRESS_AND_LIFT)), 280)
+    assert run.memory[-1].losses == 0
+    return run.height[-1].reshape(15, 15)
+
+
+@pytest.mark.parametrize("profile", ["cone", "gaussian"])
+def test_a_lifting_finger_takes_the_surface_along(profile: str) -> None:
+    # From 4.5 mm below the surface to 3 mm above; with its pulp pressed 1.5 mm the pin stands at 44.5 mm.
+    assert formed(0.0, 0.0, profile)[7, 7] == pytest.approx(44.5e-3, abs=0.7e-3)
+
+
+@pytest.mark.parametrize(("x", "y", "row", "column"), [(21, 0, 7, 14), (-21, -21, 0, 0), (23, 23, 14, 14)])
+def test_a_blister_partly_off_the_bed_rises_as_well(x: float, y: float, row: int, column: int) -> None:
+    heights = formed(x, y)
+    assert heights[row, column] > 43e-3
+    assert heights.min() > 39.9e-3
+    assert np.all(formed(40.0, 0.0) == 40e-3)  # off the bed it changes nothing
