@@ -93,14 +93,9 @@ class ReadParts:
     def __init__(self) -> None:
         self._parts: dict[tuple[Any, ...], Any] = {}
 
-    def read(self, section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
-        """Build a part as `read_part` does, or return the one that was built of the same."""
-        key = section, kind, repr(defaults), repr(own)
-        part: Part = self.keep(key, read_part, section, kind, defaults, own)
-        return part
-
-    def keep(self, key: tuple[Any, ...], make: Callable[..., Any], *given: Any) -> Any:
-        """Return what was made for a key, or make it. `given`: its arguments."""
+    def read(self, make: Callable[..., Any], *given: Any) -> Any:
+        """Return what a function makes of its arguments, or what it made of equal ones before."""
+        key = make, *(one if isinstance(one, type) else repr(one) for one in given)
         if key not in self._parts:
             self._parts[key] = make(*given)
         return self._parts[key]

@@ -54,25 +54,11 @@ def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Sce
         if section not in FINGER_PARTS
     }
     method = (shared["control"] or {}).pop("method", "virtual_master")
-    find_method(method)  # refuses an unknown one
-    defaults = {section: dict(values) for section, values in PRESETS[texts["preset"]].items()}
-    parts: dict[str, Any] = {}
-    for section, own in shared.items():
-        needed = NEEDS.get(section)
-        if (
-            own is None
-            or (needed and shared[needed] is None)
-            or (section == "blister" and not _forms_blister(method, own))
-        ):
-            parts[section] = None
-            continue
-        usual = defaults.get(section, {})
-        if section == "blister":
-            usual |= find_method(method).blister or {}
-        parts[section] = known.read(section, import_parameters(section, method), usual, own)
+    defaults = {**PRESETS[texts["preset"]], "blister": find_method(method).blister or {}}
+    parts = _read_parts(shared, defaults, known, method)
     share = ARRANGEMENTS[parts["layout"].arrangement].share
     if share is not None:
-        defaults.setdefault("contact", {})["share"] = share
+        defaults["contact"] = {**defaults.get("contact", {}), "share": share}
     rest_height = parts["actuator"].rest_height
     fingers = tuple(_read_finger(owner, own, defaults, rest_height, known) for owner, own in tables)
     return Scene(**parts, **texts, fingers=fingers, method=method)
@@ -112,21 +98,31 @@ def merge_one_finger(table: Table) -> dict[str, Any]:
     return {**{key: value for key, value in table.items() if key != FINGERS}, **given[0]}
 
 
+def _read_parts(
+    tables: dict[str, dict[str, Any] | None],
+    defaults: dict[str, dict[str, Any]],
+    known: ReadParts,
+    method: str = "",
+    owner: str = "",
+) -> dict[str, Any]:
+    """Make the parts of some sections; `owner` stands before their names in messages."""
+    parts: dict[str, Any] = dict.fromkeys(tables)
+    for section, own in tables.items():
+        left_out = own is None or (section in NEEDS and tables[NEEDS[section]] is None)
+        if not left_out and (section != "blister" or _forms_blister(method, own)):
+            kind, usual = import_parameters(section, method), defaults.get(section, {})
+            parts[section] = known.read(read_part, owner + section, kind, usual, own)
+    return parts
+
+
 def _read_finger(
     owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_height: float, known: ReadParts
 ) -> Finger:
     """Make a finger of its sections; `owner` stands before their names in messages."""
-    parts: dict[str, Any] = {}
-    for section in FINGER_PARTS:
-        own, needed = _read_section(section, table.get(section, {}), owner), NEEDS.get(section)
-        if own is None or (needed and parts[needed] is None):
-            parts[section] = None
-            continue
-        parts[section] = known.read(
-            owner + section, import_parameters(section, ""), defaults.get(section, {}), own
-        )
-    owner, own = f"{owner}trajectory", table.get("trajectory", {})
-    path = known.keep((owner, repr(own), rest_height), _read_path, owner, own, rest_height)
+    tables = {section: _read_section(section, table.get(section, {}), owner) for section in FINGER_PARTS}
+    parts = _read_parts(tables, defaults, known, owner=owner)
+    own = table.get("trajectory", {})
+    path = known.read(_read_path, f"{owner}trajectory", own, rest_height)
     return Finger(**parts, trajectory=path)
 
 
