@@ -26,7 +26,7 @@ def prism_volume(place: Floats, height: Floats, rows: int, columns: int, base: f
 def compute_volume(body: Body) -> float:
     """Return the volume a closed body encloses, m³: the sum of tetrahedra to its first vertex."""
     total = 0.0
-    for some in split_pieces(len(body.faces)):
-        a, b, c = np.moveaxis((body.vertices - body.vertices[:1])[body.faces[some]], 1, 0)
+    for faces in split_pieces(body.faces):
+        a, b, c = np.moveaxis((body.vertices - body.vertices[:1])[faces], 1, 0)
         total += float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
     return total

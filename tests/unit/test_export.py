@@ -202,7 +202,7 @@ def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("digiclay.core.mesh_io.mesh_writer._normals", stop)
+    monkeypatch.setattr("digiclay.core.mesh_io.mesh_writer._triangles", stop)
     with pytest.raises(KeyboardInterrupt):
         mesh_writer.write(solid, tmp_path / "surface.stl")
     assert not list(tmp_path.iterdir())

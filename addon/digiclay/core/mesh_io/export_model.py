@@ -77,11 +77,9 @@ def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) ->
                 f"There is no feature of {wanted} off the former surface: lower the threshold or the "
                 "smallest number of pins."
             )
-        solids = [make_feature_solid(feature) for feature in features]
-        nearest = [formed.nearest(body.vertices[:, :2]) for body in solids]
         return [
-            replace(body, values=_of_pins(formed, body.vertices, owner))
-            for body, owner in zip(solids, nearest, strict=True)
+            replace(body, values=_of_pins(formed, body.vertices, formed.nearest(body.vertices[:, :2])))
+            for body in map(make_feature_solid, features)
         ]
     features = find(skin, finding) if finding else []
     names = tuple(feature.name for feature in features)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, BinaryIO
@@ -13,7 +13,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Faces, Floats
+from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
 from ..files.run_folder import open_whole
 from ..surface.formed import NO_PIN, Body, split_pieces
@@ -21,8 +21,7 @@ from .obj_reader import UP, find_forward, make_axes
 
 #: One triangle of a binary file.
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
-TEXT = "facet normal {:.6e} {:.6e} {:.6e}\nouter loop\n" + 3 * "vertex {:.9g} {:.9g} {:.9g}\n"
-TEXT += "endloop\nendfacet\n"
+TEXT = "facet normal %.6e %.6e %.6e\nouter loop\n" + 3 * "vertex %.9g %.9g %.9g\n" + "endloop\nendfacet\n"
 
 
 def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
@@ -31,10 +30,9 @@ def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
     file.write(np.uint32(sum(len(body.faces) for body in bodies)).astype("<u4").tobytes())
     for body in bodies:
-        for some in split_pieces(len(body.faces)):
-            corners = _corners(body, some, factor)
+        for corners, normals in _triangles(body, factor):
             table = np.zeros(len(corners), TRIANGLE)
-            table["corners"], table["normal"] = corners, _normals(corners)
+            table["corners"], table["normal"] = corners, normals
             file.write(table.tobytes())
 
 
@@ -42,24 +40,19 @@ def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was."""
     for body in bodies:
         file.write(f"solid {body.name}\n".encode())
-        for some in split_pieces(len(body.faces)):
-            corners = _corners(body, some, factor)
-            table = np.concatenate([_normals(corners), corners.reshape(-1, 9)], axis=1)
-            file.write("".join(TEXT.format(*row) for row in table.tolist()).encode())
+        triangles = _triangles(body, factor)
+        _write_rows(file, TEXT, (np.column_stack([n, c.reshape(-1, 9)]) for c, n in triangles))
         file.write(f"endsolid {body.name}\n".encode())
 
 
-def _corners(body: Body, some: slice, factor: float) -> NDArray[np.float32]:
-    """Return the corners of some triangles, shape (k, 3, 3)."""
-    return np.asarray(body.vertices[body.faces[some]] * factor, np.float32)
-
-
-def _normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return unit normals, shape (k, 3), of the triangles as they are written."""
-    exact = corners.astype(np.float64)
-    normal = np.cross(exact[:, 1] - exact[:, 0], exact[:, 2] - exact[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.asarray(normal / np.where(length > 0.0, length, 1.0), np.float32)
+def _triangles(body: Body, factor: float) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32]]]:
+    """Give corners (k, 3, 3), as they are written, and unit normals (k, 3) of some triangles at a time."""
+    for faces in split_pieces(body.faces):
+        corners = (body.vertices[faces] * factor).astype(np.float32)
+        exact = corners.astype(np.float64)
+        normal = np.cross(exact[:, 1] - exact[:, 0], exact[:, 2] - exact[:, 0])
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        yield corners, (normal / np.where(length > 0.0, length, 1.0)).astype(np.float32)
 
 
 #: Numbers of a vertex in a PLY. Modes have the common size, because some readers accept no smaller one.
@@ -84,28 +77,20 @@ def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     ]
     file.write("\n".join(lines).encode())
     for body in bodies:
-        for some in split_pieces(len(body.vertices)):
-            file.write(_vertices(body, some, factor).tobytes())
+        # Without values the vertices are of no pin and bear no force.
+        force, mode = (np.broadcast_to(value, len(body.vertices)) for value in (0.0, NO_PIN))
+        values = body.values or {"height": body.vertices[:, 2], "force": force, "mode": mode}
+        columns = body.vertices, values["height"], values["force"], values["mode"]
+        for place, height, force, mode in zip(*map(split_pieces, columns), strict=True):
+            columns_in_file = [*(place * factor).T, height * factor, force, mode]
+            file.write(np.rec.fromarrays(columns_in_file, VERTEX).tobytes())
     first = 0
     for body in bodies:
-        for some in split_pieces(len(body.faces)):
-            table = np.empty(len(body.faces[some]), FACE)
-            table["count"], table["vertices"] = 3, body.faces[some] + first
+        for faces in split_pieces(body.faces):
+            table = np.empty(len(faces), FACE)
+            table["count"], table["vertices"] = 3, faces + first
             file.write(table.tobytes())
         first += len(body.vertices)
-
-
-def _vertices(body: Body, some: slice, factor: float) -> np.ndarray[tuple[int], np.dtype[np.void]]:
-    """Return some vertices as the file has them; without values they are of no pin and bear no force."""
-    place = body.vertices[some] * factor
-    table = np.zeros(len(place), VERTEX)
-    table["x"], table["y"], table["z"] = place.T
-    if body.values:
-        table["height"] = body.values["height"][some] * factor
-        table["force"], table["mode"] = body.values["force"][some], body.values["mode"][some]
-    else:
-        table["height"], table["mode"] = place[:, 2], NO_PIN
-    return table
 
 
 def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = UP, forward: str = "") -> None:
@@ -116,21 +101,16 @@ def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = U
     first = 1
     for body in bodies:
         file.write(f"o {body.name}\n".encode())
-        pieces = split_pieces(len(body.vertices))
-        _write_rows(file, line, (body.vertices[some] @ (axes * factor) for some in pieces))
+        _write_rows(file, line, (piece @ (axes * factor) for piece in split_pieces(body.vertices)))
+        groups = [("", body.faces)]
         if body.groups:
-            for number, name in enumerate(("rest", *body.groups)):
-                file.write(f"g {name}\n".encode())
-                _faces(file, body.faces[body.group == number], first)
-        else:
-            _faces(file, body.faces, first)
+            names = enumerate(("rest", *body.groups))
+            groups = [(f"g {name}\n", body.faces[body.group == number]) for number, name in names]
+        for head, faces in groups:
+            file.write(head.encode())
+            pieces = (piece.astype(np.int64) + first for piece in split_pieces(faces))
+            _write_rows(file, "f %d %d %d\n", pieces)
         first += len(body.vertices)
-
-
-def _faces(file: BinaryIO, faces: Faces, first: int) -> None:
-    """Write triangles whose vertex 0 is number `first` of the file."""
-    pieces = split_pieces(len(faces))
-    _write_rows(file, "f %d %d %d\n", (faces[some].astype(np.int64) + first for some in pieces))
 
 
 def _write_rows(file: BinaryIO | IO[bytes], line: str, pieces: Iterable[NDArray[Any]]) -> None:
@@ -157,10 +137,10 @@ def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file.write(struct.pack("<4sIII4s", b"glTF", 2, whole, len(text), b"JSON") + text)
     file.write(struct.pack("<I4s", size, b"BIN\0"))
     for body in bodies:
-        for some in split_pieces(len(body.vertices)):
-            file.write(_upright(body.vertices[some]).astype("<f4").tobytes())
-        for some in split_pieces(len(body.faces)):
-            file.write(body.faces[some].astype("<u4").tobytes())
+        for vertices in split_pieces(body.vertices):
+            file.write(_upright(vertices).astype("<f4").tobytes())
+        for faces in split_pieces(body.faces):
+            file.write(faces.astype("<u4").tobytes())
 
 
 def _describe(bodies: Sequence[Body]) -> dict[str, Any]:
@@ -219,8 +199,9 @@ MOMENT = (1980, 1, 1, 0, 0, 0)
 
 
 def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies as objects, lengths in 1 / `factor` m."""
-    unit = "millimeter" if factor > 1.0 else "meter"
+    """Write the bodies as objects, lengths in 1 / `factor` m, to the nearest nanometer."""
+    unit, form = ("millimeter", "%.6f") if factor > 1.0 else ("meter", "%.9f")
+    vertex = f'<vertex x="{form}" y="{form}" z="{form}"/>\n'
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, text in (("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONS)):
             archive.writestr(zipfile.ZipInfo(name, MOMENT), text)
@@ -232,22 +213,13 @@ def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
                 # Only what encloses a volume may be a "model".
                 kind = "model" if body.closed else "surface"
                 part.write(f'<object id="{number}" type="{kind}" name="{body.name}"><mesh>\n'.encode())
-                _mesh(part, body, factor)
-                part.write(b"</mesh></object>\n")
+                part.write(b"<vertices>\n")
+                _write_rows(part, vertex, (piece * factor for piece in split_pieces(body.vertices)))
+                part.write(b"</vertices>\n<triangles>\n")
+                _write_rows(part, '<triangle v1="%d" v2="%d" v3="%d"/>\n', split_pieces(body.faces))
+                part.write(b"</triangles>\n</mesh></object>\n")
             items = "".join(f'<item objectid="{number}"/>\n' for number in range(1, len(bodies) + 1))
             part.write(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
-
-
-def _mesh(part: IO[bytes], body: Body, factor: float) -> None:
-    """Write vertices to the nearest nanometer, and triangles."""
-    number = "%.6f" if factor > 1.0 else "%.9f"
-    vertex = f'<vertex x="{number}" y="{number}" z="{number}"/>\n'
-    part.write(b"<vertices>\n")
-    _write_rows(part, vertex, (body.vertices[some] * factor for some in split_pieces(len(body.vertices))))
-    part.write(b"</vertices>\n<triangles>\n")
-    triangle = '<triangle v1="%d" v2="%d" v3="%d"/>\n'
-    _write_rows(part, triangle, (body.faces[some] for some in split_pieces(len(body.faces))))
-    part.write(b"</triangles>\n")
 
 
 #: File formats, by name, with their lines in the help.

@@ -54,7 +54,7 @@ def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Sce
         if section not in FINGER_PARTS
     }
     method = (shared["control"] or {}).pop("method", "virtual_master")
-    defaults = {**PRESETS[texts["preset"]], "blister": find_method(method).blister or {}}
+    defaults: dict[str, Table] = {**PRESETS[texts["preset"]], "blister": find_method(method).blister or {}}
     parts = _read_parts(shared, defaults, known, method)
     share = ARRANGEMENTS[parts["layout"].arrangement].share
     if share is not None:
@@ -99,8 +99,8 @@ def merge_one_finger(table: Table) -> dict[str, Any]:
 
 
 def _read_parts(
-    tables: dict[str, dict[str, Any] | None],
-    defaults: dict[str, dict[str, Any]],
+    tables: Mapping[str, Table | None],
+    defaults: Mapping[str, Table],
     known: ReadParts,
     method: str = "",
     owner: str = "",
@@ -108,15 +108,16 @@ def _read_parts(
     """Make the parts of some sections; `owner` stands before their names in messages."""
     parts: dict[str, Any] = dict.fromkeys(tables)
     for section, own in tables.items():
-        left_out = own is None or (section in NEEDS and tables[NEEDS[section]] is None)
-        if not left_out and (section != "blister" or _forms_blister(method, own)):
+        if own is None or (section in NEEDS and tables[NEEDS[section]] is None):
+            continue
+        if section != "blister" or _forms_blister(method, own):
             kind, usual = import_parameters(section, method), defaults.get(section, {})
             parts[section] = known.read(read_part, owner + section, kind, usual, own)
     return parts
 
 
 def _read_finger(
-    owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_height: float, known: ReadParts
+    owner: str, table: Table, defaults: Mapping[str, Table], rest_height: float, known: ReadParts
 ) -> Finger:
     """Make a finger of its sections; `owner` stands before their names in messages."""
     tables = {section: _read_section(section, table.get(section, {}), owner) for section in FINGER_PARTS}
@@ -146,7 +147,7 @@ def _read_section(section: str, value: Any, owner: str = "") -> dict[str, Any] |
     raise ParameterError(owner + section, "", rule, show_value(value))
 
 
-def _forms_blister(method: str, own: dict[str, Any]) -> bool:
+def _forms_blister(method: str, own: Table) -> bool:
     """Return whether a method forms a blister; refuse a section [blister] where it does not."""
     formed = find_method(method).blister is not None
     if not formed and own:

@@ -154,7 +154,7 @@ class Body:
     """Whether it encloses a volume."""
 
 
-def split_pieces(count: int) -> Iterator[slice]:
-    """Give slices that together are ``range(count)``, none longer than `PIECE`."""
-    for start in range(0, count, PIECE):
-        yield slice(start, min(start + PIECE, count))
+def split_pieces(table: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """Give the rows of a table in order, at most `PIECE` at a time."""
+    for start in range(0, len(table), PIECE):
+        yield table[start : start + PIECE]
