@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from digiclay.core.surface.formed import Body, split_pieces
 from digiclay.core.surface.skin_mesh import find_base_level, make_skin
 from numpy.typing import NDArray
 
@@ -21,12 +20,3 @@ def prism_volume(place: Floats, height: Floats, rows: int, columns: int, base: f
     area = 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
     level = find_base_level(height) if base is None else base
     return float(np.sum(area * (height[faces].mean(axis=1) - level)))
-
-
-def compute_volume(body: Body) -> float:
-    """Return the volume a closed body encloses, m³: the sum of tetrahedra to its first vertex."""
-    total = 0.0
-    for faces in split_pieces(body.faces):
-        a, b, c = np.moveaxis((body.vertices - body.vertices[:1])[faces], 1, 0)
-        total += float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
-    return total

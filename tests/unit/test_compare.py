@@ -25,7 +25,8 @@ pytestmark = pytest.mark.usefixtures("here")
 def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["compare", "my.toml", "--methods", "cell_states,virtual_master"]) == 0
+    methods, setting = ["--methods", "cell_states,virtual_master"], ["--set", "control.force_setpoint=0.03"]
+    assert main(["compare", "my.toml", *methods, *setting]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["metric", "unit", *BOTH[::-1]]
     printed = {line.split()[0]: line.split()[-2:] for line in lines[2 : 2 + len(RUN_METRICS)]}
@@ -42,6 +43,9 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     assert known["cell_states"]["duration"] == known["virtual_master"]["duration"] == 0.5
     # Other controllers, other forces: neither was run twice.
     assert known["cell_states"]["max_total_force"] != known["virtual_master"]["max_total_force"]
+    # The setting reached both, and is asked of each cell that follows: of one at least, of all 121 at most.
+    assert known["virtual_master"]["set_point"] == 0.03
+    assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
 
 
 def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_not_found() -> None:
@@ -50,14 +54,6 @@ def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_
     rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
     assert ["lag_max", "mm", "2.5"] in rows
     assert ["rfd", "N", "–"] in rows
-
-
-def test_a_setting_reaches_every_method(here: Path) -> None:
-    main(["compare", "my.toml", "--quiet", "--set", "control.force_setpoint=0.03"])
-    known = json.loads((here / "my_compare" / "metrics.json").read_text(encoding="utf-8"))["methods"]
-    assert known["virtual_master"]["set_point"] == 0.03
-    # Asked of each cell that follows: of the nearest pin at the least, of all 121 at the most.
-    assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
 
 
 @pytest.mark.parametrize(

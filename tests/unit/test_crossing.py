@@ -1,4 +1,4 @@
-"""Crossing strokes leave no spikes; a ridge cuts nothing off another, and a groove piles nothing up."""
+"""Crossing strokes leave no spikes, cut nothing off and pile nothing up; nor does a finger taken away."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.session.take import replay
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
@@ -15,8 +16,8 @@ from digiclay.strokes.stroke import Brush
 from digiclay.strokes.sweep import LIMIT, measure_excess_heights
 from numpy.typing import NDArray
 
-from tests.hand import heights
-from tests.strokes import Places, begin_bed, form, relief
+from tests.hand import TICK, heights
+from tests.strokes import Places, begin_bed, form, measure_spikes, relief
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
@@ -52,19 +53,14 @@ def crossed(bed: str, degrees: float, brush: Brush) -> tuple[Running, Running]:
     return ridged(bed), form(session, turned(bed, degrees), brush, amount)
 
 
-def measure_spikes(session: Running) -> float:
-    """Return how far the worst pin is above or below all pins around it, mm."""
-    return 1e3 * float(np.abs(measure_excess_heights(session.system.grid, heights(session))).max())
-
-
 @pytest.mark.parametrize(("bed", "degrees"), [("paper", 45.0), ("design", 90.0)])
 def test_a_ridge_across_a_ridge_cuts_nothing_off_and_leaves_no_spikes(bed: str, degrees: float) -> None:
     before, after = crossed(bed, degrees, Brush.RAISE)
-    assert measure_spikes(after) < BOUND
+    formed = relief(after)
+    assert measure_spikes(formed) < BOUND
     # Where the finger comes down behind the crossing, its flat top takes some of the old flank down.
     height = SIZES[bed][2]
-    assert (relief(before) - relief(after)).max() < 0.35 * height
-    formed = relief(after)
+    assert (relief(before) - formed).max() < 0.35 * height
     assert formed[len(formed) // 2, len(formed) // 2] == pytest.approx(2.0 * height, abs=1.5)
 
 
@@ -72,8 +68,8 @@ def test_a_ridge_across_a_ridge_cuts_nothing_off_and_leaves_no_spikes(bed: str, 
 def test_a_groove_across_a_ridge_goes_through_it_and_piles_nothing_up(bed: str) -> None:
     _, _, height, depth = SIZES[bed]
     before, session = crossed(bed, 90.0, Brush.LOWER)
-    assert measure_spikes(session) < BOUND
     after = relief(session)
+    assert measure_spikes(after) < BOUND
     # Behind a finger that climbs the flank: 5 to 6 mm by a blister that raises there, now 0.1 and 2.5 mm.
     assert (after - relief(before)).max() < 3.0
     # Through the ridge, and as deep beyond it as a finger's pulp leaves it: 1 mm less than the finger went.
@@ -102,4 +98,44 @@ def test_after_a_groove_at_an_angle_what_settles_moves_clay_and_is_replayed_bit_
         far &= (x - order[0]) ** 2 + (y - order[1]) ** 2 > order[2] ** 2
     np.testing.assert_array_equal(after[far], before[far])
     assert not far.all()
-    assert measure_spikes(session) <= 1e3 * LIMIT * session.scene.layout.pitch + 0.05
+    excess = np.abs(measure_excess_heights(session.system.grid, heights(session))).max()
+    assert excess <= LIMIT * session.scene.layout.pitch + 0.05e-3
+
+
+# A finger that a hand takes away from its blister, faster than pins rise
+
+
+#: What is left may be higher than what was shaped by so much, mm, and a pin so far off those around it.
+#: Measured: 0.3 and 0.5 mm; 4 and 2.7 mm where a search takes frozen cells along without a bound.
+LEFT = 1.0
+
+
+def move(session: Running, goal: tuple[float, float, float], duration: float) -> Running:
+    """Move the finger by hand to a place, mm, within a time, s."""
+    start, now = session.pose[:3].copy(), session.clock.seen or 0.0
+    count = max(1, round(duration / TICK))
+    for step in range(1, count + 1):
+        place = start + (np.array(goal) * 1e-3 - start) * step / count
+        session = sculpting.advance(session, np.array([*place, *LEVEL]), now + step * TICK, 100)
+    return session
+
+
+@functools.cache
+def shaped(bed: str) -> Running:
+    """Return a session whose finger has pressed, risen and gone aside by hand."""
+    session = begin_bed(bed, 25, 25)
+    for place, duration in (((-4, 0, 46), 0.1), ((-4, 0, 37), 0.4), ((-4, 0, 46), 1.5), ((5, 0, 46), 1.0)):
+        session = move(session, place, duration)
+    return session
+
+
+@pytest.mark.parametrize("goal", [(5.0, 0.0, 90.0), (5.0, 60.0, 47.0)], ids=["upwards", "sideways"])
+@pytest.mark.parametrize("bed", ["paper", "design", "fine"])
+def test_no_pin_is_left_above_what_the_finger_has_shaped(bed: str, goal: tuple[float, float, float]) -> None:
+    before = shaped(bed)
+    session = replace(before, state=before.state.copy())
+    session = move(session, goal, 0.15)
+    session = move(session, (*goal[:2], 90.0), 0.1)
+    formed = relief(move(session, (*goal[:2], 90.0), 0.5))
+    assert formed.max() < relief(before).max() + LEFT
+    assert measure_spikes(formed) < LEFT

@@ -173,9 +173,9 @@ def test_a_fault_in_a_stack_is_not_passed_over(
 def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    sweep = ["sweep", "tap", "--vary", "control.force_gain=1:6:5", "--set", "simulation.duration=0.2"]
+    sweep = ["sweep", "tap", "--vary", "control.force_gain=1:6:4", "--set", "simulation.duration=0.1"]
     main([*sweep, "--out", "out"])
-    assert "5 points\n5 points run in 1 stack\n" in capsys.readouterr().out
+    assert "4 points\n4 points run in 1 stack\n" in capsys.readouterr().out
     file, figures = here / "out" / "points" / "000003.json", []
     for _ in range(2):
         kept = json.loads(file.read_text(encoding="utf-8"))["figures"]

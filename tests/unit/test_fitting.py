@@ -203,35 +203,35 @@ def middle(rows: int, columns: int, factor: float) -> Placement:
     return Placement(factor, factor, -columns / 2 * factor, -rows / 2 * factor)
 
 
-def test_a_map_with_a_pixel_for_every_pin_gives_every_pin_its_pixel() -> None:
-    values = np.random.default_rng(2).uniform(0.0, 1.0, (5, 7))
-    found = make_height_map("x", values).tops(make_grid(Layout(5, 7, PITCH)), middle(5, 7, PITCH))
-    assert np.abs(found.value - values.ravel()).max() < 1e-12  # places between 0 and 7, rounded
-    assert found.covered.all()
+ROW, COLUMN = np.indices((72, 72))
+PIXELS = np.random.default_rng(2).uniform(0.0, 1.0, (5, 7))
 
 
-def test_a_plane_stays_a_plane_between_the_pixels() -> None:
-    row, column = np.mgrid[0:20, 0:30]
-    found = make_height_map("x", 2.0 * row - column).tops(
-        make_grid(Layout(9, 13, PITCH)), middle(20, 30, 2.1e-3)
-    )
-    bed = make_grid(Layout(9, 13, PITCH))
-    wanted = 2.0 * (bed.y / 2.1e-3 + 9.5) - (bed.x / 2.1e-3 + 14.5)
-    assert np.abs(found.value - wanted).max() < 1e-10  # rounding of numbers up to 60
-
-
-def test_a_fine_map_is_averaged_over_the_square_of_a_pin() -> None:
-    # Eight by eight pixels to a pin, one of them white: every pin sees their mean.
-    row, column = np.indices((72, 72)) % 8
-    found = make_height_map("x", (row == 1) & (column == 6)).tops(
-        make_grid(Layout(9, 9, PITCH)), middle(72, 72, PITCH / 8)
-    )
-    assert np.abs(found.value - 1 / 64).max() < 1e-12
-
-
-def test_pins_beside_the_map_are_not_covered() -> None:
-    found = make_height_map("x", np.ones((3, 3))).tops(make_grid(Layout(9, 9, PITCH)), middle(3, 3, PITCH))
-    np.testing.assert_array_equal(np.argwhere(found.covered.reshape(9, 9)), np.argwhere(np.ones((3, 3))) + 3)
+@pytest.mark.parametrize(
+    ("values", "rows", "columns", "pixel", "wanted"),
+    [
+        pytest.param(PIXELS, 5, 7, PITCH, lambda x, y: PIXELS.ravel(), id="a pixel for every pin is its own"),
+        pytest.param(
+            (2.0 * ROW - COLUMN)[:20, :30], 9, 13, 2.1e-3,
+            lambda x, y: 2.0 * (y / 2.1e-3 + 9.5) - (x / 2.1e-3 + 14.5), id="between pixels a plane is one",
+        ),
+        # Eight by eight pixels to a pin, one of them white.
+        pytest.param(
+            (ROW % 8 == 1) & (COLUMN % 8 == 6), 9, 9, PITCH / 8, lambda x, y: np.full(x.size, 1 / 64),
+            id="a fine map is averaged over the square of a pin",
+        ),
+        pytest.param(
+            np.ones((3, 3)), 9, 9, PITCH,
+            lambda x, y: np.where(np.maximum(np.abs(x), np.abs(y)) < 4e-3, 1.0, np.nan),
+            id="pins beside the map are not covered",
+        ),
+    ],
+)  # fmt: skip
+def test_a_map_gives_each_pin_the_mean_over_its_square(values, rows, columns, pixel, wanted):
+    bed = make_grid(Layout(rows, columns, PITCH))
+    found, known = make_height_map("x", values).tops(bed, middle(*values.shape, pixel)), wanted(bed.x, bed.y)
+    np.testing.assert_array_equal(found.covered, np.isfinite(known))
+    assert np.abs(found.value - known)[found.covered].max() < 1e-10  # rounding of numbers up to 60
 
 
 @given(

@@ -16,8 +16,6 @@ from digiclay.core.shapes.mesh_relief import SMALL, ShapeMesh, fill_holes, make_
 from digiclay.core.shapes.request import Placement, Shape, Tops
 from digiclay.core.shapes.source_file import fit_shape
 from digiclay.core.surface.skin_mesh import take_corners
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
@@ -38,8 +36,7 @@ def tops(mesh: trimesh.Trimesh, arrangement: str = "aligned", side: int = 21) ->
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
-@settings(max_examples=8)
-@given(seed=st.integers(0, 2**32 - 1))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_top_of_a_terrain_is_what_scipy_interpolates(arrangement: str, seed: int) -> None:
     chance = np.random.default_rng(seed)
     plan, z = chance.uniform(-25.0, 25.0, (60, 2)), chance.uniform(-5.0, 5.0, 60)
