@@ -3,38 +3,53 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar
 
-from digiclay.core.studies.speed_limits import Follows, find_free_speed
+from digiclay.core.studies.speed_limits import find_free_speed
 
 from . import scenes
 from .relief_sections import LIMITS, Section, blister_section, sections
 from .results import (
+    AS_IT_IS,
+    DRAGS,
     FULL,
     PAPER_SPEED,
     QUICK,
     RIDGE,
     WAYS,
+    Dragged,
     Results,
     Swing,
     onset_among,
 )
 from .scenes import METHODS, NAMES
-from .simulations import WINDOWS
+from .simulations import GAUSSIAN, NO_RISE, WINDOWS
 
 MM = 1e3
 ONE, TWO = METHODS
 SHORT = {name: NAMES[name].split(",")[0] for name in METHODS}
 #: Ends of the searches for a largest speed, m/s.
 FASTEST = {speeds[1] for one in (FULL, QUICK) for speeds in (one.drags, one.lifts)}
+Value = TypeVar("Value")
 
 
-class Evidence(NamedTuple):
+@dataclass
+class Evidence:
     """What was measured for a claim, item by item; whether each part of it holds; and remarks."""
 
-    items: list[str]
-    holds: list[bool]
+    items: list[str] = field(default_factory=list)
+    holds: list[bool] = field(default_factory=list)
+    #: Names of the items that do not hold.
+    missed: list[str] = field(default_factory=list)
     why: str = ""
+
+    def add(self, name: str, text: str, *holds: bool) -> None:
+        """Add an item, and whether each of its parts holds."""
+        self.items.append(f"{name}: {text}")
+        self.holds += holds
+        self.missed += [] if all(holds) else [name]
 
     @property
     def measured(self) -> str:
@@ -44,37 +59,43 @@ class Evidence(NamedTuple):
     @property
     def verdict(self) -> str:
         """Whether all, some or none of the parts hold."""
-        return "holds" if all(self.holds) else "holds in part" if any(self.holds) else "differs"
+        return "differs" if not any(self.holds) else "holds" if all(self.holds) else "holds in part"
 
 
-def speed(found: float | None) -> str:
+def _of_paper(found: Mapping[tuple[str, str], Value]) -> Iterator[tuple[str, str, Value]]:
+    """Yield method, name of the trajectory and value of the paper's methods, without Method III's."""
+    return ((method, name, value) for (method, name), value in found.items() if method in METHODS)
+
+
+def speed(limit: float | None) -> str:
     """Write a largest speed, m/s."""
-    if found is None:
+    if limit is None:
         return "below the slowest tried"
-    return f"{'at least ' if found in FASTEST else ''}{found * MM:.1f} mm/s"
+    return f"{'at least ' if limit in FASTEST else ''}{limit * MM:.1f} mm/s"
 
 
 def relief(results: Results) -> Evidence:
     """Whether ridge, mound and valley have the sections asked for."""
-    found = {method: list(sections(results.session[method])) for method in METHODS}
-    told = [f"{SHORT[method]}, {_write_section(one)}" for method in METHODS for one in found[method]]
-    levels = []
+    evidence, levels, missed = Evidence(), [], []
     for method in METHODS:
-        parts = {one.part: f"{one.part} {one.level * MM:.1f} mm" for one in found[method]}
+        parts = {}
+        for one in sections(results.session[method]):
+            evidence.add(f"{SHORT[method]}, {one.name}", _write_section(one), one.meets(LIMITS))
+            parts[one.part] = f"{one.part} {one.level * MM:.1f} mm"
+            missed += [one.name] if method == TWO and not one.meets(LIMITS) else []
         levels.append(f"{SHORT[method]} {', '.join(parts.values())}")
-    why = (
+    evidence.why = (
         f"A section holds when its shape is {LIMITS}. Asked for is the method's own blister carried along "
         "the finger's path, at the level that was formed: beyond the finger's lowest point by "
-        f"{'; '.join(levels)}. "
+        f"{'; '.join(levels)}."
     )
-    missed = [one.name for one in found[TWO] if not one.meets(LIMITS)]
     if missed:
-        why += (
-            f"{SHORT[TWO]} misses {', '.join(missed)}: every cell under the finger keeps its own force, so "
+        evidence.why += (
+            f" {SHORT[TWO]} misses {', '.join(missed)}: every cell under the finger keeps its own force, so "
             "the surface takes the shape of the fingertip, with a rim around it, and the cells that were "
             "left behind at different moments stay where they were."
         )
-    return Evidence(told, [one.meets(LIMITS) for method in METHODS for one in found[method]], why.strip())
+    return evidence
 
 
 def _write_section(one: Section) -> str:
@@ -83,49 +104,43 @@ def _write_section(one: Section) -> str:
     low = abs(one.level) > LIMITS.level * one.middle
     level = f", its middle {one.level * MM:+.1f} mm from {one.middle * MM:.1f} mm" if low else ""
     holds = "" if one.meets(LIMITS) else " (missed)"
-    far = f"rms {one.rms * MM:.1f}, at most {one.largest * MM:.1f} of {one.relief * MM:.1f} mm"
-    return f"{one.name}: {far}{rim}{level}{holds}"
+    size = f"rms {one.rms * MM:.1f}, at most {one.largest * MM:.1f} of {one.relief * MM:.1f} mm"
+    return f"{size}{rim}{level}{holds}"
 
 
 def tracking(results: Results) -> Evidence:
     """Both methods on the simple trajectories."""
-    told = [
-        f"{SHORT[method]}, {name}: {_followed(results.simple[method, name])}"
-        for method in METHODS
-        for name in WAYS
-    ]
-    holds = {key: one.meets(results.criterion) for key, one in results.simple.items() if key[0] in METHODS}
-    missed = "; ".join(f"{SHORT[method]}, {name}" for (method, name), follows in holds.items() if not follows)
-    return Evidence(told, list(holds.values()), f"Not followed: {missed}." if missed else "")
-
-
-def _followed(one: Follows) -> str:
-    lost = f"lost {one.losses} times, {one.loss_share:.0%} of the time without contact"
-    if one.losses == 0 and one.loss_share == 0.0:
-        lost = "never lost"
-    return f"{lost}, lag ≤ {one.lag * MM:.1f} mm, RFD {one.rfd:.3f} N"
+    evidence = Evidence()
+    for method, name, one in _of_paper(results.simple):
+        lost = f"lost {one.losses} times, {one.loss_share:.0%} of the time without contact"
+        if one.losses == 0 and one.loss_share == 0.0:
+            lost = "never lost"
+        text = f"{lost}, lag ≤ {one.lag * MM:.1f} mm, RFD {one.rfd:.3f} N"
+        evidence.add(f"{SHORT[method]}, {name}", text, one.meets(results.criterion))
+    evidence.why = f"Not followed: {'; '.join(evidence.missed)}." if evidence.missed else ""
+    return evidence
 
 
 def largest_speed(results: Results) -> Evidence:
+    """Whether both methods follow the paper's speed, and how far beyond."""
+    evidence = Evidence()
     lifts = {(method, "a lift straight up"): limit for method, limit in results.lifting.items()}
-    found = {key: limit for key, limit in (results.fastest | lifts).items() if key[0] in METHODS}
-    told = [f"{SHORT[method]}, {name}: {speed(limit)}" for (method, name), limit in found.items()]
+    for method, name, limit in _of_paper(results.fastest | lifts):
+        evidence.add(f"{SHORT[method]}, {name}", speed(limit), (limit or 0.0) >= PAPER_SPEED)
     free = find_free_speed(results.printed[ONE].scene)
     gain = results.printed[TWO].gain("force_gain") * results.printed[TWO].gain("force_setpoint")
-    why = (
+    evidence.why = (
         f"A pin without load rises at {free * MM:.1f} mm/s. A cell of {SHORT[TWO]} that feels nothing opens "
         f"its valve to K_FF F_ref = {gain:.2g}, and rises at {free * min(gain, 1.0) ** 2 * MM:.1f} mm/s "
         f"at the most."
     )
-    return Evidence(told, [(limit or 0.0) >= PAPER_SPEED for limit in found.values()], why)
+    return evidence
 
 
 #: What counts as much greater, as a ratio.
 MUCH = 1.5
 #: A response is quicker that takes less than this share of the time.
 QUICKER = 0.9
-
-
 DEVIATIONS = {
     "height_deviation": ("height under the finger, standard deviation over time", MM, "mm"),
     "ridge_error": ("what is left behind over the finger's path, rms", MM, "mm"),
@@ -133,8 +148,6 @@ DEVIATIONS = {
     "force_deviation": ("total force, standard deviation over time", 1.0, "N"),
     "rfd_shaping": ("total force from its set point while shaping, rms", 1.0, "N"),
 }
-
-
 #: Of them, what is compared in the paper's windows, too.
 WINDOWED = {
     "rfd": ("RFD", 1.0, "N"), "force_deviation": ("total force", 1.0, "N"),
@@ -144,61 +157,55 @@ WINDOWED = {
 
 def deviations(results: Results) -> Evidence:
     """Whether Method II deviates much more, in the whole session and in each of the paper's windows."""
+    evidence = Evidence()
     sources = [("", DEVIATIONS, [results.session[method].metrics for method in METHODS])]
     for window, spans in WINDOWS.items():
         between = " and ".join(f"{start:g} to {end:g} s" for start, end in spans)
         values = [results.printed[method].windows.get(window, {}) for method in METHODS]
         sources.append((f"{between} ({window}), ", WINDOWED, values))
-    told, ratios = [], []
     for when, compared, values in sources:
         for name, (meaning, factor, unit) in compared.items():
-            one, two = (known.get(name) for known in values)
+            one, two = (metrics.get(name) for metrics in values)
             both, ratio = "nothing to compute from", 0.0
             if one and two is not None:
                 ratio = two / one
                 both = f"{one * factor:.3g} and {two * factor:.3g} {unit}, ratio {ratio:.1f}"
-            told.append(f"{when}{meaning}: {both}")
-            ratios.append(ratio)
-    known = results.session[TWO]
-    each = known.gain("force_setpoint")
+            evidence.add(f"{when}{meaning}", both, ratio > MUCH)
+    session = results.session[TWO]
+    each = session.gain("force_setpoint")
     level = [f"{one.rfd:.3f} N {name}" for (method, name), one in results.simple.items() if method == TWO]
-    why = (
-        f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {known.followers:.1f} cells follow it on "
+    evidence.why = (
+        f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {session.followers:.1f} cells follow it on "
         f"average. Its set point, {each:g} N times the cells that follow at the moment, is "
-        f"{_newton(known.metrics['set_point'])} on average and changes as the finger passes from cell to "
+        f"{_newton(session.metrics['set_point'])} on average and changes as the finger passes from cell to "
         "cell. A cell that is to rise needs a force below its set point, so the force falls short while the "
         "finger lifts: in level drags the RFD is " + ", ".join(level) + ". "
         f"It holds where all are {MUCH:g} times as great."
     )
-    return Evidence(told, [ratio > MUCH for ratio in ratios], why)
+    return evidence
 
 
 def reference_force(results: Results) -> Evidence:
-    told = []
-    for method in METHODS:
-        known = results.session[method].metrics
-        drag = results.simple[method, RIDGE]
-        told.append(
-            f"{SHORT[method]}, set point {_newton(known['set_point'])}: {_newton(known['rfd'])} in contact, "
-            f"{_newton(known['rfd_shaping'])} while shaping, "
-            f"{drag.rfd:.3f} N dragging a ridge at {PAPER_SPEED * MM:g} mm/s"
-        )
-    pairs = [[results.session[method].metrics[name] for method in METHODS] for name in ("rfd", "rfd_shaping")]
-    greater = [bool(one and two and two > one) for one, two in pairs]
-    less = [results.simple[ONE, name].rfd < results.simple[TWO, name].rfd for name in WAYS]
-    return Evidence(
-        told,
-        [*greater, *less],
-        "The paper's own values are not among what this project has of it, so ours stand alone.",
+    """Whether Method I's RFD is the smaller one."""
+    evidence = Evidence(
+        why="The paper's own values are not among what this project has of it, so ours stand alone."
     )
+    one, two = (results.session[method].metrics for method in METHODS)
+    for method, metrics in ((ONE, one), (TWO, two)):
+        text = (
+            f"{_newton(metrics['rfd'])} in contact, {_newton(metrics['rfd_shaping'])} while shaping, "
+            f"{results.simple[method, RIDGE].rfd:.3f} N dragging a ridge at {PAPER_SPEED * MM:g} mm/s"
+        )
+        evidence.add(f"{SHORT[method]}, set point {_newton(metrics['set_point'])}", text)
+    for name in ("rfd", "rfd_shaping"):
+        smaller, greater = one[name], two[name]
+        evidence.holds.append(bool(smaller and greater and greater > smaller))
+    evidence.holds += [results.simple[ONE, name].rfd < results.simple[TWO, name].rfd for name in WAYS]
+    return evidence
 
 
 def _newton(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f} N"
-
-
-def _seconds(time: float | None) -> str:
-    return "never" if time is None else f"{time:.2f} s"
 
 
 def _gain(gain: float) -> str:
@@ -207,121 +214,115 @@ def _gain(gain: float) -> str:
 
 def onset(results: Results) -> Evidence:
     """Where the oscillation sets in, at each K_p, and with a quicker device."""
-    sweeps, used = results.sweeps, results.printed[ONE]
-    told = [f"K_p = {gain:g} 1/m: {_sets_in(row)}" for gain, row in sweeps.items()]
+    evidence, used = Evidence(), results.printed[ONE]
+    for gain, row in results.sweeps.items():
+        evidence.add(f"K_p = {gain:g} 1/m", _sets_in(row), onset_among(row)[1] is not None)
     position_gain, gain = used.gain("position_gain"), used.gain("force_gain")
     first = results.onset(position_gain)[1]
     beyond = first is not None and gain >= first
+    evidence.holds.append(beyond)
     far = "" if first is None else f", {first / gain:.3g} times this K_f in another experiment"
-    why = (
+    evidence.why = (
         f"Fig. 9 shows it in the session. The session's own gains here, K_p = {position_gain:g} 1/m and "
         f"K_f = {gain:g} 1/N, are {'beyond' if beyond else 'below'} the onset{far}. Flow goes with the "
         "square of the opening, so a small error hardly moves a pin: only a transient starts the cycle."
     )
     if results.quicker:
         free = find_free_speed(used.scene)
-        why += (
+        evidence.why += (
             f" The device decides where: with pins of {results.quicker_speed * MM:.1f} instead of "
             f"{free * MM:.1f} mm/s without load, slower valves and a longer dead time, at K_p = "
             f"{results.quicker[0].position_gain:g} 1/m: {_sets_in(results.quicker)}."
         )
-    return Evidence(told, [*(onset_among(row)[1] is not None for row in sweeps.values()), beyond], why)
+    return evidence
 
 
 def _sets_in(swings: list[Swing]) -> str:
-    """Tell between which gains the oscillation sets in, and what it is like then."""
+    """Write between which gains the oscillation sets in, and what it is like then."""
     calm, first = onset_among(swings)
     if first is None:
         return f"none up to K_f = {calm or 0.0:g} 1/N"
-    amplitude = {one.gain: one.amplitude for one in swings}
-    one = next(one for one in swings if one.gain == first)
+    by_gain = {one.gain: one for one in swings}
+    one = by_gain[first]
     pace = "" if one.frequency is None else f", {one.frequency:.0f} Hz"
-    below = "at" if calm is None else f"above {calm:g} ({amplitude[calm]:.3f} N left), at"
+    below = "at" if calm is None else f"above {calm:g} ({by_gain[calm].amplitude:.3f} N left), at"
     return f"{below} {first:g} 1/N (amplitude {one.amplitude:.3f} N{pace})"
 
 
 def trade(results: Results) -> Evidence:
-    told, holds = [], []
+    """Whether a higher gain is quicker until it oscillates."""
+    evidence = Evidence()
     for position_gain, row in results.sweeps.items():
-        calm = [one for one in row if one.settling is not None]
+        name = f"K_p = {position_gain:g} 1/m"
+        calm = [(one.gain, one.settling) for one in row if one.settling is not None]
         if not calm:
-            told.append(f"K_p = {position_gain:g} 1/m: never settles")
-            holds.append(False)
+            evidence.add(name, "never settles", False)
             continue
-        best = min(calm, key=lambda one: one.settling or 0.0)
+        (low, slow), (high, end) = calm[0], calm[-1]
+        best, quick = min(calm, key=lambda one: one[1])
         ends = "and goes on for ever beyond" if len(calm) < len(row) else "the highest tried"
-        told.append(
-            f"K_p = {position_gain:g} 1/m: {calm[0].settling:.2f} s at K_f = {calm[0].gain:g}, "
-            f"{best.settling:.2f} s at {best.gain:g}, {calm[-1].settling:.2f} s at {calm[-1].gain:g} 1/N, "
-            f"{ends}"
-        )
-        quicker = (best.settling or 0.0) < QUICKER * (calm[0].settling or 0.0)
-        holds += [len(calm) < len(row), quicker]
-    slowest = [_seconds(row[0].settling) for row in results.sweeps.values()]
+        times = f"{slow:.2f} s at K_f = {low:g}, {quick:.2f} s at {best:g}, {end:.2f} s at {high:g} 1/N"
+        evidence.add(name, f"{times}, {ends}", len(calm) < len(row), quick < QUICKER * slow)
+    slowest = [row[0].settling for row in results.sweeps.values()]
     onsets = [onset_among(row)[1] or math.inf for row in results.sweeps.values()]
-    return Evidence(
-        told,
-        [*holds, sorted(onsets, reverse=True) == onsets],
-        f"From the lowest to the highest K_p, the time to settle at the lowest K_f goes from "
-        f"{slowest[0]} to {slowest[-1]}, and the onset from "
-        f"{_gain(onsets[0])} to {_gain(onsets[-1])}.",
+    evidence.holds.append(sorted(onsets, reverse=True) == onsets)
+    first, last = ("never" if time is None else f"{time:.2f} s" for time in (slowest[0], slowest[-1]))
+    evidence.why = (
+        f"From the lowest to the highest K_p, the time to settle at the lowest K_f goes from {first} to "
+        f"{last}, and the onset from {_gain(onsets[0])} to {_gain(onsets[-1])}."
     )
+    return evidence
 
 
 def blister(results: Results) -> Evidence:
-    told, holds = [], []
+    """Whether blisters have the sections asked for."""
+    evidence = Evidence()
     for (method, shape, profile), done in results.blisters.items():
-        if method not in METHODS:
-            continue
-        one = blister_section(done)
-        high = "high" if shape == "convex" else "deep"
-        rim = f", rim {one.pins * MM:.1f} mm beyond it" if one.pins > LIMITS.rim * one.relief else ""
-        told.append(
-            f"{SHORT[method]}, {shape}, {profile}: {one.relief * MM:.1f} mm {high} in the middle{rim}, "
-            f"section rms {one.rms * MM:.1f}, at most {one.largest * MM:.1f} mm from its profile"
-            f"{'' if one.meets(LIMITS) else ' (missed)'}"
-        )
-        holds.append(one.meets(LIMITS))
-    radius = {method: results.blisters[method, "convex", "cone"].scene.blister for method in METHODS}
-    size = ", ".join(f"{SHORT[method]} {one.radius * MM:g} mm" for method, one in radius.items() if one)
-    return Evidence(
-        told,
-        holds,
+        if method in METHODS:
+            one = blister_section(done)
+            high = "high" if shape == "convex" else "deep"
+            rim = f", rim {one.pins * MM:.1f} mm beyond it" if one.pins > LIMITS.rim * one.relief else ""
+            text = (
+                f"{one.relief * MM:.1f} mm {high} in the middle{rim}, section rms {one.rms * MM:.1f}, "
+                f"at most {one.largest * MM:.1f} mm from its profile"
+                f"{'' if one.meets(LIMITS) else ' (missed)'}"
+            )
+            evidence.add(f"{SHORT[method]}, {shape}, {profile}", text, one.meets(LIMITS))
+    forms = {method: results.blisters[method, "convex", "cone"].scene.blister for method in METHODS}
+    size = ", ".join(f"{SHORT[method]} {form.radius * MM:g} mm" for method, form in forms.items() if form)
+    evidence.why = (
         f"The finger is held {scenes.TALL * MM:g} mm over the bed, or {-scenes.SINK * MM:g} mm in it, and "
         f"the pins press into it. A section holds as those of Fig. 10 do. Radius: {size}; {SHORT[TWO]} "
         "counts its own from the nearest cell under the finger, and there the cells take the shape of the "
-        "fingertip.",
+        "fingertip."
     )
+    return evidence
 
 
 def freezing(results: Results) -> Evidence:
-    told, holds = [], []
-    for method in METHODS:
-        known = results.drags[method][0].metrics
-        offset, uneven = known["ridge_offset"], known["ridge_unevenness"]
-        if offset is None or uneven is None:
-            told.append(f"{SHORT[method]}: left nothing behind")
-            holds.append(False)
-            continue
-        told.append(
-            f"{SHORT[method]}: left {offset * MM:.2f} mm over the finger's path, even to {uneven * MM:.2f} mm"
-        )
-        holds.append(uneven < 1e-3)
+    """Whether the cells left behind stay where the finger left them."""
     why = "Over the path is how far the pins press into the finger, and what they rise once it has passed."
-    return Evidence(told, holds, why)
+    evidence = Evidence(why=why)
+    for method in METHODS:
+        metrics = results.drags[method][0].metrics
+        offset, uneven = metrics["ridge_offset"], metrics["ridge_unevenness"]
+        if offset is None or uneven is None:
+            evidence.add(SHORT[method], "left nothing behind", False)
+        else:
+            text = f"left {offset * MM:.2f} mm over the finger's path, even to {uneven * MM:.2f} mm"
+            evidence.add(SHORT[method], text, uneven < 1e-3)
+    return evidence
 
 
 def carried_out(results: Results) -> Evidence:
     """Whether the fingertip was lost on the way, and what it took not to lose it."""
-    told = []
+    evidence, lift = Evidence(), scenes.fastest_lift(results.printed[ONE].scene)
     for method in METHODS:
-        known = results.printed[method]
-        moments = ", ".join(f"{time:.2f} s" for time in known.lost)
-        told.append(f"{SHORT[method]}: " + (f"finger lost at {moments}" if known.lost else "never lost"))
-    lift, why = scenes.fastest_lift(results.printed[ONE].scene), ""
-    for method in METHODS:
-        if results.printed[method].lost:
-            why += (
+        lost = results.printed[method].lost
+        moments = ", ".join(f"{time:.2f} s" for time in lost)
+        evidence.add(SHORT[method], f"finger lost at {moments}" if lost else "never lost", not lost)
+        if lost:
+            evidence.why += (
                 f"The session lifts at up to {lift * MM:.1f} mm/s, and {SHORT[method]} follows a lift of "
                 f"{speed(results.lifting[method])} with its default gains. "
             )
@@ -330,5 +331,125 @@ def carried_out(results: Results) -> Evidence:
             f"{SHORT[method]} {'lost again' if results.session[method].lost else 'never lost'}"
             for method in METHODS
         )
-        why += f"Both were run again {results.slow:g} times as long: {again}."
-    return Evidence(told, [not results.printed[method].lost for method in METHODS], why.strip())
+        evidence.why += f"Both were run again {results.slow:g} times as long: {again}."
+    evidence.why = evidence.why.strip()
+    return evidence
+
+
+#: Cells ahead count as lowered by this share of how far the fingertip is in the surface.
+LOWERED = 0.1
+#: A search radius rejects noise that leaves at most this share of the scatter there is without it.
+REJECTED = 0.5
+#: How far the fingertip is in the surface, m.
+DEPTH = {name: -way.height for name, way in DRAGS.items() if way.height < 0.0}
+
+
+def _list_drags(results: Results, variant: str) -> Iterator[tuple[str, str, Dragged, Dragged]]:
+    """Yield method, trajectory and result of each drag of a variant, and the result of the scene as it is."""
+    for (which, method, name), changed in results.dragged.items():
+        if which == variant:
+            yield method, name, changed, results.dragged[AS_IT_IS, method, name]
+
+
+def rise(results: Results) -> Evidence:
+    """Whether Method II's forces come from the slight rise of its blister."""
+    evidence = Evidence(
+        why=f"It holds where both the force and the RFD are {MUCH:g} times as great with the rise. The rise "
+        "has cells around the finger feel it, and each that follows asks for its own force; without it fewer "
+        "cells follow, and along a ridge too few to keep the finger."
+    )
+    for _, name, less, more in _list_drags(results, NO_RISE):
+        text = (
+            f"{more.force:.2f} N with the rise and {less.force:.2f} N without, "
+            f"{more.followers:.1f} and {less.followers:.1f} cells follow, "
+            f"RFD {more.follows.rfd:.3f} and {less.follows.rfd:.3f} N{_write_losses(less)}"
+        )
+        evidence.add(name, text, more.force > MUCH * less.force, more.follows.rfd > MUCH * less.follows.rfd)
+    return evidence
+
+
+def ahead(results: Results) -> Evidence:
+    """Whether Method I lowers cells before the fingertip is over them."""
+    evidence = Evidence(
+        why=f"It holds where they are lowered by {LOWERED:.0%} of the finger's depth or more. "
+        f"{SHORT[TWO]} is there for comparison: its blister stands higher by the rise."
+    )
+    for method, name, one, _ in _list_drags(results, AS_IT_IS):
+        if method in METHODS and name in DEPTH and one.ahead is not None:
+            lowered = [-one.ahead > LOWERED * DEPTH[name]] if method == ONE else []
+            depth = f"{DEPTH[name] * MM:g} mm deep"
+            evidence.add(f"{SHORT[method]}, {name}, {depth}", f"{one.ahead * MM:+.2f} mm", *lowered)
+    return evidence
+
+
+def escape(results: Results) -> Evidence:
+    """Whether Method II stays clear of the oscillation of Method I."""
+    evidence, row, used = Evidence(), sorted(results.cell_swings), results.printed[ONE]
+    for one in row:
+        pace = f" at {one.frequency:.0f} Hz" if one.sustained and one.frequency else ""
+        evidence.add(f"K_FF = {one.gain:g} 1/N", f"{one.amplitude:.3f} N{pace}", not one.sustained)
+    calm, first = onset_among(row)
+    own = results.printed[TWO].gain("force_gain")
+    wild = results.onset(used.gain("position_gain"))[1]
+    evidence.why = f"Its own gain is {own:g} 1/N."
+    if first is not None:
+        evidence.why += (
+            f" A cycle that goes on sets in {'' if calm is None else f'above {calm:g}, '}at {first:g} 1/N, "
+            f"{first / own:.1f} times that; each cell has a valve and a dead time of its own."
+        )
+    if wild is not None:
+        evidence.why += f" Method I's sets in at {wild / used.gain('force_gain'):.1f} times its own K_f."
+    return evidence
+
+
+def find_radius(results: Results) -> float:
+    """Return r_VM, m."""
+    return min((one.radius for one in results.located), default=0.0)
+
+
+def radius(results: Results) -> Evidence:
+    """Whether looking for the fingertip only near the master rejects what noisy sensors add elsewhere."""
+    evidence, lost, least = Evidence(), [], find_radius(results)
+    wider = {(one.noise, one.thresholds): one for one in results.located if one.radius != least}
+    for near in (one for one in results.located if one.radius == least):
+        wide = wider[near.noise, near.thresholds]
+        kind = "thresholds by the noise" if near.thresholds else "no such thresholds"
+        name = f"{near.noise * MM:g} mN, {kind}"
+        text = f"{_scatter(near.scatter)} with and {_scatter(wide.scatter)} without the radius"
+        measured = near.scatter is not None and wide.scatter is not None
+        evidence.add(name, text, measured and (near.scatter or 0.0) <= REJECTED * (wide.scatter or 0.0))
+        if near.losses or wide.losses:
+            lost.append(f"{name}: {near.losses} and {wide.losses} times")
+    evidence.why = (
+        f"It holds where the radius leaves {REJECTED:.0%} at most of what there is without it. Without it "
+        "all cells the fingertip may touch are looked at. Where readings below five standard deviations "
+        "count as none, as they do in this program, few are left outside the radius for it to reject. "
+        + (f"The finger was lost with and without the radius: {', '.join(lost)}." if lost else "")
+    )
+    return evidence
+
+
+def _scatter(value: float | None) -> str:
+    return "never shapes" if value is None else f"{value * MM:.3f} mm"
+
+
+def varied(variant: str, results: Results) -> Evidence:
+    """Compare the drags of a variant with those of the scene as it is."""
+    title, evidence = variant.capitalize() if variant == GAUSSIAN else variant, Evidence()
+    for method, name, changed, usual in _list_drags(results, variant):
+        # What fails anyway says nothing of the variant.
+        holds = [changed.follows.meets(results.criterion)] if usual.follows.meets(results.criterion) else []
+        text = f"{_write_drag(usual)}, {title} {_write_drag(changed)}"
+        evidence.add(f"{SHORT[method]}, {name}", text, *holds)
+    evidence.why = "It holds where what is followed without the change is followed with it. "
+    evidence.why += f"Not so: {'; '.join(evidence.missed)}." if evidence.missed else ""
+    return evidence
+
+
+def _write_drag(one: Dragged) -> str:
+    return f"{one.follows.lag * MM:.1f} mm, {one.follows.rfd:.3f} N{_write_losses(one)}"
+
+
+def _write_losses(one: Dragged) -> str:
+    lost = one.follows.losses
+    return f" (finger lost {lost} time{'' if lost == 1 else 's'})" if lost else ""

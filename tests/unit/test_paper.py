@@ -18,18 +18,23 @@ from digiclay.plots.figure import canvas
 from numpy.typing import NDArray
 
 from digiclay_paper import scenes
-from digiclay_paper.claims import Claim, ahead, escape, radius, rise, varied
+from digiclay_paper.claims import Claim
 from digiclay_paper.evidence import (
     DEVIATIONS,
     WINDOWED,
     Evidence,
+    ahead,
     carried_out,
     deviations,
+    escape,
     largest_speed,
     onset,
+    radius,
     relief,
+    rise,
     tracking,
     trade,
+    varied,
 )
 from digiclay_paper.figures_session import details, heights_and_force
 from digiclay_paper.page import list_lines
