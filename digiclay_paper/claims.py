@@ -62,9 +62,7 @@ CLAIMS: tuple[tuple[Callable[[Results], Evidence], str, str], ...] = (
 
 def claims(results: Results) -> list[Claim]:
     """Return all claims, in the order of the paper."""
-    # Nothing is said of a session at its own speed.
-    slow = f" {results.slow:g} times as long" if results.slow > 1.0 else ""
-    radius, found = f"{evidence.find_radius(results) * MM:g}", []
+    slow, radius, found = results.slowness.lstrip(","), f"{evidence.find_radius(results) * MM:g}", []
     for judge, printed, beginning in CLAIMS:
         shown = judge(results)
         measured = beginning.format(slow=slow, radius=radius) + shown.measured

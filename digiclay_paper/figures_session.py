@@ -64,10 +64,13 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
     return figure
 
 
-def details(results: Results, title: str) -> Any:
+def details(results: Results) -> Any:
     """Draw a detail of the heights in the session: the first press, and what swings during the lift."""
-    shown = _detailed(results)
-    with canvas(4.5 * max(len(shown), 3), 7.6, title) as (figure, place):
+    shown, title = _detailed(results), "Details of the heights in the paper's session"
+    with canvas(4.5 * max(len(shown), 3), 7.6, title) as (
+        figure,
+        place,
+    ):
         wide = 4.5 * max(len(shown), 3) / len(shown)
         for column, (name, session) in enumerate(shown):
             left, across = 0.95 + (wide - 0.08) * column, wide - 1.05
@@ -120,13 +123,13 @@ def _swinging(time: Any, height: Any) -> Any:
     return height - np.polyval(np.polyfit(time - middle, height, 3), time - middle)
 
 
-def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
+def surfaces(results: Results) -> Any:
     """Draw the final surfaces in relief and from above, side by side for all methods."""
-    methods = list_methods(sessions)
+    methods = list_methods(results.session)
     across = 0.3 + 6.6 * len(methods)
-    with canvas(across, 9.6, title) as (figure, place):
+    with canvas(across, 9.6, f"Final surfaces. The paper's session{results.slowness}") as (figure, place):
         for column, method in enumerate(methods):
-            history, left = sessions[method].history, 6.6 * column
+            history, left = results.session[method].history, 6.6 * column
             relief = place(
                 f"{method} relief", left - 0.9, 3.9, 8.0, 5.9, projection="3d", computed_zorder=False
             )
@@ -151,11 +154,11 @@ def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, 
             yield method, float(x) * MM, float(y) * MM, float(height) * MM
 
 
-def profiles(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw sections through the final surfaces, formed and asked for. `sessions`: by method."""
-    found = {method: list(sections(sessions[method])) for method in list_methods(sessions)}
+def profiles(results: Results) -> Any:
+    """Draw sections through the final surfaces, formed and asked for."""
+    found = {method: list(sections(results.session[method])) for method in list_methods(results.session)}
     count = len(found[METHODS[0]])
-    with canvas(13.5, 8.6, title) as (figure, place):
+    with canvas(13.5, 8.6, f"Sections. The paper's session{results.slowness}") as (figure, place):
         for number in range(count):
             row, column = divmod(number, 3)
             axes = place(f"section {number}", 0.85 + 4.38 * column, 4.55 - 3.85 * row, 3.5, 2.7)

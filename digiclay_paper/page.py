@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
@@ -13,13 +14,14 @@ from digiclay import __version__
 from digiclay.core.base.modes import MEANINGS, Mode
 from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, Arrow
 from digiclay.core.files.run_folder import write_whole
-from digiclay.plots.figure import save
+from digiclay.core.studies.speed_limits import Follows
+from digiclay.plots.figure import MM, save
 
 from . import figures_session, paper_figures
 from .claims import Claim, claims
 from .paper_figures import curves, letter, list_methods, table
 from .relief_sections import LIMITS, sections
-from .results import PAPER_SPEED, WAYS, Extent, Results, Session
+from .results import PAPER_SPEED, WAYS, Extent, Results
 from .scenes import NAMES, THIRD
 from .simulations import Told, simulate
 
@@ -43,34 +45,30 @@ def compare_methods(results: Results) -> Iterator[str]:
     methods = list_methods(results.session)
     yield f"| | {' | '.join(NAMES[method] for method in methods)} |"
     yield f"| --- |{' ---: |' * len(methods)}"
+    for name, values in _list_rows(results, methods):
+        yield f"| {name} | {' | '.join('–' if value is None else f'{value:.3g}' for value in values)} |"
+
+
+def _list_rows(results: Results, methods: list[str]) -> Iterator[tuple[str, list[float | None]]]:
+    """Give the name and the values of each row of the table."""
     for key, name, factor, unit in METRICS:
-        values = [results.session[method].metrics.get(key) for method in methods]
-        yield _number_row(f"{name} ({unit})", [None if value is None else value * factor for value in values])
+        yield f"{name} ({unit})", _scale([results.session[each].metrics.get(key) for each in methods], factor)
     for way in WAYS:
-        found = [results.simple.get((method, way)) for method in methods]
-        speed = f"drag at {PAPER_SPEED * 1e3:g} mm/s, {way}"
-        yield _number_row(f"{speed}: RFD (N)", [one.rfd if one else None for one in found])
-        yield _number_row(f"{speed}: largest lag (mm)", [one.lag * 1e3 if one else None for one in found])
-    drags = {f"drag, {way}": [results.fastest.get((method, way)) for method in methods] for way in WAYS}
-    for name, known in {**drags, "lift": [results.lifting.get(method) for method in methods]}.items():
-        yield _number_row(
-            f"largest speed, {name} (mm/s)", [None if one is None else one * 1e3 for one in known]
-        )
-    for title, measure in SECTIONS:
-        values = [measure(results.session[method]) * 1e3 for method in methods]
-        yield _number_row(f"{title} (mm)", list(values))
+        follows = [results.simple.get((method, way)) for method in methods]
+        name = f"drag at {PAPER_SPEED * MM:g} mm/s, {way}"
+        yield f"{name}: RFD (N)", [one and one.rfd for one in follows]
+        yield f"{name}: largest lag (mm)", _scale([one and one.lag for one in follows], MM)
+    for way in WAYS:
+        speeds = [results.fastest.get((method, way)) for method in methods]
+        yield f"largest speed, drag, {way} (mm/s)", _scale(speeds, MM)
+    yield "largest speed, lift (mm/s)", _scale([results.lifting.get(method) for method in methods], MM)
+    formed = [list(sections(results.session[method])) for method in methods]
+    yield "sections, largest rms deviation (mm)", [MM * max(one.rms for one in row) for row in formed]
+    yield "sections, largest deviation (mm)", [MM * max(one.largest for one in row) for row in formed]
 
 
-def _number_row(name: str, values: list[float | None]) -> str:
-    """Return a row of the table."""
-    return f"| {name} | {' | '.join('–' if value is None else f'{value:.3g}' for value in values)} |"
-
-
-#: Deviations of the sections through ridge, mound and valley: name and measure, m.
-SECTIONS: tuple[tuple[str, Callable[[Session], float]], ...] = (
-    ("sections, largest rms deviation", lambda session: max(one.rms for one in sections(session))),
-    ("sections, largest deviation", lambda session: max(one.largest for one in sections(session))),
-)
+def _scale(values: list[float | None], factor: float) -> list[float | None]:
+    return [None if value is None else value * factor for value in values]
 
 
 #: The chain of Fig. 3, from the fingertip to the pins.
@@ -150,8 +148,30 @@ def _word(mode: Mode) -> str:
     return mode.name.lower().replace("_", " ")
 
 
-#: The figure whose data are heights of pins, and no curves.
-SURFACES = "fig10_surfaces"
+#: The figure whose data are heights of pins, and no curves; and the one of a session that was slowed.
+SURFACES, OWN_TIMES = "fig10_surfaces", "fig08_own_times"
+#: Figures: name of the file, caption, and what draws it.
+FIGURES: tuple[tuple[str, str, Callable[[Results], Any]], ...] = (
+    ("fig04_blisters", "Fig. 4: blisters in section, convex and concave, both profiles and all methods",
+     paper_figures.blisters),
+    ("fig06_freezing", "Fig. 6: sections along a drag at several times, with the frozen cells",
+     paper_figures.freezing),
+    ("fig08_session", "Fig. 8: heights of selected cells and total force over time{slow}",
+     lambda results: figures_session.heights_and_force(
+         results.session, f"The paper's session{results.slowness}")),
+    (OWN_TIMES, "Fig. 8 again, at the session's own times",
+     lambda results: figures_session.heights_and_force(
+         results.printed, "The paper's session at its own times")),
+    ("fig09_details",
+     "Fig. 9: a detail of the session's heights: the first press, and what swings in the lift",
+     figures_session.details),
+    (SURFACES, "Fig. 10: final surfaces{slow}", figures_session.surfaces),
+    ("fig10_sections", "Sections through the surfaces of Fig. 10, formed and asked for{slow}",
+     figures_session.profiles),
+    ("oscillation", "Oscillation of the virtual master, and where it sets in", paper_figures.oscillation),
+    ("tracking", "How fast a finger is followed: RFD and lag against speed", paper_figures.tracking),
+    ("variants", "What the rise, the search radius and Method II's gain do", paper_figures.variants),
+)  # fmt: skip
 
 
 def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
@@ -159,10 +179,12 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
     started = time.perf_counter()
     results = simulate(extent, told)
     took = time.perf_counter() - started
-    drawn = {}
-    for name, (caption, draw) in _pictures(results).items():
+    captions = {}
+    for name, caption, draw in FIGURES:
+        if name == OWN_TIMES and not results.slowness:
+            continue
         told(f"drawing {name}")
-        picture = draw()
+        picture = draw(results)
         if name == SURFACES:
             rows = table(figures_session.surface_rows(results.session), ("method", *"xy", "height (mm)"))
         else:
@@ -170,75 +192,34 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
             rows = table(curves(picture))
         save(picture, folder / f"{name}.svg")
         write_whole(folder / f"{name}.csv", rows.encode())
-        drawn[name] = caption
+        captions[name] = caption.format(slow=results.slowness)
     found = claims(results)
-    lines = list_lines(results, found, drawn, took, __version__)
+    lines = list_lines(results, found, captions, took, __version__)
     (folder / "paper.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     numbers = json.dumps(_numbers(results), indent=2, ensure_ascii=False, allow_nan=False)
     (folder / "metrics.json").write_text(numbers + "\n", encoding="utf-8")
     return [f"{claim.verdict:14} {claim.printed}" for claim in found]
 
 
-def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
-    """Return what is drawn: file name to caption and what draws it."""
-    slow = f", {results.slow:g} times as long" if results.slow > 1.0 else ""
-    title, session, own = (
-        f"The paper's session{slow}",
-        results.session,
-        "The paper's session at its own times",
-    )
-    rows = (
-        ("fig04_blisters", "Fig. 4: blisters in section, convex and concave, both profiles and all methods",
-         lambda: paper_figures.blisters(results)),
-        ("fig06_freezing", "Fig. 6: sections along a drag at several times, with the frozen cells",
-         lambda: paper_figures.freezing(results)),
-        ("fig08_session", f"Fig. 8: heights of selected cells and total force over time{slow}",
-         lambda: figures_session.heights_and_force(session, title)),
-        ("fig08_own_times" if slow else "", "Fig. 8 again, at the session's own times",
-         lambda: figures_session.heights_and_force(results.printed, own)),
-        ("fig09_details",
-         "Fig. 9: a detail of the session's heights: the first press, and what swings in the lift",
-         lambda: figures_session.details(results, "Details of the heights in the paper's session")),
-        (SURFACES, f"Fig. 10: final surfaces{slow}",
-         lambda: figures_session.surfaces(session, f"Final surfaces. {title}")),
-        ("fig10_sections", f"Sections through the surfaces of Fig. 10, formed and asked for{slow}",
-         lambda: figures_session.profiles(session, f"Sections. {title}")),
-        ("oscillation", "Oscillation of the virtual master, and where it sets in",
-         lambda: paper_figures.oscillation(results)),
-        ("tracking", "How fast a finger is followed: RFD and lag against speed",
-         lambda: paper_figures.tracking(results)),
-        ("variants", "What the rise, the search radius and Method II's gain do",
-         lambda: paper_figures.variants(results)),
-    )  # fmt: skip
-    return {name: (caption, draw) for name, caption, draw in rows if name}
-
-
 def _numbers(results: Results) -> dict[str, Any]:
     """Return what was measured, as it is written to ``metrics.json``; SI units."""
     methods = list_methods(results.session)
-    return {
+    numbers = {
         "criterion": {"lag": results.criterion.lag, "rfd": results.criterion.deviation},
         "slow": results.slow,
         "session": {method: results.session[method].metrics for method in methods},
         "session_at_its_own_times": {method: results.printed[method].metrics for method in methods},
         "lost_at_its_own_times": {method: results.printed[method].lost for method in methods},
         "windows_of_the_paper": {method: results.printed[method].windows for method in methods},
-        "largest_drag_speed": {", ".join(key): speed for key, speed in results.fastest.items()},
+        "largest_drag_speed": results.fastest,
         "largest_lift_speed": results.lifting,
-        "drags": {
-            method: [_finite(asdict(one)) for one in results.tracks.get(method, [])] for method in methods
-        },
-        "simple_at_15_mm_a_second": {
-            f"{method}, {name}": _finite(asdict(one)) for (method, name), one in results.simple.items()
-        },
-        "oscillation": [one._asdict() for one in results.swings],
-        "oscillation_of_a_quicker_device": [one._asdict() for one in results.quicker],
-        "oscillation_of_method_two": [one._asdict() for one in results.cell_swings],
-        "variants": {
-            ", ".join(key): {**one._asdict(), "follows": _finite(asdict(one.follows))}
-            for key, one in results.dragged.items()
-        },
-        "located": [one._asdict() for one in results.located],
+        "drags": {method: results.tracks.get(method, []) for method in methods},
+        "simple_at_15_mm_a_second": results.simple,
+        "oscillation": results.swings,
+        "oscillation_of_a_quicker_device": results.quicker,
+        "oscillation_of_method_two": results.cell_swings,
+        "variants": results.dragged,
+        "located": results.located,
         "sections": {
             method: {
                 one.name: {
@@ -250,8 +231,17 @@ def _numbers(results: Results) -> dict[str, Any]:
             for method in methods
         },
     }  # fmt: skip
+    return {name: _plain(value) for name, value in numbers.items()}
 
 
-def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    """Return a table without the infinite lag of a fingertip that never touches."""
-    return {name: None if value == float("inf") else value for name, value in values.items()}
+def _plain(value: Any) -> Any:
+    """Return a value for JSON: named fields as tables, None for the infinite lag without contact."""
+    if isinstance(value, Follows):
+        value = asdict(value)
+    elif hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, dict):
+        return {key if isinstance(key, str) else ", ".join(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_plain(one) for one in value]
+    return None if value == math.inf else value

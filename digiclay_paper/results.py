@@ -146,7 +146,6 @@ class Results:
 
     criterion: Criterion = field(default_factory=Criterion)
     blisters: dict[tuple[str, str, str], Result] = field(default_factory=dict)
-    """"""
     drags: dict[str, tuple[Result, float, float]] = field(default_factory=dict)
     printed: dict[str, Session] = field(default_factory=dict)
     session: dict[str, Session] = field(default_factory=dict)
@@ -163,6 +162,11 @@ class Results:
     cell_swings: list[Swing] = field(default_factory=list)
     dragged: dict[tuple[str, str, str], Dragged] = field(default_factory=dict)
     located: list[Located] = field(default_factory=list)
+
+    @property
+    def slowness(self) -> str:
+        """How much longer the session takes than its own times, in words; empty if it does not."""
+        return f", {self.slow:g} times as long" if self.slow > 1.0 else ""
 
     @property
     def sweeps(self) -> dict[float, list[Swing]]:

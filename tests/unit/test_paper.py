@@ -172,7 +172,7 @@ def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost:
 
 
 def test_the_detail_of_the_session_shows_heights_of_cells_side_by_side_at_every_period(lost: Results) -> None:
-    figure = details(lost, "title")
+    figure = details(lost)
     press, lift = figure.axes[:2]
     session = lost.printed["virtual_master"]
     time, height = session.detail["time"], session.detail["height"]
