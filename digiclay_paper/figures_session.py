@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from digiclay.core.metrics.finger_path import find_contact_rows
 from digiclay.plots.bed import draw_map, draw_path, draw_relief
-from digiclay.plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
-from digiclay.plots.run import LETTERS, session_cells
+from digiclay.plots.figure import DASHES, LINES, MM, canvas
+from digiclay.plots.run import LETTERS, draw_force, session_cells, shade_contact
 
 from .paper_figures import list_methods
 from .relief_sections import sections
@@ -36,23 +35,14 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
             left = 0.85 + 6.5 * column
             heights = place(f"{method} heights", left, 3.5, 5.75, 2.7)
             force = place(f"{method} force", left, 0.7, 5.75, 2.0)
-            touching = find_contact_rows(history["total_force"])
-            for axes in (heights, force):
-                over = axes.get_xaxis_transform()
-                axes.fill_between(
-                    history["time"], 0, 1, where=touching, transform=over, color=SHADE, linewidth=0
-                )
-                axes.set_xlim(history["time"][0], history["time"][-1])
             for name, color, cell in zip(names, LINES, cells, strict=False):
                 heights.plot(history["time"], history["height"][:, cell] * MM, color=color, label=name)
-            heights.set(ylim=(lowest, highest), title=NAMES[method])
+            shade_contact(heights, history)
+            draw_force(force, history, history["set_point"], "set point")
+            ends = history["time"][0], history["time"][-1]
+            heights.set(ylim=(lowest, highest), title=NAMES[method], xlim=ends)
             heights.tick_params(labelbottom=False)
-            force.plot(history["time"], history["total_force"], color=INK, linewidth=1.2, label="total force")
-            asked = {"color": LINES[1], "linewidth": 1.2, "linestyle": (0, (5, 3)), "label": "set point"}
-            force.plot(history["time"], history["set_point"], **asked)
-            force.fill_between([], [], color=SHADE, label="in contact")
-            force.set(ylim=(0.0, strongest), xlabel="time (s)", title="Total force")
-            legend_above(force)
+            force.set(ylim=(0.0, strongest), xlabel="time (s)", title="Total force", xlim=ends)
             if column == 0:
                 heights.set_ylabel("height (mm)")
                 force.set_ylabel("force (N)")
@@ -165,7 +155,7 @@ def profiles(results: Results) -> Any:
             for method, color, marker in zip(found, LINES, "os^", strict=False):
                 one = found[method][number]
                 name = NAMES[method].split(",")[0]
-                asked: dict[str, Any] = {"color": color, "linewidth": 1.1, "linestyle": (0, (4, 2))}
+                asked: dict[str, Any] = {"color": color, "linewidth": 1.1, "linestyle": DASHES}
                 axes.plot(one.along * MM, one.asked * MM, label=f"{name}, asked for", **asked)
                 axes.plot(
                     one.along * MM, one.found * MM, color=color, marker=marker, markersize=4.5, label=name

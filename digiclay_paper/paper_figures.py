@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.session.run_scene import Result
-from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
+from digiclay.plots.figure import DASHES, INK, LINES, MM, canvas, legend_above
 
 from .results import AHEAD, AS_IT_IS, PAPER_SPEED, SUSTAINED, Results
 from .scenes import COMPARED, METHODS, NAMES, PRESSED, THIRD
@@ -98,7 +98,7 @@ PROFILES = {"cone": (LINES[0], "o", 8.0), "gaussian": (LINES[1], "s", 5.0)}
 #: Instants of a drag that are drawn.
 INSTANTS = 5
 #: Line of what was asked for, of a limit, or of the bed at rest.
-DASHED: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": (0, (5, 3))}
+DASHED: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": DASHES}
 DOTTED = {**DASHED, "linestyle": (0, (1, 2))}
 
 

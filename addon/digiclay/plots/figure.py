@@ -23,6 +23,8 @@ if TYPE_CHECKING:  # only named in annotations
 MM = 1e3
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 INK, SHADE = "#222222", "#F1EEE6"
+#: Line of what was asked for.
+DASHES = (0, (5, 3))
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans", "font.size": 12, "axes.titlesize": 12, "axes.titlelocation": "left",
     "text.color": INK, "axes.edgecolor": INK, "axes.labelcolor": INK, "xtick.color": INK, "ytick.color": INK,

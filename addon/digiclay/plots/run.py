@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.metrics.finger_path import find_contact_rows, sum_cells
 from ..core.metrics.metric_table import METRICS
 from ..core.metrics.summary import compute_metrics
 from ..core.model.control_interface import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
-from .figure import INK, LINES, MM, SHADE, canvas, legend_above
+from .figure import DASHES, INK, LINES, MM, SHADE, canvas, legend_above
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
@@ -51,15 +52,10 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     Without a `set_point` neither it nor a deviation from it is shown. The axes are, by label: ``heights``,
     ``force``, ``map`` with its ``scale``, and ``figures``.
     """
-    time, total, height = (array(history, name) for name in ("time", "total_force", "height"))
+    time, height = array(history, "time"), array(history, "height")
     with canvas(12.5, 6.3) as (figure, place):
         heights, plan = place("heights", 0.8, 2.95, 6.95, 3.0), place("map", 8.62, 3.1, 3.12, 2.85)
         force, figures = place("force", 0.8, 0.65, 6.95, 1.7), place("figures", 8.62, 0.65, 3.78, 1.7)
-        for axes in (heights, force):
-            across = axes.get_xaxis_transform()
-            axes.fill_between(
-                time, 0, 1, where=find_contact_rows(total), transform=across, color=SHADE, linewidth=0
-            )
         draw_map(plan, history, "Where the cells are")
         for name, color, cell in zip(LETTERS, LINES, session_cells(history), strict=False):
             heights.plot(time, height[:, cell] * MM, color=color, label=name)
@@ -70,28 +66,36 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         heights.set_ylim(ends(np.array(heights.get_ylim()), 2.0))
         heights.set(ylabel="height (mm)", title="Heights of cells", xlim=ends(time, 0.1))
         heights.tick_params(labelbottom=False)
-        force.plot(time, total, color=INK, linewidth=1.3, label="total force")
-        _draw_set_point(force, history, set_point)
-        force.fill_between([], [], color=SHADE, label="in contact")
+        shade_contact(heights, history)
+        wanted, label = None, ""
+        if set_point is not None:
+            wanted = set_point.total(sum_cells(history).following)
+            label = f"set point {set_point.force:g} N{' a cell' if set_point.per_cell else ''}"
+        draw_force(force, history, wanted, label)
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
         force.set_title("Total force on the finger")
+        legend_above(heights)
         for axes in (heights, force):
-            legend_above(axes)
             axes.yaxis.set_label_coords(-0.075, 0.5)
         _write_figures(figures, compute_metrics(history, set_point))
     return figure
 
 
-def _draw_set_point(axes: Axes, history: History, set_point: SetPoint | None) -> None:
-    """Draw the set point over time, dashed; one per cell is absent without a following cell."""
-    if set_point is None:
-        return
-    wanted = set_point.total(sum_cells(history).following)
-    per_cell = " a cell" if set_point.per_cell else ""
-    axes.plot(
-        array(history, "time"), wanted, color=LINES[1], linewidth=1.3, linestyle=(0, (5, 3)),
-        label=f"set point {set_point.force:g} N{per_cell}",
-    )  # fmt: skip
+def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: str) -> None:
+    """Draw the total force over time, the one asked for (t,), N, dashed, and when the fingertip touches."""
+    time, total = array(history, "time"), array(history, "total_force")
+    axes.plot(time, total, color=INK, linewidth=1.3, label="total force")
+    if wanted is not None:
+        axes.plot(time, wanted, color=LINES[1], linewidth=1.3, linestyle=DASHES, label=label)
+    shade_contact(axes, history, "in contact")
+    legend_above(axes)
+
+
+def shade_contact(axes: Axes, history: History, label: str | None = None) -> None:
+    """Shade the time in contact over the whole height of the axes."""
+    touching, across = find_contact_rows(array(history, "total_force")), axes.get_xaxis_transform()
+    shade = {"color": SHADE, "linewidth": 0, "label": label}
+    axes.fill_between(array(history, "time"), 0, 1, where=touching, transform=across, **shade)
 
 
 def surface_figure(history: History) -> Figure:

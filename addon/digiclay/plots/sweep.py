@@ -11,7 +11,7 @@ from ..core.base.arrays import Floats
 from ..core.session.run_scene import RUN_METRICS
 from ..core.studies.axes import Column
 from ..core.studies.evaluation import FIGURES
-from .figure import INK, LINES, canvas, legend_above
+from .figure import DASHES, INK, LINES, canvas, legend_above
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
@@ -56,16 +56,14 @@ def _draw_line(axes: Axes, column: Column, values: Floats, label: str) -> None:
     """Draw a line with a marker for each point."""
     shown, along = _shown(column)
     if column.numeric:
-        order = np.argsort(shown)
-        axes.plot(shown[order], values[order], "o-", color=LINES[0], markersize=6)
+        place, look = shown, "o-"
         axes.set_xscale("log" if column.logarithmic else "linear")
-        missing = shown[np.isnan(values)]
     else:
-        place = np.arange(len(values))
-        axes.plot(place, values, "o", color=LINES[0], markersize=8)
+        place, look = np.arange(len(values)), "o"
         axes.set_xticks(place, [str(value) for value in column.values])
         axes.set_xlim(-0.5, len(values) - 0.5)
-        missing = place[np.isnan(values)]
+    order, missing = np.argsort(place), place[np.isnan(values)]
+    axes.plot(place[order], values[order], look, color=LINES[0], markersize=6 if column.numeric else 8)
     if missing.size:
         across = axes.get_xaxis_transform()
         axes.plot(
@@ -147,8 +145,8 @@ def comparison(
             force.plot(time, total, color=colors[method], linewidth=1.4, label=method)
         for method, (time, _, wanted) in forces.items():
             if not np.all(np.isnan(wanted)):
-                force.plot(time, wanted, color=colors[method], linewidth=1.0, linestyle=(0, (5, 3)))
-        force.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="set points")
+                force.plot(time, wanted, color=colors[method], linewidth=1.0, linestyle=DASHES)
+        force.plot([], [], color=INK, linewidth=1.0, linestyle=DASHES, label="set points")
         force.set(xlabel="time (s)", ylabel="total force (N)", ylim=(0.0, None), title="Total force")
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
         legend_above(force)
