@@ -194,22 +194,6 @@ def test_a_place_without_digiclay_is_named_in_one_line(place, line, here, start)
     assert " lacks digiclay" in told
 
 
-def test_libraries_that_differ_without_effect_are_not_mentioned(here: Path, start: Start) -> None:
-    made = here / "other" / "lz4-0.0.dist-info" / "METADATA"
-    made.parent.mkdir(parents=True)
-    made.write_text("Metadata-Version: 2.1\nName: lz4\nVersion: 0.0\n", encoding="utf-8")
-    _, address = start_scheduler(start, here)
-    start_worker(start, address, "--no-nanny", PYTHONPATH=os.pathsep.join((str(ADDON), str(here / "other"))))
-    with Client(address, set_as_default=False) as client:
-        wait_until(lambda: client.scheduler_info()["workers"])
-        with pytest.warns(UserWarning, match="lz4"):
-            client.get_versions(check=True)
-    words = ["digiclay", "sweep", "tap", "--vary", "control.force_gain=1,2", "--out", "far", "--quiet"]
-    sweep = start(*words, "--scheduler", address)
-    _, said = sweep.communicate(timeout=TIMEOUT)
-    assert (sweep.returncode, said) == (0, "")
-
-
 def test_a_worker_elsewhere_gets_the_code_of_a_method_with_its_points(here: Path, start: Start) -> None:
     own = write_method(here)
     axes = ["--vary", "control.step=1e-5,3e-5", "--vary", "control.yield_force=0.01,0.02,0.03"]

@@ -100,14 +100,6 @@ def test_the_numbers_of_the_page_are_those_of_the_metrics(text: str, numbers: di
     assert f"{one:.3g} and {two:.3g} N, ratio {two / one:.1f}" in text
 
 
-def test_method_two_deviates_more_than_method_one(numbers: dict[str, Any]) -> None:
-    # The paper's claim; measured five to seven times, so half more is far from chance.
-    known = numbers["session"]
-    one, two = known["virtual_master"], known["cell_states"]
-    ratios = {name: two[name] / one[name] for name in ("height_deviation", "force_deviation", "rfd_shaping")}
-    assert {name: ratio for name, ratio in ratios.items() if not ratio > 1.5} == {}
-
-
 def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_much(numbers):
     # RFD, total force, height. Both windows together: the level of Method II differs between them.
     known = numbers["windows_of_the_paper"]
@@ -131,15 +123,3 @@ def test_the_page_sets_method_three_beside_the_others(text: str, numbers: dict[s
     assert shown == pytest.approx([known[method]["rfd"] for method in COMPARED], rel=5e-3)  # three digits
     # The goal of Method III on the session: at most half of Method I's.
     assert shown[2] < 0.5 * shown[0]
-
-
-def test_each_relief_of_the_surfaces_stands_over_the_map_of_its_own_method(folder: Path) -> None:
-    drawn = (folder / "fig10_surfaces.svg").read_text(encoding="utf-8")
-    bitmaps = re.findall(
-        r'<image xlink:href="[^"]*" id="\w+" transform="[^"]*" x="([\d.]+)" [^>]*? width="([\d.]+)"', drawn
-    )
-    boxes = [(float(x), float(x) + float(width)) for x, width in bitmaps]
-    # A relief, its map, and the scale of that, for each method.
-    assert len(boxes) == 3 * len(COMPARED)
-    for relief, plan in zip(boxes[::3], boxes[1::3], strict=True):
-        assert plan[0] < 0.5 * sum(relief) < plan[1]

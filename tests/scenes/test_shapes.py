@@ -110,7 +110,7 @@ def test_a_session_without_a_shape_is_what_it_was_before() -> None:
     assert one["total_force"].max() > 0.1
 
 
-@pytest.mark.parametrize(("method", "moment"), [("elastic", 0.3), *((method, 3.0) for method in EDITING)])
+@pytest.mark.parametrize(("method", "moment"), [("elastic", 0.3), ("viscous", 3.0), ("virtual_master", 3.0)])
 def test_a_state_is_kept_and_taken_up_bit_for_bit(method: str, moment: float) -> None:
     # While the shape is coming up, and while the finger presses it.
     made = scene(method)
@@ -123,7 +123,7 @@ def test_a_state_is_kept_and_taken_up_bit_for_bit(method: str, moment: float) ->
     assert snapshot.dump(system, one) == snapshot.dump(system, other)
 
 
-#: Sample sessions of this project, with what is left when they end: lowest, highest, mm above rest.
+#: Sample sessions, with what is left when they end: lowest, highest, mm above rest.
 SESSIONS = {
     "circle": (0.0, 9.1),
     "two_ridges": (0.0, 8.0),
@@ -135,6 +135,12 @@ SESSIONS = {
     "staggered_bed": (0.0, 9.4),
     "crater_breached": (-8.0, 6.0),
     "dome_peaked": (0.0, 21.9),
+    "elastic_press": (0.0, 0.0),
+    "plastic_press": (-3.1, 0.0),
+    "viscous_press": (0.0, 0.0),
+    "push_pull": (-3.2, 0.0),
+    "force_display": (0.0, 0.0),
+    "shape_display": (-4.8, 7.8),
 }
 
 
@@ -145,4 +151,5 @@ def test_every_sample_session_forms_what_it_says(name: str) -> None:
     raised = (result.history["height"][-1] - made.actuator.rest_height) * 1e3
     # Between machines a session differs by far less than this; another way of forming differs by more.
     assert (raised.min(), raised.max()) == pytest.approx(SESSIONS[name], abs=0.2)
-    assert result.history["total_force"].max() < 3.0
+    assert 0.04 < result.history["total_force"].max() < 3.0
+    assert set(result.history["mode"][-1].tolist()) <= {Mode.REST, Mode.HOLD}
