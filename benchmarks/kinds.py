@@ -183,8 +183,7 @@ def run(name: str, arguments: argparse.Namespace) -> int:
     if benchmark.needs == "bpy":
         refuse_without_blender()
     elif benchmark.needs:
-        extra = EXTRAS[benchmark.needs]
-        refuse_without(benchmark.needs, f"python -m benchmarks {name}", f"pip install digiclay[{extra}]")
+        refuse_without(f"python -m benchmarks {name}", EXTRAS[benchmark.needs], benchmark.needs)
     module, _, function = benchmark.measure.partition(".")
     measure: Any = getattr(import_module(f"{__package__}.{module}"), function)
     with Steps(io.StringIO() if arguments.quiet else sys.stderr, name) as steps:

@@ -37,7 +37,7 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Simulate, draw, write, and tell how the claims came out."""
     check_folder(arguments.out, overwrite=arguments.overwrite)
-    refuse_without("matplotlib", "digiclay paper", "pip install digiclay[plots]")
+    refuse_without("digiclay paper", "plots", "matplotlib")
     from .page import produce
     from .results import FULL, QUICK
 

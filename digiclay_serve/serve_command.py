@@ -66,8 +66,7 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    for module in ("websockets", "pythonosc"):
-        refuse_without(module, "digiclay serve", "pip install digiclay[serve]")
+    refuse_without("digiclay serve", "serve", "websockets", "pythonosc")
     if sys.platform == "win32":
         raise OutputError("digiclay serve runs on Linux and macOS: it needs pipes that do not wait.")
     if arguments.report is not None:

@@ -104,14 +104,13 @@ def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | N
     """Return on how many trajectories, of how many, a method has a greater mean RFD than the first one."""
     found: dict[str, dict[str, list[float]]] = {method: {} for method in methods}
     for (method, name, _), figures in table.items():
-        if figures.get("rfd") is not None:
-            found[method].setdefault(name, []).append(figures["rfd"] or 0.0)
-    first, *others = methods
-    counted: dict[str, tuple[int | None, int]] = {first: (None, len(found[first]))}
-    for method in others:
-        both = found[method].keys() & found[first].keys()
-        greater = sum(fmean(found[method][name]) > fmean(found[first][name]) for name in both)
-        counted[method] = (greater, len(both))
+        if (rfd := figures.get("rfd")) is not None:
+            found[method].setdefault(name, []).append(rfd)
+    first, *others = ({name: fmean(rfd) for name, rfd in found[method].items()} for method in methods)
+    counted: dict[str, tuple[int | None, int]] = {methods[0]: (None, len(first))}
+    for method, means in zip(methods[1:], others, strict=True):
+        both = means.keys() & first.keys()
+        counted[method] = (sum(means[name] > first[name] for name in both), len(both))
     return counted
 
 

@@ -86,8 +86,7 @@ def _read_samples(text: str) -> int:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run what is not done yet, and write tables, page and plot."""
-    for module in ("SALib", "matplotlib"):
-        refuse_without(module, "digiclay study", "pip install digiclay[study]")
+    refuse_without("digiclay study", "study", "SALib", "matplotlib")
     subject = read_subject(arguments)
     count, second = len(subject.ranges), arguments.second
     if count < 2:
@@ -225,13 +224,10 @@ def _write_page(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
         f"{findings.points} runs: {arguments.samples} samples of Saltelli's design, seed {arguments.seed}. "
         "All values of a range are equally likely; on a logarithmic scale, equal ratios are.\n"
     )
-    yield "| parameter | range |"
-    yield "| --- | --- |"
-    yield from (f"| `{each.key}` | {each} |" for each in subject.ranges)
+    yield from _list_table(("parameter", "range"), [(f"`{each.key}`", each) for each in subject.ranges], 2)
     yield "\n## Outputs\n"
-    yield f"| {' | '.join(HEAD)} |"
-    yield f"| --- | --- |{' ---: |' * (len(HEAD) - 2)}"
-    yield from (_describe(findings.unchanged[name], each) for name, each in findings.responses.items())
+    outputs = [_describe(findings.unchanged[name], each) for name, each in findings.responses.items()]
+    yield from _list_table(HEAD, outputs, 2)
     yield (
         "\n*Without a value* are runs that failed or to which the output does not apply. *Fingertip lost* "
         f"are other runs whose `{LOSS}` exceeds that of the unchanged scene by more than {ALLOWED:g}. Both "
@@ -251,29 +247,35 @@ def _write_page(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
         if indices is None:
             yield "It does not vary.\n"
             continue
-        yield "| parameter | first order | total |"
-        yield "| --- | ---: | ---: |"
-        for i in _rank(indices["total"]):
-            yield f"| `{keys[i]}` | {_format(indices, 'first', i)} | {_format(indices, 'total', i)} |"
+        rows = [
+            [f"`{keys[i]}`", _format(indices, "first", i), _format(indices, "total", i)]
+            for i in _rank(indices["total"])
+        ]
+        yield from _list_table(("parameter", "first order", "total"), rows)
         yield ""
         if "second" in indices:
-            yield "| interaction of | second order |"
-            yield "| --- | ---: |"
-            pairs = np.triu_indices(len(keys), 1)
-            for place in _rank(indices["second"], pairs):
-                i, j = (int(part[place]) for part in pairs)
-                yield f"| `{keys[i]}`, `{keys[j]}` | {_format(indices, 'second', (i, j))} |"
+            first, second = np.triu_indices(len(keys), 1)
+            ranked = _rank(indices["second"], (first, second))
+            pairs = zip(first[ranked], second[ranked], strict=True)
+            rows = [[f"`{keys[i]}`, `{keys[j]}`", _format(indices, "second", (i, j))] for i, j in pairs]
+            yield from _list_table(("interaction of", "second order"), rows)
             yield ""
 
 
-def _describe(unchanged: float | None, response: Response) -> str:
+def _list_table(head: Sequence[str], rows: Sequence[Sequence[object]], texts: int = 1) -> Iterator[str]:
+    """Give the lines of a table in Markdown; the first `texts` columns are texts, all others numbers."""
+    yield f"| {' | '.join(head)} |"
+    yield f"|{' --- |' * texts}{' ---: |' * (len(head) - texts)}"
+    yield from (f"| {' | '.join(map(str, row))} |" for row in rows)
+
+
+def _describe(unchanged: float | None, response: Response) -> list[object]:
     """Return an output as a row of the table."""
     factor, unit = read_unit(FIGURES[response.name].unit, response.values)
     values = response.values * factor
     usual = "–" if unchanged is None else f"{unchanged * factor:.4g}"
-    numbers = (values.mean(), values.std(), values.min(), values.max())
-    middle = " | ".join(f"{number:.4g}" for number in numbers)
-    return f"| `{response.name}` | {unit or '1'} | {usual} | {middle} | {response.absent} | {response.lost} |"
+    numbers = (f"{number:.4g}" for number in (values.mean(), values.std(), values.min(), values.max()))
+    return [f"`{response.name}`", unit or "1", usual, *numbers, response.absent, response.lost]
 
 
 def _rank(order: tuple[Floats, Floats], part: Any = slice(None)) -> list[int]:

@@ -86,8 +86,7 @@ def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequ
         raise OutputError("--overwrite is not for --suite, which continues its folder: choose another --out.")
     if arguments.speed:
         raise OutputError("--speed is not for --suite: its trajectories ridge-limit and lift-limit are that.")
-    for module in ("matplotlib", "scipy"):
-        refuse_without(module, "digiclay compare --suite", "pip install digiclay[suite]")
+    refuse_without("digiclay compare --suite", "suite", "matplotlib", "scipy")
     plan = make_plan(arguments, methods)
     out: Path = arguments.out or Path(f"{plan.title}_suite")
     description = {
@@ -180,7 +179,7 @@ def _write(out: Path, plan: Plan, records: dict[int, Record], command: str) -> l
     }
     for name, text in files.items():
         write_whole(out / name, text.encode())
-    lines = list(print_league(league))
+    lines = print_league(league)
     if failed:
         lines.append(f"{len(failed)} of {len(plan.points)} trials failed; the first one: {failed[0]}")
     return [*lines, f"written to {out}: start with {out / 'index.html'}"]

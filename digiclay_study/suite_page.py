@@ -6,7 +6,7 @@ import importlib.metadata
 import os
 import platform
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -126,11 +126,11 @@ def format_league(source: Provenance, league: Sequence[Row]) -> str:
     return _format_csv(source, head, rows)
 
 
-def print_league(league: Sequence[Row]) -> Iterator[str]:
-    """Give the lines of the league for a terminal."""
+def print_league(league: Sequence[Row]) -> list[str]:
+    """Return the lines of the league for a terminal."""
     names = [name for name in MEASURES if name in PRINTED]
     titles = [f"{MEASURES[name].label} {MEASURES[name].shown}".strip() for name in names]
-    yield from aligned(("method", *titles, WORSE), [_list_cells(row, names) for row in league])
+    return list(aligned(("method", *titles, WORSE), [_list_cells(row, names) for row in league]))
 
 
 def format_page(

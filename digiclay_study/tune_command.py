@@ -66,8 +66,7 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run what is not done yet, and write tables, plot and the chosen scene."""
-    for module in ("optuna", "matplotlib"):
-        refuse_without(module, "digiclay tune", "pip install digiclay[study]")
+    refuse_without("digiclay tune", "study", "optuna", "matplotlib")
     subject = read_subject(arguments)
     if len(subject.names) != 2:
         raise ParameterError("--metric", "", "must name two metrics", repr(arguments.metric))

@@ -109,7 +109,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     path, methods = find(arguments.scene), _list_methods(_list_words(arguments, DEFAULT))
     out: Path = arguments.out or Path(f"{find_name(path)}_compare")
     check_folder(out, overwrite=arguments.overwrite)
-    refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
+    refuse_without("digiclay compare", "plots", "matplotlib")
     from ..plots.figure import save
     from ..plots.sweep import comparison
 

@@ -35,7 +35,7 @@ def _read_address(text: str) -> str:
     """Return the address of a scheduler; refuse it without Dask, before any work."""
     if in_blender():
         raise DigiclayError("--scheduler is not for the extension: run 'digiclay' outside of Blender.")
-    refuse_without("distributed", "--scheduler", "pip install digiclay[cluster]")
+    refuse_without("--scheduler", "cluster", "distributed")
     return text
 
 

@@ -211,7 +211,7 @@ def plotted(scene: Scene, history: History, folder: Path) -> list[Path]:
 def plot(arguments: argparse.Namespace) -> int:
     """Plot."""
     folder: Path = arguments.out or arguments.run
-    refuse_without("matplotlib", "digiclay plot", "pip install digiclay[plots]")
+    refuse_without("digiclay plot", "plots", "matplotlib")
     run = read_run(arguments.run, *(name for name in SHAPES if name != "time"))
     require_surface(run.scene, "plot")
     refuse_unwritable(folder)

@@ -147,7 +147,7 @@ def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
         require_surface(scene, "--export")
     if arguments.plots:
         require_surface(scene, "--plots")
-        refuse_without("matplotlib", "--plots", "pip install digiclay[plots]")
+        refuse_without("--plots", "plots", "matplotlib")
     if arguments.render:
         refuse_without_blender()
 

@@ -78,10 +78,11 @@ def require_surface(scene: Scene, option: str) -> None:
         )
 
 
-def refuse_without(module: str, option: str, remedy: str) -> None:
-    """Refuse what needs a library that is not installed."""
-    if importlib.util.find_spec(module) is None:
-        raise OutputError(f"{option} needs {module}: run '{remedy}'.")
+def refuse_without(option: str, extra: str, *modules: str) -> None:
+    """Refuse what needs libraries of an extra of this package that are not installed."""
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            raise OutputError(f"{option} needs {module}: run 'pip install digiclay[{extra}]'.")
 
 
 def refuse_without_blender() -> None:
