@@ -38,9 +38,7 @@ def test_pressure_is_force_over_area_and_speed_is_flow_over_area_but_for_flow_in
         ({"supply": Supply(0.8e5, -0.2e5)}, 38.4e-3, -9.6e-3, 0.01),  # as the drops
     ],
 )
-def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bound(
-    parts: dict[str, object], rise: float, fall: float, digits: float
-) -> None:
+def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bound(parts, rise, fall, digits):
     for control, printed in ((RAISE, rise), (LOWER, fall)):
         system = one_cell(dead_time=0.0, valve_lag=None, control=control, **parts)
         height, bound = record(system, AWAY, 3).height[:, 0], find_speeds(system.cell)
@@ -61,9 +59,7 @@ def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bou
         (47e-3, Relaxation(), 600, 5e-3, "bernoulli", 1e-3),
     ],
 )
-def test_a_pin_under_a_still_finger_comes_to_the_balance_force(
-    start: float, pulp: Relaxation | None, count: int, error: float, stepper: str, step: float
-) -> None:
+def test_a_pin_under_a_still_finger_comes_to_the_balance_force(start, pulp, count, error, stepper, step):
     # The finger stays with its underside at 48 mm; whatever the start, P_s A_a balances it in the end.
     system = one_cell(
         actuator=Actuator(rest_height=start), relaxation=pulp, contact=Contact(stiffness=1000.0),
@@ -82,9 +78,7 @@ def test_a_pin_rests_exactly_at_its_end_stop(control: Any, stop: float, stepper:
 
 
 @STEPPERS
-def test_a_pin_on_its_end_stop_feels_the_indentation_beyond_where_force_begins(
-    stepper: str, step: float
-) -> None:
+def test_a_pin_on_its_end_stop_feels_the_indentation_beyond_where_force_begins(stepper, step):
     # The valve is open downwards: the stop holds the pin, and the finger presses on it.
     contact, start = Contact(offset=0.5e-3), Actuator(rest_height=0.0)
     system = one_cell(

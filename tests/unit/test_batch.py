@@ -62,9 +62,7 @@ def runs(out: str = "two") -> list[str]:
     return sorted(path.name for path in Path(out, "runs").iterdir())
 
 
-def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys, monkeypatch):
     jobs(TWO)
     pages: list[str] = []
     write = Folder.write_index
@@ -97,9 +95,7 @@ def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(
     assert page.count("start of its process") == page.count("data:image/png;base64,") == 2
 
 
-def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_ones_are_done_again(
-    here: Path,
-) -> None:
+def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_ones_are_done_again(here):
     jobs(TWO)
     assert main(["batch", "two.toml", "--prepare", "--quiet"]) == 0
     assert runs() == []
@@ -169,9 +165,7 @@ def test_when_a_batch_is_killed_its_processes_end_and_a_process_that_dies_is_tol
         (["--out", "two", "secnod"], TWO, "unrecognized arguments: secnod"),
     ],
 )
-def test_a_mistake_is_refused_in_one_line_before_any_work(
-    arguments: list[str], said: str, told: str, refused: Any
-) -> None:
+def test_a_mistake_is_refused_in_one_line_before_any_work(arguments, said, told, refused):
     jobs(said)
     refused(["batch", "two.toml", *arguments], told)
     assert [path.name for path in Path().iterdir()] == ["two.toml"]

@@ -118,16 +118,12 @@ def test_results_name_versions_and_no_path(tmp_path: Path) -> None:
         ("commits nonsense --quiet", "commits: nonsense must be a commit, branch or tag"),
     ],
 )
-def test_a_mistake_is_one_line_and_exit_code_2(
-    line: str, message: str, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mistake_is_one_line_and_exit_code_2(line, message, here, capsys):
     code, told = main(line.split()), capsys.readouterr()
     assert (code, told.out, told.err.count("\n"), message in told.err) == (2, "", 1, True)
 
 
-def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(here, capsys):
     files = [path.relative_to(CORE).as_posix() for path in CORE.rglob("*.py")]
     assert [name for name in FILES if not any(file.startswith(name) for file in files)] == []
     assert set(FILES.values()) == set(PARTS)
@@ -153,9 +149,7 @@ def test_the_cheapest_run_is_the_fastest_that_is_exact_enough() -> None:
     assert ratios == [60.0, 20.0, None]
 
 
-def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(capsys, monkeypatch):
     for kind in BENCHMARKS:
         code, out = main([kind, "--help"]), capsys.readouterr().out
         assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (0, True)
@@ -220,9 +214,7 @@ def test_the_runs_of_a_study_differ_and_form_one_batch(name: str) -> None:
     assert make_bundles([Point(i, (), scene) for i, scene in enumerate(scenes)]).alone == ()
 
 
-def test_a_benchmark_prints_and_writes_a_table_and_a_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_benchmark_prints_and_writes_a_table_and_a_picture(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(runs_together, "COUNTS", (2,))
     monkeypatch.setattr(runs_together, "REST", 0.0)
     out = ["--out", str(tmp_path)]

@@ -28,9 +28,7 @@ from tests.scene_files import left
 pytestmark = pytest.mark.usefixtures("here")
 
 
-def test_a_run_is_written_to_a_folder_called_like_the_scene_and_says_so(
-    here: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_is_written_to_a_folder_called_like_the_scene_and_says_so(here, capfd):
     assert main(["run", "my.toml"]) == 0
     out, err = capfd.readouterr()
     summary, where = out.splitlines()
@@ -88,18 +86,14 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
 
 
 @pytest.mark.parametrize(("arguments", "said"), MISTAKES.values(), ids=MISTAKES.keys())
-def test_a_mistake_is_one_line_exit_code_2_and_no_folder(
-    arguments: list[str], said: str, here: Path, refused: Any
-) -> None:
+def test_a_mistake_is_one_line_exit_code_2_and_no_folder(arguments, said, here, refused):
     (here / "d.png").mkdir()
     (here / "d.png" / "metrics.json").touch()
     refused(arguments, said)
     assert left(here) == ["d.png"]
 
 
-def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(here, monkeypatch):
     monkeypatch.setattr("digiclay.plots.bed.fit_relief", lambda *given: None)  # takes seconds
     main(["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots"])
     added = {path.name for path in (here / "my").iterdir()}
@@ -135,9 +129,7 @@ def highest(path: Path) -> float:
     return max(float(line.split()[3]) for line in path.read_text().splitlines() if line.startswith("v "))
 
 
-def test_describe_tells_what_is_left_out_and_counts_cells_periods_and_bytes(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_describe_tells_what_is_left_out_and_counts_cells_periods_and_bytes(capsys):
     main(["describe", "my.toml", "--set", "conduit=absent"])
     out = capsys.readouterr().out
     lines = [line.split() for line in out.splitlines()]
@@ -170,9 +162,7 @@ MEANT = {
 
 
 @pytest.mark.parametrize(("line", "asked"), MEANT.items())
-def test_a_misspelt_word_gets_a_suggestion_and_what_is_like_nothing_gets_none(
-    line: str, asked: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_misspelt_word_gets_a_suggestion_and_what_is_like_nothing_gets_none(line, asked, capsys):
     assert main(line.split()) == 2
     said = capsys.readouterr().err
     assert f". {asked} See 'digiclay" in said if asked else "Did you mean" not in said
@@ -187,9 +177,7 @@ def test_a_misspelt_word_gets_a_suggestion_and_what_is_like_nothing_gets_none(
         ["run", "my.toml", f"--{'z' * 5000}"],
     ],
 )  # fmt: skip
-def test_an_error_is_one_line_of_a_sane_length(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_error_is_one_line_of_a_sane_length(arguments, capsys):
     assert main(arguments) == 2
     said = capsys.readouterr().err
     assert 0 < len(said) < 600
@@ -207,9 +195,7 @@ def test_a_resolution_must_be_a_number_of_points(command: str, refused: Any) -> 
         refused([command, "my", f"--resolution={said}"], " 64")
 
 
-def test_a_file_that_fails_half_way_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_that_fails_half_way_is_one_line(monkeypatch, capfd):
     def full(*given: Any) -> None:
         raise OSError(28, "No space left on device", "a file")
 
@@ -218,9 +204,7 @@ def test_a_file_that_fails_half_way_is_one_line(
     assert capfd.readouterr().err == "a file cannot be used: No space left on device.\n"
 
 
-def test_the_list_of_commands_has_a_line_for_each_but_for_plumbing(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_list_of_commands_has_a_line_for_each_but_for_plumbing(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "120")
     main(["--help"])
     listed = capsys.readouterr().out.partition("COMMAND\n")[2].partition("\n\n")[0].splitlines()
@@ -258,9 +242,7 @@ def test_a_signal_while_the_program_starts_stops_it_in_one_line(here: Path) -> N
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_what_is_written_before_a_signal_is_not_denied(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_written_before_a_signal_is_not_denied(here, monkeypatch, capfd):
     main(["run", "my.toml", "--quiet", "--no-errors"])
     write = export.write
 
@@ -301,9 +283,7 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said: str, cores: s
         ("sweep my.toml --vary seed=3,4 --out o --scheduler tcp://a:1", "distributed", "digiclay[cluster]"),
     ],
 )  # fmt: skip
-def test_a_missing_library_is_told_before_any_work(
-    line: str, missing: str, install: str, here: Path, refused: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_library_is_told_before_any_work(line, missing, install, here, refused, monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == missing]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.delitem(sys.modules, "digiclay.compat", raising=False)
@@ -347,9 +327,7 @@ def numbers(text: str) -> list[float]:
 UNLIKE = ("supply.high=0.4 bar", "supply.low=-0.6 bar", "layout.rows=12", "layout.columns=10")
 
 
-def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide_open(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide_open(capsys):
     said, moved = described(capsys, *UNLIKE), []
     for command in (1.0, -1.0):
         one = one_cell(supply=Supply(0.4e5, -0.6e5), control=scripted(lambda time, x, y, k=command: k))
@@ -367,9 +345,7 @@ def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide
     assert volume == pytest.approx(120 * np.pi * 100.0 * 1e-3, rel=5e-3)
 
 
-def test_a_reservoir_that_cannot_lower_a_pin_never_empties_the_bed(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_reservoir_that_cannot_lower_a_pin_never_empties_the_bed(capsys):
     said = described(capsys, "supply.low=0")
     assert ", 0 mm/s down" in said["free speed"]
     assert "floor: never" in said["refill"]

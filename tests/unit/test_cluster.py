@@ -66,9 +66,7 @@ def never() -> bool:
 
 
 @pytest.mark.parametrize(("words", "tables"), [(SWEEP, 1), (TUNING, 2)], ids=["sweep", "tuning"])
-def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(
-    words: list[str], tables: int, here: Path, address: str
-) -> None:
+def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(words, tables, here, address):
     assert main([*words, "--workers", "1", "--out", "own"]) == 0
     assert main([*words, "--scheduler", address, "--out", "far"]) == 0
     own, far = ({path.name: path.read_bytes() for path in (here / at).glob("*.csv")} for at in ("own", "far"))
@@ -99,9 +97,7 @@ def evaluate_hours(point: Point) -> Any:
     return evaluate_on_worker([point], errors=False)
 
 
-def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(capsys):
     notes: list[str] = []
     with (
         cluster_here(0) as empty,
@@ -115,9 +111,7 @@ def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(
     )
 
 
-def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(
-    address: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(address, monkeypatch):
     done: dict[int, Any] = {}
     with open_cluster(address, lambda: False, silent) as cluster:
         finish(submit(cluster, invert, [0, 1, 2], stopped=never), done.__setitem__, done.__setitem__)

@@ -22,9 +22,7 @@ BOTH = ["virtual_master", "cell_states"]
 pytestmark = pytest.mark.usefixtures("here")
 
 
-def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(here, capsys):
     methods, setting = ["--methods", "cell_states,virtual_master"], ["--set", "control.force_setpoint=0.03"]
     assert main(["compare", "my.toml", *methods, *setting]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -102,10 +102,7 @@ def test_a_constant_and_a_linear_tension_are_filtered_exactly(step: float, count
     ],
     ids=["ramp", "sine"],
 )
-def test_filters_agree_with_the_convolution(
-    depth: Callable[[float], float], speed: Callable[[float], float],
-    stepper: str, step: float, tolerance: float,
-) -> None:  # fmt: skip
+def test_filters_agree_with_the_convolution(depth, speed, stepper, step, tolerance):
     # A locked pin that the finger presses; the errors of the frozen and linear parts are of order 2 and 4.
     system = one_cell(contact=Contact(share=1.0), stepper=stepper, step=step)
     force = record(system, Motion(lambda times: 40e-3 - np.array([depth(t) for t in times])), 16).force

@@ -100,9 +100,7 @@ def test_commands_kept_and_the_cut_make_up_the_dead_time_and_steps_fill_the_peri
         ("runge_kutta_4", ValveLag(), 2),
     ],
 )
-def test_a_dead_time_within_a_step_cuts_it_where_it_must(
-    stepper: str, lag: ValveLag | None, count: int
-) -> None:
+def test_a_dead_time_within_a_step_cuts_it_where_it_must(stepper, lag, count):
     system = one_cell(stepper=stepper, period=PERIOD, step=PERIOD, dead_time=PERIOD / 5, valve_lag=lag)
     assert len(system.plan.segments) == count
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -78,9 +77,7 @@ def test_a_control_period_of_a_larger_stack_takes_no_more_calls() -> None:
         (5, "1e5", []),
     ],
 )
-def test_a_stack_has_no_more_runs_than_pay_or_fit_into_memory(
-    count: int, duration: str, sizes: list[int]
-) -> None:
+def test_a_stack_has_no_more_runs_than_pay_or_fit_into_memory(count, duration, sizes):
     settings = [Setting("simulation.duration", duration)]
     parts = make_bundles(some(f"control.force_gain=1:6:{count}", settings=settings))
     assert [len(batch) for batch in parts.batches] == sizes
@@ -125,9 +122,7 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
         ),
     ],
 )  # fmt: skip
-def test_points_of_one_structure_run_together_and_others_alone(
-    varied: tuple[str, ...], setting: str, errors: bool, batches: Any, alone: Any, said: str | None
-) -> None:
+def test_points_of_one_structure_run_together_and_others_alone(varied, setting, errors, batches, alone, said):
     settings = [*SHORT, *([Setting(*setting.split("="))] if setting else [])]
     parts = make_bundles(some(*varied, settings=settings), errors=errors)
     assert (indices(parts.batches), indices(parts.alone)) == (batches, alone)
@@ -154,9 +149,7 @@ def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     monkeypatch.setattr("digiclay.core.studies.evaluation.measure_together", faulty)
 
 
-def test_a_fault_in_a_stack_is_not_passed_over(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fault_in_a_stack_is_not_passed_over(here, monkeypatch, capsys):
     # Warnings are errors in tests: a stack that fails by our own fault fails the test it runs in.
     break_stacks(monkeypatch, ZeroDivisionError("by\nzero"))
     with pytest.warns(BatchWarning, match="A batch of 2 runs failed: ZeroDivisionError: by zero"):
@@ -170,9 +163,7 @@ def test_a_fault_in_a_stack_is_not_passed_over(
     assert [line.endswith(",") for line in table[1:]] == [True] * 4  # no point has an error
 
 
-def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(here, capsys):
     sweep = ["sweep", "tap", "--vary", "control.force_gain=1:6:4", "--set", "simulation.duration=0.1"]
     main([*sweep, "--out", "out"])
     assert "4 points\n4 points run in 1 stack\n" in capsys.readouterr().out

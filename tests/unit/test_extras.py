@@ -94,9 +94,7 @@ def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(
         assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
 
 
-def test_plot_writes_into_a_folder_and_prints_its_files(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_plot_writes_into_a_folder_and_prints_its_files(here, capsys):
     assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors"]) == 0
     assert main(["plot", "o", "--out", "new/pictures"]) == 0
     assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
@@ -113,9 +111,7 @@ def test_a_run_stopped_before_its_errors_are_estimated_says_so(here: Path, stopp
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "as farms stop"])
-def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says(
-    number: int, here: Path, stopped: Any
-) -> None:
+def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says(number, here, stopped):
     arguments = ("run", "my.toml", "--quiet", "--export", "ply")
     commands = stopped(RunRecording, "observe", *arguments, number=number)
     assert list(commands) == ["surface.ply"]
@@ -125,9 +121,7 @@ def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says
 
 
 @pytest.mark.parametrize("step", ["scene_of", "fit_shape", "make_forming_scene"])
-def test_form_that_is_stopped_before_its_session_writes_nothing(
-    step: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_form_that_is_stopped_before_its_session_writes_nothing(step, here, monkeypatch, capsys):
     monkeypatch.setattr(form_command, "run", lambda *given, **known: pytest.fail("It went on."))
     stop_before(monkeypatch, form_command, step)
     assert main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
@@ -143,9 +137,7 @@ def test_form_that_is_stopped_before_its_session_writes_nothing(
         ([], ["plot", "o", "--out", "my.toml/x"], "my.toml/x cannot be a folder: my.toml is a file."),
     ],
 )
-def test_what_cannot_be_plotted_is_told_in_a_line(
-    settings: list[str], arguments: list[str], said: str, refused: Any
-) -> None:
+def test_what_cannot_be_plotted_is_told_in_a_line(settings, arguments, said, refused):
     assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors", *settings]) == 0
     refused(arguments, said)
 

@@ -80,9 +80,7 @@ def test_the_tasks_of_a_job_are_its_run_then_frames_then_films_and_the_page_is_l
 
 
 @pytest.mark.parametrize("before", ["", "x" * 100], ids=["short names", "names cut to one length"])
-def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
-    before: str, here: Path
-) -> None:
+def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(before, here):
     jobs = JOBS.replace("a =", f"{before}a =").replace("b =", f"{before}b =")
     assert submit("openjd", jobs + FILMS, "--program", WINDOWS) == 0
     template = decode_job_template(template=json.loads(Path("out/openjd.json").read_text(encoding="utf-8")))
@@ -240,9 +238,7 @@ REFUSED: list[tuple[str, list[str], int, str]] = [
 
 
 @pytest.mark.parametrize(("said", "options", "code", "told"), REFUSED)
-def test_what_cannot_be_submitted_is_refused_in_one_line(
-    said: str, options: list[str], code: int, told: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_submitted_is_refused_in_one_line(said, options, code, told, capsys):
     Path("two.toml").write_text(said, encoding="utf-8")
     assert main(["batch", "two.toml", "--quiet", *options]) == code
     out, err = capsys.readouterr()

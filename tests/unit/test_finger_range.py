@@ -35,9 +35,7 @@ def shallow() -> Result:
     return pressed(1.5e-3)
 
 
-def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line_and_no_other(
-    shallow: Result,
-) -> None:
+def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line_and_no_other(shallow):
     assert (shallow.metrics["beyond_a_finger"], "contact law" in shallow.summary()) == ("", False)
     through = pressed(60e-3)  # all valves are shut
     said = through.metrics["beyond_a_finger"]
@@ -58,9 +56,7 @@ def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line_and_no_
         (3.5e-3, 0, 0, 0.01), (3.2e-3, 0, 1.5e-3, 0.01), (2.9e-3, 0.6, 0, 0.01), (4e-3, 0.6, 0, 0.01),
     ],
 )  # fmt: skip
-def test_rows_and_live_states_beyond_the_law_are_marked(
-    depth: float, tilt: float, x: float, stiffness: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_and_live_states_beyond_the_law_are_marked(depth, tilt, x, stiffness, monkeypatch):
     monkeypatch.setattr(touch, "ROWS", 1)
     result = pressed(depth, tilt, x, contact=Contact(stiffness=stiffness))
     history, system = result.history, assemble(result.scene)

@@ -86,9 +86,7 @@ def test_what_is_wrong_with_a_finger_is_told_with_its_number(words: str, said: s
 
 
 @pytest.mark.parametrize(("number", "fingers"), [(0, ()), (2, scene(TWO).fingers)])
-def test_a_number_of_fingers_that_the_physics_does_not_carry_is_refused_in_one_line(
-    number: int, fingers: tuple[object, ...]
-) -> None:
+def test_a_number_of_fingers_that_the_physics_does_not_carry_is_refused_in_one_line(number, fingers):
     said = rf"^scene\.fingers must be one: the physics carries exactly one finger \(got {number}\)\.$"
     with pytest.raises(ParameterError, match=said):
         assemble(replace(scene(ONE), fingers=fingers))

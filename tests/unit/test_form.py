@@ -76,9 +76,7 @@ def test_without_a_touch_the_shape_comes_out_as_it_went_in(tmp_path: Path) -> No
     assert np.abs(again.heights - height).max() < 1e-8
 
 
-def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the_run(tmp_path, capsys):
     source = tmp_path / "shape.npy"
     np.save(source, np.eye(4))
     out = form(tmp_path, str(source), "--finger", "press")

@@ -146,9 +146,7 @@ RUNS = [record(0.2), record(0.5, 0.04), {"error": "no memory"}, record(None, Non
         ("contact_loss_share", 0.0, [0.0, 0.04, 0.3, 0.3, 0.3], (2, 0)),  # the loss keeps its value
     ],
 )
-def test_runs_without_a_value_or_the_fingertip_have_the_largest_of_the_others(
-    name: str, usual: float, values: list[float], counts: tuple[int, int]
-) -> None:
+def test_runs_without_a_value_or_the_fingertip_have_the_largest_of_the_others(name, usual, values, counts):
     found = make_response(name, RUNS, find_excess_losses(RUNS, record(0.1, usual)))
     assert found.values.tolist() == values
     assert (found.absent, found.lost) == counts

@@ -59,9 +59,7 @@ def test_a_job_that_is_done_is_left_as_it_is_with_exit_code_0(capsys: pytest.Cap
     assert written() > before
 
 
-def test_a_job_whose_files_changed_or_a_copy_broke_off_is_done_again_and_says_so(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_job_whose_files_changed_or_a_copy_broke_off_is_done_again_and_says_so(capsys):
     main(["job", str(JOB), "--quiet"])
     before = written()
     prepare(JOBS.replace("0.05", "0.06"))
@@ -113,9 +111,7 @@ RANGES: dict[str, tuple[int, int] | None] = {
 
 
 @pytest.mark.parametrize(("text", "ends"), RANGES.items())
-def test_a_range_of_frames_reads_back_and_one_that_is_none_is_refused(
-    text: str, ends: tuple[int, int] | None
-) -> None:
+def test_a_range_of_frames_reads_back_and_one_that_is_none_is_refused(text, ends):
     if ends is None:
         with pytest.raises(OutputError, match="--frames must be "):
             read_range(text, 60)
@@ -138,9 +134,7 @@ def page() -> str:
     return Path("two/index.html").read_text(encoding="utf-8")
 
 
-def test_jobs_that_are_started_alone_write_the_page_of_their_series(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_jobs_that_are_started_alone_write_the_page_of_their_series(capsys):
     assert main(["job", "two/jobs/tap-endless", "--quiet"]) == 2
     said = capsys.readouterr().err.strip()
     assert "0 of 3 jobs done, 2 failed." in page()
@@ -174,9 +168,7 @@ def test_a_job_that_another_process_does_has_not_failed_and_one_described_anew_f
     assert page().count("not done yet") == 2
 
 
-def test_what_is_no_series_has_no_page_and_one_of_an_older_version_the_jobs_in_it(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_no_series_has_no_page_and_one_of_an_older_version_the_jobs_in_it(capsys):
     shutil.copytree("two/jobs/tap-quick", "alone/jobs/tap-quick")
     assert main(["job", "alone/jobs/tap-quick", "--quiet"]) == 0
     assert sorted(path.name for path in Path("alone").iterdir()) == ["jobs", "runs"]

@@ -45,9 +45,7 @@ def test_every_scene_meets_every_method_and_every_setting(tmp_path: Path) -> Non
     ]  # fmt: skip
 
 
-def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeypatch):
     (tmp_path / "Übung 1.toml").write_text("simulation.duration = 0.25", encoding="utf-8")
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")

@@ -197,9 +197,7 @@ def go_on(finger: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("ticks", [(3, 3, 4), (1,), (2, 1), (9,)])
-def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(
-    ticks: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(ticks, monkeypatch):
     done: list[int] = []
     repeat = accuracy.repeat_period
 
