@@ -7,10 +7,10 @@ import copy
 import statistics
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -160,8 +160,6 @@ def scene(case: Case, stepper: str, step: float, period: float) -> Scene:
     return resolve(sections, "stiff")
 
 
-Integrate = Callable[[str, float, float], Floats]
-
 STEPS = (1e-3, 5e-3, 20e-3, 50e-3)
 #: Control period of the shorter steps, s; that of the longer ones is the step.
 PERIOD = 5e-3
@@ -172,7 +170,7 @@ BOUNDED = ("bernoulli", "richardson", "adaptive")
 #: Columns of the table of costs; 'times' is over the easy case.
 COSTS = {
     "case": "case", "force, N": "force .2g", "reference, µm": "off .1g 1e6", "numpy calls": "calls g",
-    "times": "calls_ratio .2f", "CPU times": "time_ratio .2f", "ill-conditioned": "why",
+    "times": "ratio .2f", "ill-conditioned": "why",
 }  # fmt: skip
 #: From this height error on, m, a run's own estimate has to show that it is wrong.
 WRONG = 1e-4
@@ -257,70 +255,62 @@ def period_of(step: float) -> float:
     return max(step, PERIOD)
 
 
-def commands_of(case: Case) -> Floats:
+@cache
+def commands_of(name: str) -> Floats:
     """Record the commands of a case, (t, n), each of which lasts for `HOLD`."""
-    return case.factor * _run(*_prepare(CASES[EASY] if case.borrowed else case, "bernoulli", 1e-3, HOLD))[1]
+    case = CASES[name]
+    return case.factor * _run(*_prepare(EASY if case.borrowed else name, "bernoulli", 1e-3, HOLD))[1]
 
 
-def live(case: Case, stepper: str, step: float) -> Floats:
+def live(name: str, stepper: str, step: float) -> Floats:
     """Run a case with its controller at a physics step, s, and return the heights, (t, n)."""
-    return _run(*_prepare(case, stepper, step, period_of(step)))[0]
+    return _run(*_prepare(name, stepper, step, period_of(step)))[0]
 
 
 def _prepare(
-    case: Case, stepper: str, step: float, period: float, commands: Floats | None = None
+    name: str, stepper: str, step: float, period: float, *, recorded: bool = False
 ) -> tuple[System, Sequence[Trajectory], int]:
-    """Return a case's system, with its controller or under commands, its path, and its number of periods."""
-    shown = scene(case, stepper, step, period)
-    if commands is None:
-        system = assemble(shown)
+    """Return a case's system, with its controller or recorded commands, its path, and number of periods."""
+    shown = scene(CASES[name], stepper, step, period)
+    if recorded:
+        system = replaying(shown, np.repeat(commands_of(name), round(HOLD / period), axis=0))
     else:
-        system = replaying(shown, np.repeat(commands, round(HOLD / period), axis=0))
+        system = assemble(shown)
     return system, shown.trajectories(), shown.periods
 
 
-def replayed(case: Case, commands: Floats, stepper: str, step: float, period: float) -> Floats:
+@cache
+def replayed(name: str, stepper: str, step: float, period: float) -> Floats:
     """Integrate a case under commands of `HOLD` each and return the heights, (t, n); step and period, s."""
-    return _run(*_prepare(case, stepper, step, period, commands))[0]
+    return _run(*_prepare(name, stepper, step, period, recorded=True))[0]
 
 
-def largest_force(case: Case, commands: Floats) -> float:
+def largest_force(name: str) -> float:
     """Return the largest force on a cell at the end of a control period, N."""
-    return _run(*_prepare(case, "bernoulli", 1e-3, PERIOD, commands))[2]
+    return _run(*_prepare(name, "bernoulli", 1e-3, PERIOD, recorded=True))[2]
 
 
-def calls_of(case: Case, commands: Floats, step: float = 1e-3) -> float:
+def calls_of(name: str, step: float = 1e-3) -> float:
     """Return the numpy calls of a control period of the default stepper, the median over the run."""
-    system, trajectories, count = _prepare(case, "bernoulli", step, period_of(step), commands)
+    system, trajectories, count = _prepare(name, "bernoulli", step, period_of(step), recorded=True)
     return statistics.median(period_calls(system, trajectories, count // 2)[0])
 
 
-def reference(
-    case: Case, commands: Floats, step: float = FINE, integrate: Integrate | None = None
-) -> tuple[Floats, float]:
-    """Return the heights every 5 ms, (t, n), and how far they may be off, m; `integrate`: see `outcome`."""
-    integrate = integrate or partial(replayed, case, commands)
-    fine = integrate("richardson", step, PERIOD)
-    coarse = integrate("richardson", 1e-3 if step < ROUGH else 2 * step, PERIOD)
+def reference(name: str, step: float = FINE) -> tuple[Floats, float]:
+    """Return the heights of a case every 5 ms, (t, n), and how far they may be off, m."""
+    fine = replayed(name, "richardson", step, PERIOD)
+    coarse = replayed(name, "richardson", 1e-3 if step < ROUGH else 2 * step, PERIOD)
     # Order 2 is what is left of order 3 across a kink.
     return fine, float(np.abs(fine - coarse).max()) / (24.0 if step < ROUGH else 3.0)
 
 
-def outcome(
-    case: Case, commands: Floats, exact: Floats, stepper: str, step: float, integrate: Integrate | None = None
-) -> Outcome:
-    """Run one stepper at one step, and compare it with `exact`, (t, n), heights every 5 ms, m.
-
-    `integrate`: returns what `replayed` does for a stepper, its step and the control period, s. Callers that
-    compare several steppers can keep the results: the finer run is the same for each, and that of the
-    shortest step is the reference's.
-    """
-    integrate = integrate or partial(replayed, case, commands)
+def outcome(name: str, exact: Floats, stepper: str, step: float) -> Outcome:
+    """Run one stepper at one step, and compare it with `exact`, (t, n), heights every 5 ms, m."""
     period = period_of(step)
     every = round(period / PERIOD)
     try:
         with strict():
-            heights = integrate(stepper, step, period)
+            heights = replayed(name, stepper, step, period)
     except DivergenceError as wrong:
         return Outcome(float("nan"), stopped=f"{wrong.quantity} {wrong.value:.2g} at {wrong.time:.3g} s")
     except (FloatingPointError, RuntimeWarning) as wrong:
@@ -330,9 +320,9 @@ def outcome(
     error = float(np.abs(heights - exact[every - 1 :: every]).max())
     if error <= WRONG:
         return Outcome(error)
-    judge = reference_settings(scene(case, stepper, step, period).simulation)
+    judge = reference_settings(scene(CASES[name], stepper, step, period).simulation)
     with strict():
-        finer = integrate(judge.stepper, judge.physics_step, period)
+        finer = replayed(name, judge.stepper, judge.physics_step, period)
     return Outcome(error, SHARE * float(np.abs(heights - finer).max()))
 
 
@@ -347,13 +337,11 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     costs: list[Row] = []
     broken: list[str] = []
     for name in steps.through(list(CASES)):
-        case = CASES[name]
         with strict():
-            commands = commands_of(case)
-            exact, off = reference(case, commands, ROUGH if arguments.quick else FINE)
-            most = largest_force(case, commands)
+            exact, off = reference(name, ROUGH if arguments.quick else FINE)
+            most = largest_force(name)
         for stepper in steppers:
-            outcomes = [outcome(case, commands, exact, stepper, step) for step in STEPS]
+            outcomes = [outcome(name, exact, stepper, step) for step in STEPS]
             lines.append([name if stepper == steppers[0] else "", stepper, *(run.cell for run in outcomes)])
             rows += [
                 {
@@ -364,36 +352,27 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
                 for step, run in zip(STEPS, outcomes, strict=True)
             ]  # fmt: skip
             if stepper == "bernoulli":
-                broken += _list_broken(name, case, outcomes, off)
-        calls, spent = calls_of(case, commands), min(_time(case, commands) for _ in range(2))
-        easy = costs[0] if costs else {"calls": calls, "spent": spent}
-        costs.append({
-            "case": name, "force": most, "off": off, "calls": calls, "spent": spent, "why": case.why,
-            "calls_ratio": calls / easy["calls"], "time_ratio": spent / easy["spent"],
-        })  # fmt: skip
+                broken += _list_broken(name, outcomes, off)
+        calls = calls_of(name)
+        ratio = calls / (costs[0]["calls"] if costs else calls)
+        why = CASES[name].why
+        costs.append({"case": name, "force": most, "off": off, "calls": calls, "ratio": ratio, "why": why})
     took = time.process_time() - started
     return Report(list(_list_lines(lines, costs, broken, took)), rows)
 
 
-def _time(case: Case, commands: Floats) -> float:
-    """Return the CPU time of the default stepper at 1 ms, s."""
-    started = time.process_time()
-    replayed(case, commands, "bernoulli", 1e-3, PERIOD)
-    return time.process_time() - started
-
-
-def _list_broken(name: str, case: Case, outcomes: list[Outcome], off: float) -> Iterator[str]:
+def _list_broken(name: str, outcomes: list[Outcome], off: float) -> Iterator[str]:
     """Give which of its promises the default stepper breaks under recorded commands, and under control."""
     for step, run in zip(STEPS, outcomes, strict=True):
         if run.stopped:
             yield f"{name}, {step * 1e3:g} ms: {run.stopped}"
     errors = [run.error for run in outcomes]
-    if not case.why and any(a > max(b, 10.0 * off, 1e-12) for a, b in pairwise(errors)):
+    if not CASES[name].why and any(a > max(b, 10.0 * off, 1e-12) for a, b in pairwise(errors)):
         yield f"{name}: the error does not fall with the step"
     for step in STEPS:
         try:
             with strict():
-                live(case, "bernoulli", step)
+                live(name, "bernoulli", step)
         except (DivergenceError, FloatingPointError, Warning, AssertionError) as wrong:
             yield f"{name}, live, {step * 1e3:g} ms: {wrong}"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -38,29 +38,16 @@ def at_shared_ends(height: Floats, exact: Floats, period: float) -> float:
     return float(np.abs(height[own - 1 :: own] - exact[every - 1 :: every]).max())
 
 
-@cache
-def recorded(name: str) -> Floats:
-    """Return the recorded commands of a case."""
-    with stiff.strict():
-        return stiff.commands_of(CASES[name])
-
-
-@cache
-def integrated(name: str, stepper: str, step: float, period: float) -> Floats:
-    """Return the heights under the recorded commands, (t, n), m."""
-    with stiff.strict():
-        return stiff.replayed(CASES[name], recorded(name), stepper, step, period)
-
-
-@cache
 def reference(name: str) -> tuple[Floats, float]:
     """Return the heights of a case under its recorded commands, and how far they may be off, m."""
-    return stiff.reference(CASES[name], recorded(name), stiff.ROUGH, partial(integrated, name))
+    with stiff.strict():
+        return stiff.reference(name, stiff.ROUGH)
 
 
 def replayed(name: str, step: float) -> Floats:
     """Return the heights of the default stepper under the recorded commands, (t, n), m."""
-    return integrated(name, "bernoulli", step, stiff.period_of(step))
+    with stiff.strict():
+        return stiff.replayed(name, "bernoulli", step, stiff.period_of(step))
 
 
 @pytest.mark.parametrize("step", stiff.STEPS)
@@ -69,7 +56,7 @@ def test_the_default_stepper_does_not_blow_up(name: str, step: float) -> None:
     # No warning, all finite, heights within the stroke, no negative force: `stiff.replayed` asserts it.
     assert np.isfinite(replayed(name, step)).all()
     with stiff.strict():
-        heights = stiff.live(CASES[name], "bernoulli", step)  # under its own controller
+        heights = stiff.live(name, "bernoulli", step)  # under its own controller
     assert np.isfinite(heights).all()
 
 
@@ -86,43 +73,42 @@ def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(name: 
 def test_no_explicit_stepper_is_wrong_without_telling_and_no_case_costs_eight_easy_ones(name: str) -> None:
     # It stops, or its estimate is at least half its error; up to 0.1 mm is no failure.
     exact, _ = reference(name)
-    known = partial(stiff.outcome, CASES[name], recorded(name), exact)
-    said = {
-        (stepper, step): known(stepper, step, partial(integrated, name))
+    outcomes = {
+        (stepper, step): stiff.outcome(name, exact, stepper, step)
         for stepper in EXPLICIT
         for step in stiff.STEPS[1:]
     }
-    assert [key for key, one in said.items() if one.silent] == []
+    assert [key for key, outcome in outcomes.items() if outcome.silent] == []
     assert 0.0 < calls(name) < MOST * calls(EASY)
 
 
 @cache
 def calls(name: str) -> float:
     """Return the numpy calls a control period of a case takes, with one physics step as in a session."""
-    return stiff.calls_of(CASES[name], recorded(name), step=stiff.PERIOD)
+    return stiff.calls_of(name, step=stiff.PERIOD)
 
 
 @pytest.mark.parametrize("stepper", EXPLICIT)
 def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(stepper: str) -> None:
     said = r"At 0\.\d+ s the height of cell \d+ became inf\. Use a shorter"
     with pytest.raises(DivergenceError, match=said):
-        stiff.replayed(CASES[EASY], recorded(EASY), stepper, 20e-3, 20e-3)
+        stiff.replayed(EASY, stepper, 20e-3, 20e-3)
 
 
 def test_the_cases_reach_what_they_are_there_for() -> None:
-    assert [name for name in CASES if not np.abs(recorded(name)).max() > 0.0] == []
+    assert [name for name in CASES if not np.abs(stiff.commands_of(name)).max() > 0.0] == []
     # e^(m x) = 1e12 is a force of f_d b/m 1e12 = 4e10 N on a pin.
     deep = "press to e^(m x) = 1e12"
-    assert stiff.largest_force(CASES[deep], recorded(deep)) > 0.34 * 250.0 / 2000.0 * 1e12
-    assert 1e-9 < np.abs(recorded("openings of 1e-9")).max() < 1e-7
+    assert stiff.largest_force(deep) > 0.34 * 250.0 / 2000.0 * 1e12
+    assert 1e-9 < np.abs(stiff.commands_of("openings of 1e-9")).max() < 1e-7
 
 
 def test_a_pin_pressed_onto_an_end_stop_is_integrated_as_exactly_as_any() -> None:
     # 0.9 µm at 1 ms, as in the easy case; 44 µm where the mean force is that of a pin that goes on.
     name = "all at the lower end stop"
-    exact = stiff.replayed(CASES[name], recorded(name), "runge_kutta_4", 1e-4, stiff.PERIOD)
+    exact = stiff.replayed(name, "runge_kutta_4", 1e-4, stiff.PERIOD)
     assert exact.min() == 0.0
-    assert stiff.outcome(CASES[name], recorded(name), exact, "bernoulli", 1e-3).error < 3e-6
+    assert stiff.outcome(name, exact, "bernoulli", 1e-3).error < 3e-6
 
 
 @pytest.mark.parametrize("state", ["no_control", "sensors", "shape_display"])
