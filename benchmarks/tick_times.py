@@ -10,10 +10,11 @@ import time
 import tracemalloc
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from digiclay import bridge
@@ -92,20 +93,18 @@ def _find_session(bed: Any) -> running.Running:
     return session
 
 
-def time_ticks(
-    move: Callable[[int], None], span: float, ticks: int, clock: Callable[[], float] = time.process_time
-) -> Ticks:
-    """Time ticks of the open sessions, `span` s apart; `move`: moves the fingertip; `clock`: of the parts."""
+def time_ticks(move: Callable[[int], None], span: float, ticks: int) -> Ticks:
+    """Time ticks of the open sessions, `span` s apart; `move`: moves the fingertip."""
     whole, rows = [], []
-    with _time_parts(clock) as spent:
+    with _time_parts() as spent:
         for count in range(WARM_UP + ticks):
             move(count)
             spent.clear()
             began = time.perf_counter(), time.process_time()
             tick.tick(bpy.context, count * span)
-            evaluating = clock()
+            evaluating = time.process_time()
             bpy.context.evaluated_depsgraph_get()
-            spent["evaluate"] += clock() - evaluating
+            spent["evaluate"] += time.process_time() - evaluating
             whole.append((time.perf_counter() - began[0], time.process_time() - began[1]))
             spent["simulate"] -= spent["monitor"] + spent["pack"]
             rows.append([spent[name] for name in PARTS])
@@ -114,57 +113,42 @@ def time_ticks(
 
 
 @contextmanager
-def _time_parts(clock: Callable[[], float]) -> Iterator[defaultdict[str, float]]:
+def _time_parts() -> Iterator[defaultdict[str, float]]:
     """Time the parts of ticks, on the session's own functions, until the context is left."""
     spent: defaultdict[str, float] = defaultdict(float)
-    places = [
-        (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"), (accuracy, "note", "monitor"),
-        (accuracy, "catch_up", "monitor"), (accuracy, "begin_stretch", "monitor"),
-        (snapshot, "dump", "pack"), (tick, "_move_finger", "finger"),
-        (tick, "_evaluate", "evaluate"), (live_beds, "write", "store"), (view, "show_state", "show"),
-    ]  # fmt: skip
-    former: list[tuple[Any, str, Any]] = [(module, name, getattr(module, name)) for module, name, _ in places]
-    running_parts: set[str] = set()
-    for module, name, part in places:
-        setattr(module, name, _timed(spent, running_parts, clock, part, getattr(module, name)))
-    # Every control period that is due is simulated, however little of the machine others leave: a tick that
-    # leaves some out takes less time than it is to be measured with.
-    former.append((live_session, "SHARE", live_session.SHARE))
-    live_session.SHARE = EVERY_PERIOD
+    active: set[str] = set()
 
-    def watch(phase: str, _: dict[str, int]) -> None:
-        spent["garbage"] += clock() * (-1.0 if phase == "start" else 1.0)
-
-    gc.callbacks.append(watch)
-    try:
-        yield spent
-    finally:
-        gc.callbacks.remove(watch)
-        for module, name, function in former:
-            setattr(module, name, function)
-
-
-def _timed(
-    spent: defaultdict[str, float],
-    active: set[str],
-    clock: Callable[[], float],
-    part: str,
-    function: Callable[..., Any],
-) -> Callable[..., Any]:
-    """Return a function that adds its time to a part; the outermost call of the part counts."""
-
-    def timed(*arguments: Any, **named: Any) -> Any:
+    def add_time(part: str, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        # The outermost call of a part counts.
         if part in active:
             return function(*arguments, **named)
         active.add(part)
-        began = clock()
+        began = time.process_time()
         try:
             return function(*arguments, **named)
         finally:
             active.discard(part)
-            spent[part] += clock() - began
+            spent[part] += time.process_time() - began
 
-    return timed
+    def watch(phase: str, _: dict[str, int]) -> None:
+        spent["garbage"] += time.process_time() * (-1.0 if phase == "start" else 1.0)
+
+    with ExitStack() as left:
+        for module, name, part in (
+            (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"),
+            (accuracy, "note", "monitor"), (accuracy, "catch_up", "monitor"),
+            (accuracy, "begin_stretch", "monitor"), (snapshot, "dump", "pack"),
+            (tick, "_move_finger", "finger"), (tick, "_evaluate", "evaluate"), (live_beds, "write", "store"),
+            (view, "show_state", "show"),
+        ):  # fmt: skip
+            timed = partial(add_time, part, getattr(module, name))
+            left.enter_context(patch.object(module, name, timed))
+        # Every control period that is due is simulated, however little of the machine others leave: a tick
+        # that leaves some out takes less time than it is to be measured with.
+        left.enter_context(patch.object(live_session, "SHARE", EVERY_PERIOD))
+        gc.callbacks.append(watch)
+        left.callback(gc.callbacks.remove, watch)
+        yield spent
 
 
 # Ticks while a hand draws
@@ -311,7 +295,8 @@ def measure_viewport(arguments: argparse.Namespace, steps: Steps) -> Report:
     lines = [
         "\nA tick of a live session: 33 ms of simulated time while a fingertip presses and drags; medians.",
         "read: the fingertip's place; keep: the state into the bed, for undo and files; write: pins;",
-        "evaluate: Blender's geometry nodes, without drawing. Times in ms.\n",
+        "evaluate: Blender's geometry nodes, without drawing. Processor time of the parts, elapsed time of",
+        "the tick, ms.\n",
         *tabulate(rows, first, left=0),
         "\nAll pins moved, forms by turns: processor time of the geometry nodes, medians, ms.\n",
         *tabulate(rows, {"pins": "pins d", **skins}, left=0),
@@ -332,7 +317,7 @@ def measure_bed(rows: int, columns: int, ticks: int) -> dict[str, float]:
         bpy.context.view_layer.update()
 
     with open_session(make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master")) as bed:
-        timed = time_ticks(move, SPAN, ticks, time.perf_counter)
+        timed = time_ticks(move, SPAN, ticks)
         growth = _measure_growth(move, WARM_UP + ticks, ticks)
     parts = {
         f"{stage}_s": float(np.median(sum(timed.parts[name] for name in names)))
