@@ -7,7 +7,6 @@ import statistics
 import tempfile
 import time
 import tracemalloc
-from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import Formed
 
-from .report import Curves, Report, Row, Steps, tabulate
+from .report import Curves, Report, Steps, tabulate
 
 #: Pins along a side of the beds.
 SIDES, EXPORTED = (25, 101, 317, 1001), (25, 100, 316, 1000)
@@ -142,11 +141,6 @@ def measure_export(arguments: argparse.Namespace, steps: Steps) -> Report:
         (side, *what) for side in sides for what in EXPORTS[: None if side in (sides[0], sides[-1]) else 1]
     ]
     exports = [export(*job) for job in steps.through(jobs)]
-    return Report(_list_exports(exports), exports)
-
-
-def _list_exports(exports: Sequence[Row]) -> Iterator[str]:
-    """Give the lines of the report."""
-    yield "\nA bed of waves, written to a temporary folder; memory besides the bed itself\n"
+    title = "\nA bed of waves, written to a temporary folder; memory besides the bed itself\n"
     rows = [{**one, "bytes_a_pin": one["peak"] * 1e6 / one["pins"]} for one in exports]
-    yield from tabulate(rows, EXPORT, left=2)
+    return Report([title, *tabulate(rows, EXPORT, left=2)], exports)

@@ -44,7 +44,7 @@ class Benchmark:
     """Arguments."""
     options: Options = lambda parser: None
     needs: str = ""
-    """Package without which it cannot run."""
+    """Package without which it cannot run, and whose version is given."""
     quick: bool = True
     out: bool = True
     """Whether it has these options."""
@@ -189,7 +189,7 @@ def run(name: str, arguments: argparse.Namespace) -> int:
     with Steps(io.StringIO() if arguments.quiet else sys.stderr, name) as steps:
         reports: Report | list[Report] = measure(arguments, steps)
     for report in reports if isinstance(reports, list) else [reports]:
-        text = report.text()
+        text = report.text(benchmark.needs)
         print(text)
         if arguments.out is not None:
             report.write(arguments.out, report.name or name, text)

@@ -116,7 +116,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
             "CPU time, ms", "largest height error, µm",
         )  # fmt: skip
         name = "precision_whole_bed" if plan.side else ""
-        reports.append(Report(lines, [asdict(run) for run in work], curves, name=name, packages=("scipy",)))
+        reports.append(Report(lines, [asdict(run) for run in work], curves, name=name))
     return reports
 
 

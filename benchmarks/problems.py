@@ -110,14 +110,7 @@ class Solution:
         return float(np.abs(height).max()), float(np.abs(force).max())
 
 
-def live(
-    name: str,
-    period: float = PERIOD,
-    step: float = 1e-3,
-    stepper: str = "bernoulli",
-    *,
-    side: int | None = None,
-) -> Scene:
+def live(name: str, period: float = PERIOD, step: float = 1e-3, *, side: int | None = None) -> Scene:
     """Return a problem's scene under Method I, on its bed or one of `side` rows and columns; times in s."""
     rows, waypoints, joined, command = PROBLEMS[name]
     return resolve(
@@ -125,7 +118,7 @@ def live(
             "layout": {"rows": side or rows, "columns": side or rows},
             "recorder": "absent",
             "control": {} if command is None else "absent",
-            "simulation": {"control_period": period, "physics_step": step, "stepper": stepper},
+            "simulation": {"control_period": period, "physics_step": step},
             "trajectory": {
                 "interpolation": joined,
                 "waypoints": [{"time": t, "position": [v * 1e-3 for v in place]} for t, *place in waypoints],

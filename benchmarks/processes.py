@@ -21,9 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.commands.cluster import Cluster, evaluate_on_worker, open_cluster
+from digiclay.commands.cluster import evaluate_on_worker, open_cluster
 from digiclay.commands.evaluator import submit
-from digiclay.commands.progress import table
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.model.trajectory import sample_poses
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -82,12 +81,14 @@ def measure_commits(arguments: argparse.Namespace, steps: Steps) -> Report:
     before, after = 1e6 * times[::2], 1e6 * times[1::2]
     figures = [np.median(before, 0), np.median(after, 0)]
     figures += [reduce(after / before, axis=0) for reduce in (np.median, np.min, np.max)]
-    columns = ("case", f"old, {names[0]} (µs)", f"new, {names[1]} (µs)", "ratio", "least", "largest")
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(CASES, *figures, strict=True)]
-    cells = [[case, *(f"{v:.1f}" for v in row[:2]), *(f"{v:.2f}" for v in row[2:])]
-             for case, *row in (list(row.values()) for row in rows)]  # fmt: skip
-    title = f"processor time of a control period, medians of {turns} turns"
-    return Report(["", title, "", *table(columns, cells)], rows)
+    keys = ("case", "old_us", "new_us", "ratio", "least", "largest")
+    rows = [dict(zip(keys, row, strict=True)) for row in zip(CASES, *figures, strict=True)]
+    columns = {
+        "case": "case", f"old, {names[0]} (µs)": "old_us .1f", f"new, {names[1]} (µs)": "new_us .1f",
+        **{key: f"{key} .2f" for key in keys[3:]},
+    }  # fmt: skip
+    title = f"\nprocessor time of a control period, medians of {turns} turns\n"
+    return Report([title, *tabulate(rows, columns)], rows)
 
 
 def extract(commit: str, folder: Path) -> Path:
@@ -141,16 +142,15 @@ def measure_cluster(arguments: argparse.Namespace, steps: Steps) -> Report:
         hash_points(points)
 
     steps.total = 4
-    costs = [_make_cost("set-up", 0, gains * bands, *_time(set_up))]
+    costs = [_measure("set-up", 0, gains * bands, set_up)]
     steps("set-up")
     evaluate_bundle(bundles[0])  # imports
-    wall, spent = _time(lambda: [evaluate_bundle(bundle) for bundle in bundles])
-    costs.append(_make_cost("points here", 0, len(points), wall, 0.0, spent))
+    costs.append(_measure("points here", 0, len(points), lambda: [*map(evaluate_bundle, bundles)]))
     steps("here")
     for workers in (1, 2):
         costs += _measure_workers(workers, tasks, bundles)
         steps(f"{workers} workers")
-    return Report(list(_list_costs(costs, bundles[0])), costs, packages=("distributed",))
+    return Report(list(_list_costs(costs, bundles[0])), costs)
 
 
 def _make_points(settings: Sequence[str], *axes: str) -> list[Point]:
@@ -158,24 +158,28 @@ def _make_points(settings: Sequence[str], *axes: str) -> list[Point]:
     return make_points(find("slow_press"), changes, [read_axis(axis) for axis in axes])
 
 
-def _make_cost(
-    work: str, workers: int, pieces: int, wall: float, central: float, spent: float = 0.0
+def _measure(
+    work: str, workers: int, pieces: int, task: Callable[[], object], client: Any = None
 ) -> dict[str, Any]:
-    """Return a row: elapsed time, processor time of session and scheduler, and of the workers, s."""
-    times = {"wall": wall / pieces, "central": central / pieces, "spent": spent / pieces}
-    return {"work": work, "workers": workers, "pieces": pieces, **times}
+    """Return a row of some work, a piece, s: elapsed time, processor time here, and that of the workers."""
 
+    def read_clocks() -> list[float]:
+        spent = sum(client.run(time.process_time).values()) if client else 0.0
+        return [time.perf_counter(), time.process_time(), spent]
 
-def _time(work: Callable[[], Any]) -> tuple[float, float]:
-    """Return elapsed and processor time of some work, s."""
-    started, spent = time.perf_counter(), time.process_time()
-    work()
-    return time.perf_counter() - started, time.process_time() - spent
+    before = read_clocks()
+    task()
+    times = [(after - start) / pieces for after, start in zip(read_clocks(), before, strict=True)]
+    row = dict(zip(("wall", "central", "spent"), times, strict=True))
+    return {"work": work, "workers": workers, "pieces": pieces, **row}
 
 
 def _measure_workers(workers: int, tasks: int, bundles: Sequence[Sequence[Point]]) -> list[dict[str, Any]]:
     """Have empty tasks and bundles done by workers of one thread, each a process."""
-    from distributed import LocalCluster
+    from distributed import Client, LocalCluster
+
+    def fail(piece: Any, why: str) -> None:
+        raise RuntimeError(why)
 
     with (
         LocalCluster(
@@ -183,33 +187,20 @@ def _measure_workers(workers: int, tasks: int, bundles: Sequence[Sequence[Point]
             dashboard_address=":0",
         ) as local,
         open_cluster(local.scheduler_address, lambda: False, lambda note: None) as cluster,
+        Client(local.scheduler_address, set_as_default=False) as client,
     ):  # fmt: skip
-        run = partial(_run_pieces, cluster, local.scheduler_address, workers)
+
+        def run(task: Any, pieces: Sequence[Any]) -> None:
+            finish(submit(cluster, task, pieces, stopped=lambda: False), lambda *_: None, fail)
+
         evaluate = partial(evaluate_on_worker, errors=False)
-        run("", abs, range(8 * workers), 1)
-        run("", evaluate, [bundles[0][:4]] * workers, 1)  # imports
+        run(abs, range(8 * workers))
+        run(evaluate, [bundles[0][:4]] * workers)  # imports
+        count = sum(map(len, bundles))
         return [
-            run("empty tasks", abs, range(tasks), tasks),
-            run("points", evaluate, bundles, sum(map(len, bundles))),
+            _measure("empty tasks", workers, tasks, partial(run, abs, range(tasks)), client),
+            _measure("points", workers, count, partial(run, evaluate, bundles), client),
         ]
-
-
-def _run_pieces(
-    cluster: Cluster, address: str, workers: int, work: str, task: Any, pieces: Sequence[Any], count: int
-) -> dict[str, Any]:
-    """Return the cost of pieces of work."""
-    from distributed import Client
-
-    def fail(piece: Any, why: str) -> None:
-        raise RuntimeError(why)
-
-    with Client(address, set_as_default=False) as client:
-        before = sum(client.run(time.process_time).values())
-        times = _time(
-            lambda: finish(submit(cluster, task, pieces, stopped=lambda: False), lambda *_: None, fail)
-        )
-        spent = sum(client.run(time.process_time).values()) - before
-    return _make_cost(work, workers, count, *times, spent)
 
 
 def _list_costs(costs: Sequence[Row], bundle: Sequence[Point]) -> Iterator[str]:
@@ -244,7 +235,7 @@ def measure_serve(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Serve for a while."""
     figures, frames = _serve(QUICK if arguments.quick else FULL)
     rows = [{"what": name, **{f"{s}_s": figures[name][s] for s in SHARES}} for name in LINES]
-    return Report(list(_list_deadlines(figures, rows, frames)), rows, packages=("websockets",))
+    return Report(list(_list_deadlines(figures, rows, frames)), rows)
 
 
 def _serve(seconds: float) -> tuple[dict[str, Any], int]:

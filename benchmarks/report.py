@@ -112,15 +112,10 @@ class Report:
     """Of the figure, inches."""
     name: str = ""
     """Of the files; by default that of the benchmark."""
-    packages: tuple[str, ...] = ()
-    """Packages whose versions are given."""
-    program: str = ""
-    """Version of another program."""
 
-    def text(self) -> str:
-        """Return versions, machine and lines."""
-        machine = ", ".join(filter(None, [describe_machine(*self.packages), self.program]))
-        return "\n".join([machine, *self.lines])
+    def text(self, package: str = "") -> str:
+        """Return versions, that of a package included, machine and lines."""
+        return "\n".join([describe_machine(*filter(None, [package])), *self.lines])
 
     def write(self, out: Path, name: str, text: str) -> None:
         """Write ``name.md``, ``name.csv`` and ``name.png``; OutputError if they cannot be."""

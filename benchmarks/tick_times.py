@@ -202,10 +202,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
         for bed, parts in zip(BEDS, beds, strict=True)
         for name, times in parts.items()
     ]  # fmt: skip
-    return Report(
-        list(_list_lines(beds, rows)), rows, partial(_draw, beds=beds), (7.2, 2.1 * len(beds)),
-        program=f"Blender {bpy.app.version_string}",
-    )  # fmt: skip
+    return Report(list(_list_lines(beds, rows)), rows, partial(_draw, beds=beds), (7.2, 2.1 * len(beds)))
 
 
 def keep_to_one_core() -> None:
@@ -302,7 +299,7 @@ def measure_viewport(arguments: argparse.Namespace, steps: Steps) -> Report:
         *tabulate(rows, {"pins": "pins d", **skins}, left=0),
     ]
     written = [{key: value for key, value in row.items() if key != "goal"} for row in rows]
-    return Report(lines, written, program=f"Blender {bpy.app.version_string}")
+    return Report(lines, written)
 
 
 def measure_bed(rows: int, columns: int, ticks: int) -> dict[str, float]:
