@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -154,12 +155,27 @@ def apply(name: str) -> None:
 
 @pytest.mark.parametrize("file", sorted(SHIPPED.glob("*.py")), ids=lambda file: file.stem)
 def test_each_preset_sets_a_known_finger_and_every_setting(settings: Any, file: Path) -> None:
+    shown = settings.bl_rna.properties
+    wanted = {name: shown[name].default for name in brush.list_settings(settings)}
+    lines = [line.split(" = ") for line in file.read_text().splitlines() if line.startswith("settings.")]
+    wanted |= {name.removeprefix("settings."): ast.literal_eval(value) for name, value in lines}
+    settings.brush, settings.depth, settings.height, settings.strength = "LEVEL", 9.0, 9.0, 0.5
+    settings.symmetry, settings.path, settings.stabilizer, settings.pressure_curve = "XY", "LINE", 9.0, "SOFT"
+    settings.use_pressure = settings.use_tilt = False
     assert str(SHIPPED) in bpy.utils.preset_paths(brush.SUBFOLDER)
     bpy.context.object.digiclay.size = 40.0
     apply(file.stem)
     assert find_kind(devices.read_finger(bpy.context.object.digiclay)) in FINGERS.values()
-    written = {line.split(" = ")[0] for line in file.read_text().splitlines() if " = " in line}
-    assert set(brush.preset_values(settings)) <= written
+    assert {name: getattr(settings, name) for name in wanted} == wanted
+
+
+def test_a_preset_that_cannot_be_run_changes_nothing(settings: Any, tmp_path: Path) -> None:
+    settings.depth, settings.symmetry = 7.5, "XY"
+    file = tmp_path / "broken.py"
+    file.write_text("settings.depth = 3.0")
+    with pytest.raises(RuntimeError, match="settings"):
+        bpy.ops.digiclay.press_brush(filepath=str(file), menu_idname=BrushMenu.bl_idname)
+    assert (settings.depth, settings.symmetry) == (7.5, "XY")
 
 
 def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings: Any, tmp_path: Path) -> None:

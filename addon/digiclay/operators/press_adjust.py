@@ -290,9 +290,15 @@ def fingers(entries: Any, context: Any) -> None:
 )  # fmt: skip
 def apply_brush(operator: Any, context: Any) -> None:
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""
+    settings: Any = brush.tool_settings(context)
+    before = {name: getattr(settings, name) for name in brush.list_settings(settings)}
+    for name in before:  # a preset need not name those that have their defaults
+        settings.property_unset(name)
     try:
         bpy.ops.script.execute_preset(filepath=operator.filepath, menu_idname=operator.menu_idname)
     except RuntimeError as error:  # what Blender says of the file
+        for name, value in before.items():
+            setattr(settings, name, value)
         raise DigiclayError(str(error).removeprefix("Error: ").strip()) from None
 
 

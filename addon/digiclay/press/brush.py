@@ -143,10 +143,14 @@ DEFINES = (
 HOME = str(Path(__file__).parents[1])
 
 
+def list_settings(settings: Any) -> list[str]:
+    """Return the names of all settings of the tool."""
+    return [rna.identifier for rna in settings.bl_rna.properties if rna.identifier != "rna_type"]
+
+
 def preset_values(settings: Any) -> list[str]:
     """Return what a preset keeps: the form of the fingertip, and every setting of the tool."""
-    names = [rna.identifier for rna in settings.bl_rna.properties if rna.identifier != "rna_type"]
-    return ["wm.digiclay_finger", *(f"settings.{name}" for name in names)]
+    return ["wm.digiclay_finger", *(f"settings.{name}" for name in list_settings(settings))]
 
 
 def register() -> None:
