@@ -1,15 +1,19 @@
-"""Geometry nodes of a bed: pins, colored by mode or by force, arrows on them, and the housing."""
+"""Geometry nodes of a bed: pins, colored by mode or by force, arrows on them, the live skin, and the housing.
+
+The skin is weighted sums of the heights of the pins, in Blender's own code. It follows whatever moves the
+pins: a session, a bake, undo. It needs no data of its own in a tick.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from ..compat import bpy
 from ..core.base.modes import Mode
 from . import heat
-from .nodes import attribute, combine, new_tree, node, number, read_height, socket, switch
-from .parts import Sources
+from .parts import FOLLOWING, HIGH, LOW, PAIR, PREVIOUS, VALUE, WEIGHTS, Sources
 from .skin_lattice import KINDS
-from .skin_nodes import skin_nodes
 
 #: Names of the nodes that have the housing and the collection of all that is drawn.
 CASE, SOURCES = "Housing", "Sources"
@@ -26,6 +30,101 @@ FORM, MEMBRANE, FAR = "Form", "Membrane", "Far"
 LENGTH = 150.0
 #: Smaller forces get no arrow, N: a millinewton is what the pulp of a fingertip just feels.
 LEAST = 1e-3
+
+
+def node(
+    tree: Any, kind: str, column: float, row: float, inputs: Mapping[str, Any] | None = None, **settings: Any
+) -> Any:
+    """Add a node at a place of a coarse grid; each input gets a value, an output, or a list of outputs."""
+    made = tree.nodes.new(kind)
+    made.location = (220.0 * column, -180.0 * row)
+    for name, value in settings.items():
+        setattr(made, name, value)
+    for name, value in (inputs or {}).items():
+        link(tree, value, enabled(made.inputs, name))
+    return made
+
+
+def link(tree: Any, value: Any, place: Any) -> None:
+    """Give an input a value, an output, or a list of outputs in the order in which they are to be linked."""
+    if isinstance(value, list):
+        for each in value:
+            tree.links.new(each, place)
+    elif isinstance(value, bpy.types.NodeSocket):
+        tree.links.new(value, place)
+    else:
+        place.default_value = value
+
+
+def enabled(sockets: Any, name: str) -> Any:
+    """Return the socket of a name that is in use: nodes have one for each type, all of the same name."""
+    return next((each for each in sockets if each.name == name and each.enabled), sockets[name])
+
+
+def new_tree(name: str) -> Any:
+    """Add a tree that takes a geometry."""
+    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    return tree
+
+
+def socket(tree: Any, name: str, kind: str, default: Any, description: str) -> None:
+    """Add a setting to a tree, which each object that uses the tree has for itself."""
+    made = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind)
+    made.default_value = default
+    made.description = description
+
+
+def attribute(tree: Any, name: Any, kind: str, column: float, row: float) -> Any:
+    """Add a node that reads an attribute of the vertices of a name or text of nodes; return its output."""
+    made = node(tree, "GeometryNodeInputNamedAttribute", column, row, {"Name": name}, data_type=kind)
+    return enabled(made.outputs, "Attribute")
+
+
+def number(tree: Any, operation: str, column: float, row: float, *values: Any) -> Any:
+    """Add a node that reckons with numbers or with outputs of other nodes; return its output."""
+    made = node(tree, "ShaderNodeMath", column, row, operation=operation)
+    for place, value in zip(made.inputs, values, strict=False):
+        link(tree, value, place)
+    return made.outputs["Value"]
+
+
+def switch(tree: Any, kind: str, column: float, row: float, on: Any, off: Any, then: Any) -> Any:
+    """Add a node that hands on `then` where `on` holds and `off` (may be None) else; return its output."""
+    # What is not handed on is not worked out either: that is how a part that is off costs nothing.
+    ways = {"Switch": on, **({} if off is None else {"False": off}), "True": then}
+    return enabled(node(tree, "GeometryNodeSwitch", column, row, ways, input_type=kind).outputs, "Output")
+
+
+def combine(tree: Any, column: float, row: float, **parts: Any) -> Any:
+    """Add a node that makes a vector of X, Y and Z; return its output."""
+    return node(tree, "ShaderNodeCombineXYZ", column, row, parts).outputs["Vector"]
+
+
+def read_height(tree: Any, row: float) -> Any:
+    """Add the nodes that read the height of a vertex; return their output."""
+    place = node(tree, "GeometryNodeInputPosition", 0, row).outputs["Position"]
+    return node(tree, "ShaderNodeSeparateXYZ", 1, row, {"Vector": place}).outputs["Z"]
+
+
+def mesh_of(tree: Any, thing: Any, column: float, row: float) -> Any:
+    """Add the node that reads an object's mesh; return its output."""
+    return node(tree, "GeometryNodeObjectInfo", column, row, {"Object": thing}).outputs["Geometry"]
+
+
+def sample(tree: Any, table: Any, value: Any, kind: str, index: Any, column: float, row: float) -> Any:
+    """Add the node that reads a value of other vertices, by their place; return its output."""
+    given = {"Geometry": table, "Value": value, "Index": index}
+    made = node(tree, "GeometryNodeSampleIndex", column, row, given, data_type=kind, domain="POINT")
+    return enabled(made.outputs, "Value")
+
+
+def store(tree: Any, table: Any, name: str, kind: str, value: Any, column: float, row: float) -> Any:
+    """Add the node that stores a value at every vertex; return its geometry."""
+    given = {"Geometry": table, "Name": name, "Value": value}
+    made = node(tree, "GeometryNodeStoreNamedAttribute", column, row, given, data_type=kind, domain="POINT")
+    return made.outputs["Geometry"]
 
 
 def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
@@ -133,3 +232,62 @@ def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: flo
     both = {"Geometry": [instances.outputs["Instances"], pins]}
     joined = node(tree, "GeometryNodeJoinGeometry", 5, row, both).outputs["Geometry"]
     return switch(tree, "GEOMETRY", 6, row - 1, settings.outputs[ARROWS], pins, joined)
+
+
+def skin_nodes(tree: Any, sources: Any, pins: Any, kind: Any, row: float) -> Any:
+    """Add the nodes that stretch a skin over pins; return its geometry."""
+    names = [_prefixed(tree, words, kind, row + step) for step, words in enumerate(WEIGHTS)]
+    height = read_height(tree, row + 3)
+    index = node(tree, "GeometryNodeInputIndex", 1, row + 2).outputs["Index"]
+    points = mesh_of(tree, sources.pins, 1, row)
+    value = sample(tree, pins, height, "FLOAT", index, 2, row)
+    pair = _store_pair(tree, store(tree, points, VALUE, "FLOAT", value, 3, row), 4, row)
+    lines = mesh_of(tree, sources.rows, 6, row + 2)
+    value = _sum(tree, pair, names, 6, row)
+    pair = _store_pair(tree, store(tree, lines, VALUE, "FLOAT", value, 10, row), 11, row)
+    up = combine(tree, 17, row + 1, Z=_sum(tree, pair, names, 13, row))
+    flat = mesh_of(tree, sources.skin, 16, row)
+    raised = node(tree, "GeometryNodeSetPosition", 18, row, {"Geometry": flat, "Offset": up})
+    return raised.outputs["Geometry"]
+
+
+def _prefixed(tree: Any, words: str, kind: Any, row: float) -> Any:
+    """Add the nodes that put words before a name."""
+    first = node(tree, "FunctionNodeInputString", -1, row, string=words).outputs["String"]
+    # What is linked first stands last.
+    return node(tree, "GeometryNodeStringJoin", 0, row, {"Strings": [kind, first]}).outputs["String"]
+
+
+def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
+    """Add the nodes that store height and slope: the harmonic mean of the slopes on both sides, or 0."""
+    here = attribute(tree, VALUE, "FLOAT", column, row + 1)
+    sides = []
+    for step, name in enumerate((PREVIOUS, FOLLOWING), 2):
+        beside = {"Value": here, "Index": attribute(tree, name, "INT", column, row + step)}
+        kind = {"data_type": "FLOAT", "domain": "POINT"}
+        read = node(tree, "GeometryNodeFieldAtIndex", column + 0.5, row + step, beside, **kind)
+        sides.append(enabled(read.outputs, "Value"))
+    before = number(tree, "SUBTRACT", column + 1, row + 2, here, sides[0])
+    after = number(tree, "SUBTRACT", column + 1, row + 3, sides[1], here)
+    product = number(tree, "MULTIPLY", column + 1, row + 4, before, after)
+    same_way = number(tree, "MAXIMUM", column + 1, row + 5, product, 0.0)
+    twice = number(tree, "MULTIPLY", column + 1, row + 6, same_way, 2.0)
+    total = number(tree, "ADD", column + 1, row + 7, before, after)
+    slope = number(tree, "DIVIDE", column + 1, row + 8, twice, total)  # Blender divides by 0 to 0
+    pair = combine(tree, column + 1.5, row + 1, X=here, Y=slope)
+    return store(tree, table, PAIR, "FLOAT_VECTOR", pair, column + 1.7, row)
+
+
+def _sum(tree: Any, table: Any, names: list[Any], column: float, row: float) -> Any:
+    """Add the nodes that add up heights and slopes of two neighbors."""
+    pair = attribute(tree, PAIR, "FLOAT_VECTOR", column, row + 5)
+    parts = []
+    for step, (side, name) in enumerate(zip((LOW, HIGH), names, strict=True)):
+        at = attribute(tree, side, "INT", column, row + 6 + step)
+        weight = attribute(tree, name, "FLOAT_VECTOR", column, row + 8 + step)
+        there = sample(tree, table, pair, "FLOAT_VECTOR", at, column + 1, row + 5 + step)
+        dot = node(tree, "ShaderNodeVectorMath", column + 2, row + 5 + step, operation="DOT_PRODUCT")
+        for place, value in zip(dot.inputs, (there, weight), strict=False):
+            link(tree, value, place)
+        parts.append(dot.outputs["Value"])
+    return number(tree, "ADD", column + 3, row + 5, *parts)

@@ -1,4 +1,4 @@
-"""Objects of the device: shapes, materials and roles."""
+"""Objects of the device: shapes, materials and roles; meshes of the live skin."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from ..core.base.modes import COLORS, Mode
 from ..roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 from . import heat, primitives
 from .instant import Instant
-from .skin_lattice import choose_parts, make_lattice
-from .skin_nodes import SkinMeshes, make_meshes
+from .skin_lattice import Pass, SkinLattice, choose_parts, make_lattice
 
 #: sRGB of what is no pin.
 SKIN = (0.91, 0.60, 0.47)
@@ -29,6 +28,10 @@ GAP, WALL = 0.85, 1.7
 MANY = 4000
 #: Radius of an arrow's head, in pitches.
 HEAD = 0.36
+#: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on the way.
+PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = "previous", "following", "low", "high", "value", "pair"
+#: Attributes of the weights: their first half; the other is the name of the skin.
+WEIGHTS = ("weight low ", "weight high ")
 
 
 def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None = None) -> Any:
@@ -54,6 +57,14 @@ def material(name: str, color: tuple[float, float, float], roughness: float, alp
     shader.inputs["Roughness"].default_value = roughness
     shader.inputs["Alpha"].default_value = alpha
     return made
+
+
+class SkinMeshes(NamedTuple):
+    """Meshes of the skin: points of the pins and of the rows, and the skin itself, flat."""
+
+    pins: Any
+    rows: Any
+    skin: Any
 
 
 class Sources(NamedTuple):
@@ -113,6 +124,50 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
     mesh = bridge.mesh("Digital Clay Housing", shape)
     mesh.materials.append(material("housing", CASE, roughness=0.55))
     return mesh
+
+
+def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
+    """Make the meshes of a skin."""
+    pins = _points("Digital Clay Skin Pins", lattice.along.previous.size)
+    _write_neighbors(pins, lattice.along)
+    rows = _points("Digital Clay Skin Rows", lattice.across.previous.size)
+    _write_neighbors(rows, lattice.across)
+    _write_weights(rows, lattice.along)
+    count = len(lattice.place)
+    skin = _points("Digital Clay Skin", count)
+    flat = np.column_stack([lattice.place, np.where(lattice.sunk, deck, 0.0)]) * SCALE
+    skin.vertices.foreach_set("co", flat.astype(np.float32).ravel())
+    skin.loops.add(lattice.faces.size)
+    skin.loops.foreach_set("vertex_index", lattice.faces.ravel())
+    skin.polygons.add(len(lattice.faces))
+    skin.polygons.foreach_set("loop_start", np.arange(0, lattice.faces.size, 4, dtype=np.int32))
+    skin.update(calc_edges=True)
+    _write_weights(skin, lattice.across)
+    skin.materials.append(material)
+    return SkinMeshes(pins, rows, skin)
+
+
+def _points(name: str, count: int) -> Any:
+    """Make a mesh of loose vertices."""
+    made = bpy.data.meshes.new(name)
+    made.vertices.add(count)
+    return made
+
+
+def _write_neighbors(mesh: Any, step: Pass) -> None:
+    """Write the neighbors that the slopes of a pass need."""
+    for name, values in ((PREVIOUS, step.previous), (FOLLOWING, step.following)):
+        mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
+
+
+def _write_weights(mesh: Any, step: Pass) -> None:
+    """Write the neighbors that a pass adds up, and their weights."""
+    for name, values in ((LOW, step.low), (HIGH, step.high)):
+        mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
+    for kind, weights in step.weights.items():
+        for name, share in zip(WEIGHTS, weights, strict=True):
+            made = mesh.attributes.new(name + kind, "FLOAT2", "POINT")
+            made.data.foreach_set("vector", share.astype(np.float32).ravel())
 
 
 def make_fingertip(collection: Any, bed: Any) -> Any:

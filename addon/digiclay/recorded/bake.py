@@ -22,7 +22,7 @@ from ..core.session.live_session import simulate_path
 from ..core.session.take import Take
 from ..device import view
 from ..device.instant import pick_pose
-from ..device.nodes import attribute, enabled, mesh_of, new_tree, node, number, sample, socket, store
+from ..device.node_tree import attribute, enabled, mesh_of, new_tree, node, number, sample, socket, store
 from ..roles import BAKE, ROLE, fingertip_of
 
 #: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
