@@ -131,20 +131,12 @@ class AdjustMixin(Drawing):
         tip = bed and fingertip_of(bed)
         if tip is None or context.area != area or not self.poll(context):
             return
-        from ..overlay.draw import cursor
-
         settings = brush.tool_settings(context)
         depth = 1e-3 * settings.depth if settings else DEEPEST
         rims = self.outlines(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, self._shown())
-        places = [np.column_stack([rim, np.zeros(len(rim))]) + self.center for rim in rims]
-        lines = [bridge.project(context, bed, place) for place in places]
+        places = [tool.close(np.column_stack([rim, np.zeros(len(rim))]) + self.center) for rim in rims]
         middle = bridge.project(context, bed, self.center[None])[0]
-        system = context.preferences.system
-        closed = [np.concatenate([line, line[:1]]) for line in lines if np.isfinite(line).all()]
-        cursor(
-            tool.make_lines(closed, system.pixel_size),
-            tool.make_label(self.words, (middle[0], middle[1]), system.ui_scale),
-        )
+        tool.draw_on_bed(context, bed, places, self.words, (middle[0], middle[1]))
 
 
 def _find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:

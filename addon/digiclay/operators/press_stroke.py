@@ -333,19 +333,13 @@ class PressShape(Drawing, bpy.types.Operator):
         bed, settings = brush.find_bed(context, self.uid), brush.tool_settings(context)
         if bed is None or settings is None or context.area != area:
             return
-        from ..overlay.draw import cursor
-
         lines = []
         for mirror in SYMMETRIES[settings.symmetry]:
             path = self._path() * mirror
             heights = self.height[self.grid.at(path[:, 0], path[:, 1])]
-            points = bridge.project(context, bed, np.column_stack([path, heights]))
-            if len(points) > 1 and np.isfinite(points).all():
-                lines.append(points)
-        system = context.preferences.system
+            lines += [np.column_stack([path, heights])] if len(path) > 1 else []
         at = bridge.project(context, bed, np.array([[*self.to, float(self.height.max())]]))[0]
-        text = tool.make_label(self.words.partition("  |")[0], (at[0], at[1] - 14.0), system.ui_scale)
-        cursor(tool.make_lines(lines, system.pixel_size), text if np.isfinite(at).all() else ())
+        tool.draw_on_bed(context, bed, lines, self.words.partition("  |")[0], (at[0], at[1] - 14.0))
 
 
 class PressLine(Polled, bpy.types.Operator):

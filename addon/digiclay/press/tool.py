@@ -44,6 +44,25 @@ def make_label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
     return [*edge, Words(x, y, size, LIGHT, text)]
 
 
+def close(path: Floats) -> Floats:
+    """Return a path (k, d) that ends where it begins."""
+    return np.concatenate([path, path[:1]])
+
+
+def draw_on_bed(
+    context: Any, bed: Any, paths: Sequence[Floats], text: str, xy: tuple[float, float],
+    color: Color = LIGHT, corner: tuple[float, float] = (0.0, 0.0),
+) -> None:  # fmt: skip
+    """Draw paths (k, 3), m, of a bed's space, and text beside a place; pixels from a corner of the region."""
+    from ..overlay.draw import cursor
+
+    system = context.preferences.system
+    lines = [np.asarray(corner) + bridge.project(context, bed, path) for path in paths]
+    shown = [line for line in lines if np.isfinite(line).all()]
+    label = make_label(text, xy, system.ui_scale) if np.isfinite(xy).all() else ()
+    cursor(make_lines(shown, system.pixel_size, color), label)
+
+
 #: Width from which on a header names brushes and popovers in full, in pixels at a resolution scale of 1.
 WIDE = 1000
 #: Widths of what it holds, in Blender's units of 20 pixels.
@@ -132,16 +151,11 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
         touch_outline(target.bed, target.grid, target.height, target.point * [*mirror, 1.0], depth, kind)
         for mirror in SYMMETRIES[settings.symmetry]
     ]
-    drawn = [*(np.concatenate([rim, rim[:1]]) for rim in rims), *_trail(target)]
-    corner = np.array([region.x, region.y])
-    lines = [corner + bridge.project(context, target.bed, points) for points in drawn]
-    width = context.preferences.system.pixel_size
-    shown = [points for points in lines if np.isfinite(points).all()]
     amount = 1e-3 * getattr(settings, amount_name(kind))
     text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)
     color = SMOOTHING if kind is Brush.SMOOTH else LIGHT
-    label = make_label(text, xy, context.preferences.system.ui_scale)
-    cursor(make_lines(shown, width, color), label)
+    paths = [*map(close, rims), *_trail(target)]
+    draw_on_bed(context, target.bed, paths, text, xy, color, (region.x, region.y))
 
 
 def _shown_brush(bed: Any, settings: Any) -> Brush:
@@ -160,7 +174,7 @@ def _trail(target: aim.Target) -> list[Floats]:
     depth = float(target.height.max()) - pose[2]
     rim = pose[:2] + find_outline(finger, pose[3:], depth, kind, target.grid.layout)
     first, *later = [path for stroke in session.strokes for path in stroke.ahead]
-    ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
+    ways = [close(rim), np.concatenate([pose[None, :2], first]), *later]
     return [drape(target.grid, target.height, way) for way in ways if len(way) > 1]
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from ..compat import PACKAGE, bpy
 from ..core.base.errors import OutputError
+from ..core.files.run_folder import write_whole
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS, format_scene
 
@@ -46,13 +46,11 @@ def path(name: str) -> Path:
 def save(name: str, scene: Scene) -> Path:
     """Save a scene as a preset, in place of one of the same name."""
     file = path(name)
-    partial = file.with_suffix(".partial")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(format_scene(scene), encoding="utf-8")
-        os.replace(partial, file)
     except OSError as error:
         raise OutputError(f"Cannot write {file}: {error.strerror or error}.") from None
+    write_whole(file, format_scene(scene).encode())
     return file
 
 
