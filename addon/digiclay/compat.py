@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -145,6 +145,22 @@ def strips(scene: Any) -> Any:
     """Return the strips of a scene's video sequencer, made now; up to 4.3 they were called sequences."""
     editor = scene.sequence_editor_create()
     return editor.strips if hasattr(editor, "strips") else editor.sequences
+
+
+def connect(functions: Mapping[str, Callable[..., object]]) -> None:
+    """Have Blender call functions, by the names of its lists of handlers."""
+    for name, function in functions.items():
+        handlers = getattr(bpy.app.handlers, name)
+        if function not in handlers:
+            handlers.append(function)
+
+
+def disconnect(functions: Mapping[str, Callable[..., object]]) -> None:
+    """Undo `connect`."""
+    for name, function in functions.items():
+        handlers = getattr(bpy.app.handlers, name)
+        if function in handlers:
+            handlers.remove(function)
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from .. import bridge
-from ..compat import bpy, own_curves
+from ..compat import bpy, connect, disconnect, own_curves
 from ..core.base.errors import DigiclayError
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
@@ -336,18 +336,6 @@ def note_change(scene: Any, graph: Any = None) -> None:
 
 
 @bpy.app.handlers.persistent
-def note_undo(*_: Any) -> None:
-    """Look soon at what undo has come to."""
-    _repair_soon("undo")
-
-
-@bpy.app.handlers.persistent
-def note_redo(*_: Any) -> None:
-    """Look soon at what redo has come to."""
-    _repair_soon("redo")
-
-
-@bpy.app.handlers.persistent
 def note_load(*_: Any) -> None:
     """Look soon at what another file has: it stays as it is."""
     _watch.known = None
@@ -385,21 +373,18 @@ def _is_busy(windows: Any) -> bool:
     )
 
 
-def _pairs() -> list[tuple[Any, Any]]:
-    """Return Blender's lists of handlers with what belongs into them."""
-    lists = bpy.app.handlers
-    return [
-        (lists.depsgraph_update_post, note_change),
-        (lists.undo_post, note_undo),
-        (lists.redo_post, note_redo),
-        (lists.load_post, note_load),
-    ]
+#: Handlers by the names of Blender's lists: objects may have come or gone, undo or redo has come to a step.
+HANDLERS = {
+    "depsgraph_update_post": note_change,
+    "undo_post": bpy.app.handlers.persistent(lambda *_: _repair_soon("undo")),
+    "redo_post": bpy.app.handlers.persistent(lambda *_: _repair_soon("redo")),
+    "load_post": note_load,
+}
 
 
 def watch() -> None:
     """Have the handlers called from now on; what is there already is taken as it is."""
-    for handler, function in _pairs():
-        handler.append(function)
+    connect(HANDLERS)
     note_load()
 
 
@@ -413,7 +398,5 @@ def unregister() -> None:
     """Undo `register`."""
     if bpy.app.timers.is_registered(_repair_when_idle):
         bpy.app.timers.unregister(_repair_when_idle)
-    for handler, function in _pairs():
-        if function in handler:
-            handler.remove(function)
+    disconnect(HANDLERS)
     _watch.known, _watch.came, _watch.pending = None, "", False

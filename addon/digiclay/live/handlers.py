@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..compat import bpy
+from ..compat import bpy, connect, disconnect
 from ..overlay import views
 from ..recorded import takes
 from ..sessions import running
@@ -92,43 +92,20 @@ def reload_states(*_: Any) -> None:
         running.put(replace(drop_strokes(session), stale=STALE))
 
 
-@bpy.app.handlers.persistent
-def cancel_saving(*_: Any) -> None:
-    """Continue the recordings after the file could not be saved."""
-    clear_recovery()
-
-
-@bpy.app.handlers.persistent
-def end_for_loading(*_: Any) -> None:
-    """End all sessions: their file is about to be closed."""
-    end_with_file("ended: another file was loaded")
+#: Handlers of a running session, by the names of Blender's lists.
+HANDLERS = {
+    "undo_post": reload_states,
+    "redo_post": reload_states,
+    "save_pre": write_recovery,
+    "save_post": clear_recovery,
+    "save_post_fail": bpy.app.handlers.persistent(lambda *_: clear_recovery()),
+    "load_pre": bpy.app.handlers.persistent(lambda *_: end_with_file("ended: another file was loaded")),
+}
 
 
 def watch() -> None:
     """Add the handlers."""
-    for handlers, function in _handler_pairs():
-        if function not in handlers:
-            handlers.append(function)
-
-
-def unwatch() -> None:
-    """Remove the handlers."""
-    for handlers, function in _handler_pairs():
-        if function in handlers:
-            handlers.remove(function)
-
-
-def _handler_pairs() -> list[tuple[Any, Any]]:
-    """Return Blender's lists of handlers with what belongs into them."""
-    lists = bpy.app.handlers
-    return [
-        (lists.undo_post, reload_states),
-        (lists.redo_post, reload_states),
-        (lists.save_pre, write_recovery),
-        (lists.save_post, clear_recovery),
-        (lists.save_post_fail, cancel_saving),
-        (lists.load_pre, end_for_loading),
-    ]
+    connect(HANDLERS)
 
 
 def end(how: str, *sessions: Running) -> None:
@@ -145,7 +122,7 @@ def end(how: str, *sessions: Running) -> None:
             running.set_message(". ".join(words), *(session.uid for session in sessions))
         if not running.list_sessions():
             loop.end()
-            unwatch()
+            disconnect(HANDLERS)
         views.follow()
     beds.select_active(frozenset(session.uid for session in sessions))
 
