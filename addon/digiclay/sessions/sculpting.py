@@ -17,17 +17,7 @@ from ..core.engine.system import System
 from ..core.model.fingertip import wrap_one
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
-from ..core.session import accuracy, recent_trace, snapshot
-from ..core.session.live_session import (
-    Clock,
-    Moment,
-    clamp_pose,
-    follow_path,
-    interpolate_path,
-    periods_due,
-    start_recording,
-    update_cost,
-)
+from ..core.session import accuracy, live_session, recent_trace, snapshot
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..strokes.motion import follow
 from ..strokes.stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
@@ -53,12 +43,12 @@ def begin_session(
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost."""
     system = assemble(scene)
     state, lost = _load_state(system, kept)
-    pose = clamp_pose(pose, system.cell.actuator.stroke)
+    pose = live_session.clamp_pose(pose, system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
         scene=scene, system=system, state=state, pose=pose, uid=uid, name=name, snapshot=now, tick=tick + 1,
-        clock=Clock(), trace=recent_trace.start(system.period), monitor=accuracy.start(scene),
-        next_gesture=Moment(state.period, now, pose),
+        clock=live_session.Clock(), trace=recent_trace.start(system.period), monitor=accuracy.start(scene),
+        next_gesture=live_session.Moment(state.period, now, pose),
     )  # fmt: skip
     return running, lost
 
@@ -86,7 +76,7 @@ def advance(
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:
-        count, clock = periods_due(running.clock, now, running.system.period, most)
+        count, clock = live_session.periods_due(running.clock, now, running.system.period, most)
     running = replace(running, clock=clock, steps=0, tick=running.tick + 1)
     return follow_finger(running, pose, count) if count else running
 
@@ -102,9 +92,9 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
     if running.strokes:
         running, path, smoothing = take_path(running, count)
     else:
-        pose = clamp_pose(pose, system.cell.actuator.stroke)
+        pose = live_session.clamp_pose(pose, system.cell.actuator.stroke)
         running = _mark_gesture_start(running, pose, count)
-        path = interpolate_path(running.pose[None], pose[None], count)[:, 0]
+        path = live_session.interpolate_path(running.pose[None], pose[None], count)[:, 0]
     rows, first, trace, paths = [], running.state.period + 1, running.trace, wrap_one(path)
     started = time.perf_counter()
     monitor = monitor and accuracy.begin_stretch(monitor, running.state)
@@ -116,10 +106,10 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
         if state.period % trace.every == 0:
             rows.append(recent_trace.sample(system, state, running.scene.set_point, trace.pins))
 
-    gone, errors = follow_path(running, path, smoothing, running.tick, watch), None
+    gone, errors = live_session.follow_path(running, path, smoothing, running.tick, watch), None
     if monitor:
         monitor, errors = accuracy.catch_up(monitor, gone.state, len(path) - 1)
-    clock = update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
+    clock = live_session.update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
         gone, clock=clock, snapshot=snapshot.dump(system, gone.state), monitor=monitor,
         errors=errors or running.errors, trace=recent_trace.extend(trace, rows),
@@ -134,7 +124,7 @@ def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
     next_gesture = running.next_gesture
     free = next_gesture is None and recent_trace.measure_total_force(running.system, running.state) == 0.0
     if free or (moved and running.rest_time >= REST):
-        next_gesture = Moment(running.state.period, running.snapshot, running.pose)
+        next_gesture = live_session.Moment(running.state.period, running.snapshot, running.pose)
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
@@ -157,10 +147,11 @@ def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None
     gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
     free = recent_trace.measure_total_force(running.system, state) == 0.0
     return replace(
-        running, state=state, snapshot=now, pose=clamp_pose(pose, running.system.cell.actuator.stroke),
-        clock=running.clock.stopped(), monitor=running.monitor and accuracy.reset(running.monitor), stale=0,
+        running, state=state, snapshot=now, clock=running.clock.stopped(), stale=0,
+        pose=live_session.clamp_pose(pose, running.system.cell.actuator.stroke),
+        monitor=running.monitor and accuracy.reset(running.monitor),
         recording=keep, gestures=gestures, tick=running.tick + 1, rest_time=0.0,
-        next_gesture=Moment(state.period, now, pose) if free else None,
+        next_gesture=live_session.Moment(state.period, now, pose) if free else None,
     )  # fmt: skip
 
 
@@ -181,7 +172,7 @@ def set_recording(running: Running, on: bool) -> Running:
     """Begin to record the fingertip's path, or stop recording it."""
     if not on:
         return replace(running, recording=None)
-    return start_recording(running, running.snapshot, running.tick)
+    return live_session.start_recording(running, running.snapshot, running.tick)
 
 
 def rewind(running: Running) -> Running:
@@ -203,7 +194,7 @@ def withdraw_stroke(running: Running) -> Running:
     return drop_strokes(restore_gesture(running, running.stroke_start))
 
 
-def restore_gesture(running: Running, gesture: Moment) -> Running:
+def restore_gesture(running: Running, gesture: live_session.Moment) -> Running:
     """Bring state, fingertip and recording back to where a gesture of the session began."""
     back = restore(replace(running, recording=None), gesture.snapshot, gesture.pose)
     keep = running.recording
@@ -219,7 +210,7 @@ def restore_gesture(running: Running, gesture: Moment) -> Running:
 def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the fingertip off it; this can be rewound like a gesture."""
     # Before period 0, at which the first gesture after the reset may begin.
-    before = Moment(-1, running.snapshot, running.pose)
+    before = live_session.Moment(-1, running.snapshot, running.pose)
     pose = running.pose.copy()
     pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
     back = restore(replace(drop_strokes(running), gestures=()), None, pose, tick=-1)
@@ -267,7 +258,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | N
     """Return the session, and path (k + 1, 7) and smoothing orders (k, 4) of its first stroke, k <= count."""
     first = running.strokes[0]
     if first.height is None:
-        begun = Moment(running.state.period, running.snapshot, running.pose)
+        begun = live_session.Moment(running.state.period, running.snapshot, running.pose)
         running = replace(running, next_gesture=begun, stroke_start=begun)
     stroke, path, smoothing = _advance(running, first, count)
     left = (stroke, *running.strokes[1:])
