@@ -172,6 +172,7 @@ def test_behaviors_and_steppers_do_what_they_do_alone(name, keys, settings, *, e
         # The cells are chosen anew every 32 periods or sooner: most of their sets have no row of their own.
         ("plastic_press", "contact.exponent", (2e3, 1990), ("recorder.every=99", "simulation.duration=0.9")),
         ("tap", "actuator.rest_height", (0.01, 0.02), ("simulation.duration=0.1",)),  # nothing is touched
+        ("tap", "actuator.bore", (1.8e-3, 2e-3), ("valve_lag=absent", "relaxation=absent", "conduit=absent")),
     ],
 )  # fmt: skip
 def test_what_is_recorded_and_judged_of_a_run_is_that_of_the_run_alone(name, key, values, settings):

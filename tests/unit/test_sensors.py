@@ -14,9 +14,10 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
-from digiclay.core.model.interfaces import Sensors, Truth
+from digiclay.core.model.control_interface import Measurement
+from digiclay.core.model.interfaces import Sensors
 from digiclay.core.model.null_parts import PerfectSensors
-from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, Sensing, draw_normals
+from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, Sensing, draw_polar
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
@@ -37,10 +38,26 @@ def heights(*settings: str) -> Floats:
     return np.asarray(run(sample("slow_press", *settings)).history["height"])
 
 
-def truth(period: int, force: Sequence[float], height: Sequence[float]) -> Truth:
-    """Return what there is of cells 0, 1, ..."""
-    count = len(force)
-    return Truth(np.arange(count), period, np.array(force), np.array(height), np.zeros(count))
+def show(force: Sequence[float], height: Sequence[float] | Floats) -> Measurement:
+    """Return what there is of cells 0, 1, ..., of which the sensors remember nothing."""
+    cells, nothing = np.arange(len(force)), np.zeros(len(force))
+    return Measurement(
+        quadratic_basis=np.empty(0),
+        height=np.array(height),
+        force=np.array(force),
+        target=nothing,
+        mode=nothing.astype(np.int8),
+        own=np.empty((0, cells.size)),
+        cells=cells,
+        command=nothing,
+        sensed=np.empty((0, cells.size)),
+    )
+
+
+def draw_normals(seed: Any, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Return both kinds of noise of standard deviation 1."""
+    radius, angle = draw_polar(seed, period, cells)
+    return radius * np.cos(angle), radius * np.sin(angle)
 
 
 @cache
@@ -82,22 +99,23 @@ def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed: An
 
 
 def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:
-    sensors, seen = Noisy(PerfectSensors(), 2e-3, 5e-6, 8), truth(4, [0.1, 0.2], [0.04, 0.05])
+    sensors, seen = Noisy(PerfectSensors(), 2e-3, 5e-6, 8), show([0.1, 0.2], [0.04, 0.05])
     first, second = draw_normals(8, 4, seen.cells)
-    force, height = sensors.measure(np.empty((0, 2)), seen)
+    force, height = sensors.measure(seen, 4)
     np.testing.assert_array_equal(force, seen.force + 2e-3 * first)
     np.testing.assert_array_equal(height, seen.height + 5e-6 * second)
+    assert Noisy(PerfectSensors(), 2e-3, 0.0, 8).measure(seen, 4)[1] is seen.height
 
 
 def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_rounds_nothing() -> None:
-    seen, own = truth(0, [0.3, 0.4, 0.12], [0.3, 0.0, 1.0]), np.empty((0, 3))
-    force, height = Quantized(PerfectSensors(), 0.25, 0.125).measure(own, seen)
+    seen = show([0.3, 0.4, 0.12], [0.3, 0.0, 1.0])
+    force, height = Quantized(PerfectSensors(), 0.25, 0.125).measure(seen, 0)
     # Steps that are powers of two: not even a rounding error is allowed.
     assert force.tolist() == [0.25, 0.5, 0.0]
     assert height.tolist() == [0.25, 0.0, 1.0]
-    assert Quantized(PerfectSensors(), 0.0, 0.125).measure(own, seen)[0] is seen.force
+    assert Quantized(PerfectSensors(), 0.0, 0.125).measure(seen, 0)[0] is seen.force
     sensors = assemble(sample("slow_press", "sensors.force_noise=5 mN", "sensors.force_step=1 mN")).sensors
-    force, _ = sensors.measure(np.empty((0, 9)), truth(1, [0.02] * 9, [0.04] * 9))
+    force, _ = sensors.measure(show([0.02] * 9, [0.04] * 9), 1)
     np.testing.assert_array_equal(force, np.rint(force / 1e-3) * 1e-3)
     assert np.unique(force).size > 3
 
@@ -107,32 +125,32 @@ def test_no_force_reads_above_the_floor_of_five_standard_deviations_and_half_a_s
     floor = Sensing(force_noise=1.0, force_step=step).force_floor
     assert (floor, Sensing(force_step=step).force_floor) == (pytest.approx(5.0 + step / 2, abs=1e-12), 0.0)
     sensors = Quantized(Noisy(PerfectSensors(), 1.0, 0.0, 5), step, 0.0)
-    nothing = (truth(period, [0.0] * CELLS, [0.04] * CELLS) for period in range(PERIODS))
-    read = max(float(sensors.measure(np.empty((0, CELLS)), seen)[0].max()) for seen in nothing)
+    nothing = show([0.0] * CELLS, [0.04] * CELLS)
+    read = max(float(sensors.measure(nothing, period)[0].max()) for period in range(PERIODS))
     # 200 000 readings: one in 3.5 million would be above.
     assert read < floor
 
 
-def readings(sensors: Sensors, truths: Sequence[Truth], skipped: Sequence[int] = ()) -> Floats:
-    """Return what is read of cell 0, (t, 2), where it takes no part in some periods."""
+def readings(sensors: Sensors, truths: Sequence[tuple[float, float]], skipped: Sequence[int] = ()) -> Floats:
+    """Return what is read of cell 0, (t, 2), with forces and heights, where some periods leave it out."""
     own, read = np.zeros((sensors.rows, 1)), []
-    for seen in truths:
-        if seen.period and seen.period not in skipped:
-            sensors.update(own, seen)
+    for period, (force, height) in enumerate(truths):
+        seen = show([force], [height])._replace(sensed=own)
+        if period and period not in skipped:
+            sensors.note(seen, period)
         before = own.copy()
-        read.append([float(one[0]) for one in sensors.measure(own, seen)])
+        read.append([float(one[0]) for one in sensors.measure(seen, period)])
         np.testing.assert_array_equal(own, before)
     return np.array(read)
 
 
-RAMP = [truth(i, [0.1 * i], [40e-3 + 1e-3 * i]) for i in range(9)]
+RAMP = [(0.1 * i, 40e-3 + 1e-3 * i) for i in range(9)]
 
 
 @pytest.mark.parametrize("late", [1, 2, 4, 5])
 def test_readings_are_late_by_whole_periods_and_begin_with_that_of_the_start(late: int) -> None:
     read = readings(Delayed(PerfectSensors(), late, 40e-3), RAMP)
-    expected = [[seen.force[0], seen.height[0]] for seen in RAMP]
-    assert read.tolist() == [[0.0, 40e-3]] * late + expected[:-late]
+    assert read.tolist() == [[0.0, 40e-3]] * late + [list(true) for true in RAMP[:-late]]
 
 
 @pytest.mark.parametrize("late", [1, 3])
@@ -141,7 +159,7 @@ def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(lat
     level, truths = 40e-3, []
     for i in range(20):
         level += 0.0 if i in gap or i == 0 else 1e-3 * i
-        truths.append(truth(i, [0.0], [level]))
+        truths.append((0.0, level))
     sensors = Delayed(Noisy(PerfectSensors(), 1e-3, 1e-5, 2), late, 40e-3)
     np.testing.assert_array_equal(readings(sensors, truths, gap), readings(sensors, truths))
 
@@ -200,8 +218,8 @@ def watched(known: Scene, command_in: Callable[[int], float], count: int = 120) 
 def sensed(system: System, state: State) -> float:
     """Return the force the sensors read of the pin, N; they get no true force to look at."""
     own = np.array([state.row(row) for row in range(system.rows.count)[system.rows.sensed]])
-    hidden = Truth(np.arange(1), state.period, np.array([np.nan]), state.row(0), np.zeros(1))
-    return float(system.sensors.measure(own, hidden)[0][0])
+    hidden = show([np.nan], state.row(0))._replace(sensed=own)
+    return float(system.sensors.measure(hidden, state.period)[0][0])
 
 
 def pulled_down(period: int) -> float:
@@ -326,9 +344,9 @@ def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_
         own, level, after = np.zeros((sensors.rows, 1)), 40e-3, []
         for period, now in enumerate(command[1:], 1):
             level += 1e-5 * now
-            seen = Truth(np.arange(1), period, np.zeros(1), np.array([level]), np.array([now]))
             if period not in skipped:
-                sensors.update(own, seen)
+                seen = show([0.0], [level])._replace(command=np.array([now]), sensed=own)
+                sensors.note(seen, period)
             if period > max(gap):
                 after.append(own.copy())
         results.append(np.array(after))

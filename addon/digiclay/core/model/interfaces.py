@@ -8,10 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, Protocol
 
 from ..base.arrays import Floats
 from .control_interface import Measurement
@@ -85,44 +82,21 @@ class Pulp(Protocol):
 
 
 class Sensors(Protocol):
-    """Measured forces and heights for the controller; `own` are their state rows."""
+    """Measured forces and heights for the controller, of cells as they are after so many control periods."""
 
     @property
     def rows(self) -> int: ...
 
-    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
-        """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is."""
-
-    def update(self, own: Floats, truth: Truth) -> None:
-        """Bring `own`, (rows, m), up to date, in place, with what there is at the end of a period."""
+    def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
+        """Return measured forces, N, and heights, m, shape (m,); `seen.sensed` stays as it is."""
 
     def read(self, seen: Measurement, period: int) -> Measurement:
-        """Return cells, as they are after so many control periods, with measured forces and heights."""
-        force, height = self.measure(seen.sensed, find_truth(seen, period))
+        """Return cells with measured forces and heights."""
+        force, height = self.measure(seen, period)
         return seen._replace(force=force, height=height)
 
     def note(self, seen: Measurement, period: int) -> None:
-        """Bring the sensors' rows of cells up to date, in place."""
-        self.update(seen.sensed, find_truth(seen, period))
-
-
-class Truth(NamedTuple):
-    """True quantities of some cells between two control periods."""
-
-    cells: NDArray[np.intp]
-    """(m,)."""
-    period: int
-    """Number of control periods done."""
-    force: Floats
-    height: Floats
-    """(m,): N, m."""
-    command: Floats
-    """(m,): Valve command of the period before."""
-
-
-def find_truth(seen: Measurement, period: int) -> Truth:
-    """Return what there is to be measured of some cells."""
-    return Truth(seen.cells, period, seen.force, seen.height, seen.command)
+        """Bring `seen.sensed` up to date, in place, at the end of a period."""
 
 
 class Stepper(Protocol):

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..base.arrays import Floats
 from .control_interface import Commands, Measurement
 from .delay import Queue
-from .interfaces import Sensors, Truth
+from .interfaces import Sensors
 
 
+@dataclass(frozen=True)
 class InstantValve:
     """No valve lag: the opening is the command."""
 
@@ -37,12 +38,13 @@ class InstantValve:
         """Nothing to settle."""
 
 
+@dataclass(frozen=True)
 class Unrelaxed:
     """No relaxation: the pulp is elastic."""
 
     rows = 0
-    rates: Floats = np.empty((0, 1))
-    shares: Floats = np.empty(0)
+    rates: ClassVar[Floats] = np.empty((0, 1))
+    shares: ClassVar[Floats] = np.empty(0)
 
     def relaxed(self, own: Floats) -> float:
         """Return no loss of force."""
@@ -70,12 +72,9 @@ class PerfectSensors(Sensors):
 
     rows = 0
 
-    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
-        """Return what is there."""
-        return truth.force, truth.height
-
-    def update(self, own: Floats, truth: Truth) -> None:
-        """Nothing to remember."""
+    def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
+        """Return the true ones."""
+        return seen.force, seen.height
 
     def read(self, seen: Measurement, period: int) -> Measurement:
         """Return the cells as they are."""

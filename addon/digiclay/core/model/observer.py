@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from ..base.arrays import Floats, apply_map
+from .control_interface import Measurement
 from .delay import Queue
-from .interfaces import Sensors, Truth
+from .interfaces import Sensors
 from .physics import Cell
 
 #: Root mean square opening in a control period below which a valve counts as shut: through it
@@ -54,29 +55,26 @@ class ValveObserver(Sensors):
         """State rows: estimate, periods known (0: none), the height then, opening, commands on their way."""
         return 3 + self.cell.lag.rows + self.length
 
-    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+    def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
         """Return the estimated forces, and the heights as the inner sensors read them."""
-        return own[0], self._height(truth)
+        return seen.sensed[0], self.inner.measure(seen, period)[1]
 
-    def update(self, own: Floats, truth: Truth) -> None:
+    def note(self, seen: Measurement, period: int) -> None:
         """Follow the valve through the period, and estimate the force where it was open."""
+        own = seen.sensed
         # The reading before this one, made again: the cell has not changed while it took no part.
         former = np.where(own[1] > 0.0, own[2], self.cell.actuator.rest_height)
-        before = self._height(Truth(truth.cells, truth.period - 1, truth.force, former, truth.command))
-        after = self._height(truth)
+        _, before = self.inner.measure(seen._replace(height=former), period - 1)
+        _, after = self.inner.measure(seen, period)
         commands, lag = own[3 + self.cell.lag.rows :], own[3 : 3 + self.cell.lag.rows]
         commands[:-1] = commands[1:]
-        commands[-1] = truth.command
+        commands[-1] = seen.command
         opening = apply_map(self.response, own[3:])
         own[0] = self._estimate(opening[:-1], before, after, own[0])
         if lag.shape[0]:
             lag[:] = opening[-1]
             self.cell.lag.settle(lag)
-        own[1], own[2] = truth.period + 1, truth.height
-
-    def _height(self, truth: Truth) -> Floats:
-        """Return the heights as the inner sensors read them."""
-        return self.inner.measure(np.empty((0, *truth.cells.shape)), truth)[1]
+        own[1], own[2] = period + 1, seen.height
 
     def _estimate(self, opening: Floats, before: Floats, after: Floats, last: Floats) -> Floats:
         """Return the forces, N, from openings (nodes, m[, b]) and the heights before and after, m."""

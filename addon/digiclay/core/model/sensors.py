@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from .interfaces import Sensors, Truth
+from .control_interface import Measurement
+from .interfaces import Sensors
 
 Words = NDArray[np.uint64]
 
@@ -28,8 +29,8 @@ SURE = 5.0
 FINEST = 1e-12
 #: Odd constants of the 64-bit mixer SplitMix64 (Steele, Lea and Flood 2014).
 WEYL, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
-#: Control periods whose noise is drawn at once.
-AHEAD = 16
+#: Control periods whose noise is drawn at once: one set of cells serves for so many, less one.
+AHEAD = 33
 
 
 @dataclass(frozen=True)
@@ -89,20 +90,20 @@ class Sensing(Parameters):
                 raise ParameterError("Sensing", name, rule, f"{getattr(self, name):g} N")
 
 
-def draw_normals(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Return two independent standard normal numbers a cell, a pure function of the arguments.
+def draw_polar(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Return a radius and an angle a cell, a pure function of the arguments.
 
     A counter is hashed instead of drawing from a generator: what a cell reads does not depend
-    on which others are read, nor on what was read before. The numbers, ([t,] m[, b]) for seeds (b,),
-    periods (t,) and cells (m[, b]), are Box and Muller's; none is farther from 0 than 8.6.
+    on which others are read, nor on what was read before. The numbers are ([t,] m[, b]) for seeds (b,),
+    periods (t,) and cells (m[, b]). Radius times cosine and sine are two independent standard normal numbers
+    (Box and Muller); none is farther from 0 than 8.6.
     """
     periods = np.asarray(period, np.uint64)
     start = _mix(np.array(seed, np.uint64, ndmin=1))
     start = _mix(start + periods.reshape(*periods.shape, *[1] * cells.ndim))
     counter = start + np.uint64(WEYL) * (2 * cells.astype(np.uint64))
     radius = np.sqrt(-2.0 * np.log(_draw_uniform(counter)))
-    angle = 2.0 * np.pi * _draw_uniform(counter + np.uint64(WEYL))
-    return radius * np.cos(angle), radius * np.sin(angle)
+    return radius, 2.0 * np.pi * _draw_uniform(counter + np.uint64(WEYL))
 
 
 def _mix(words: Words) -> Words:
@@ -129,16 +130,23 @@ class NoiseAhead:
 
     def __init__(self, seed: Any, *deviations: Any) -> None:
         self._seed, self._deviations, self._first = seed, deviations, 0
-        self._cells, self._drawn = np.empty(0, np.intp), np.empty((2, 0, 0))
+        self._cells: NDArray[np.intp] = np.empty(0, np.intp)
+        self._drawn: list[Floats | None] = []
 
-    def draw(self, period: int, cells: NDArray[np.intp]) -> Floats:
-        """Return the noise of forces, N, and heights, m, in a period, shape (2, m[, b])."""
+    def draw(self, period: int, cells: NDArray[np.intp]) -> list[Floats | None]:
+        """Return the noise of forces, N, and heights, m, in a period, (m[, b]) each; None: there is none."""
         late, count = period - self._first, len(cells)
-        if not 0 <= late < self._drawn.shape[1] or cells.tobytes() != self._cells[:count].tobytes():
-            self._first, self._cells, late = period, cells.copy(), 0
-            normals = draw_normals(self._seed, period + np.arange(AHEAD), cells)
-            self._drawn = np.array([by * each for by, each in zip(self._deviations, normals, strict=True)])
-        return self._drawn[:, late, :count]
+        known = bool(self._drawn) and cells.tobytes() == self._cells[:count].tobytes()
+        if not (known and 0 <= late < AHEAD):
+            # The leading part of the cells is read before all of them.
+            self._first, self._cells, late = period, self._cells if known else cells.copy(), 0
+            radius, angle = draw_polar(self._seed, period + np.arange(AHEAD), self._cells)
+            turns: tuple[np.ufunc, ...] = np.cos, np.sin
+            self._drawn = [
+                by * (radius * turn(angle)) if np.any(by) else None
+                for by, turn in zip(self._deviations, turns, strict=True)
+            ]
+        return [noise if noise is None else noise[late, :count] for noise in self._drawn]
 
 
 @dataclass(frozen=True)
@@ -152,9 +160,9 @@ class Stateless(Sensors):
         """State rows a cell needs: those of the inner sensors."""
         return self.inner.rows
 
-    def update(self, own: Floats, truth: Truth) -> None:
+    def note(self, seen: Measurement, period: int) -> None:
         """Bring the rows of the inner sensors up to date."""
-        self.inner.update(own, truth)
+        self.inner.note(seen, period)
 
 
 @dataclass(frozen=True)
@@ -166,11 +174,14 @@ class Noisy(Stateless):
     """Standard deviations, N and m."""
     seed: int
 
-    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+    def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
         """Return forces and heights with noise; a force may read below 0."""
-        force, height = self.inner.measure(own, truth)
-        of_force, of_height = self._ahead.draw(truth.period, truth.cells)
-        return force + of_force, height + of_height
+        force, height = self.inner.measure(seen, period)
+        of_force, of_height = self._ahead.draw(period, seen.cells)
+        return (
+            force if of_force is None else force + of_force,
+            height if of_height is None else height + of_height,
+        )
 
     @cached_property
     def _ahead(self) -> NoiseAhead:
@@ -186,9 +197,9 @@ class Quantized(Stateless):
     height: float
     """Steps, N and m."""
 
-    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+    def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
         """Return rounded forces and heights."""
-        force, height = self.inner.measure(own, truth)
+        force, height = self.inner.measure(seen, period)
         return _round_to_step(force, self.force), _round_to_step(height, self.height)
 
 
@@ -219,38 +230,39 @@ class Delayed(Sensors):
         """State rows: periods read (0: none), force and height then, the readings on their way, the inner."""
         return 3 + 2 * (self.periods + 1) + self.inner.rows
 
-    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+    def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
         """Return the readings made `periods` ago."""
-        force, height = self._read(own, truth.cells, max(truth.period - self.periods, 0))
+        force, height = self._read(seen, max(period - self.periods, 0))
         return force, height
 
-    def update(self, own: Floats, truth: Truth) -> None:
+    def note(self, seen: Measurement, period: int) -> None:
         """Make up for the readings a cell has missed, and take new ones."""
-        for period in range(max(truth.period - self.periods, 0), truth.period):
-            own[self._slot(period)] = self._read(own, truth.cells, period)
-        inner = own[self._inner]
-        self.inner.update(inner, truth)
-        own[self._slot(truth.period)] = self.inner.measure(inner, truth)
-        own[0] = truth.period + 1
-        own[1], own[2] = truth.force, truth.height
+        own = seen.sensed
+        for missed in range(max(period - self.periods, 0), period):
+            own[self._slot(missed)] = self._read(seen, missed)
+        inner = self._show_inner(seen)
+        self.inner.note(inner, period)
+        own[self._slot(period)] = self.inner.measure(inner, period)
+        own[0] = period + 1
+        own[1], own[2] = seen.force, seen.height
 
-    @property
-    def _inner(self) -> slice:
-        """Rows of the inner sensors."""
-        return slice(self.rows - self.inner.rows, None)
+    def _show_inner(self, seen: Measurement) -> Measurement:
+        """Return cells with the rows of the inner sensors."""
+        return seen._replace(sensed=seen.sensed[self.rows - self.inner.rows :])
 
     def _slot(self, period: int) -> slice:
         """Rows that hold the readings of a period."""
         first = 3 + 2 * (period % (self.periods + 1))
         return slice(first, first + 2)
 
-    def _read(self, own: Floats, cells: NDArray[np.intp], period: int) -> Floats:
+    def _read(self, seen: Measurement, period: int) -> Floats:
         """Return force and height read in a period, shape (2, m[, b])."""
+        own = seen.sensed
         stored: Floats = own[self._slot(period)]
         missed = own[0] <= period
         if not missed.any():
             return stored
         height = np.where(own[0] > 0.0, own[2], self.rest)
         # A cell that takes no part has its valve shut and nothing on its way to it.
-        still = Truth(cells, period, own[1], height, np.zeros(cells.shape))
-        return np.where(missed, self.inner.measure(own[self._inner], still), stored)
+        still = self._show_inner(seen)._replace(force=own[1], height=height, command=np.zeros_like(height))
+        return np.where(missed, self.inner.measure(still, period), stored)
