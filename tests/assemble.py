@@ -104,7 +104,6 @@ class Scripted:
     script: Callable[[float, Floats, Floats], Any]
     period: float
 
-    name = "scripted"
     rows = 0
 
     def begin(self) -> int:

@@ -145,7 +145,6 @@ class Everywhere:
 
     inner: Controller
 
-    name = "everywhere"
     rows = 0
 
     def begin(self) -> Any:

@@ -101,7 +101,6 @@ class SpongeControl(CellwiseControl):
 
     parameters: Sponge
 
-    name = "sponge"
     rows = 1
 
     def command(self, memory, seen):

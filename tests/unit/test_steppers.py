@@ -113,8 +113,9 @@ def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper
     cases = [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)]
     exponent, lift, bow, deepest = np.array(cases).T
     one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
-    start = StepStart(np.ones((1, 4)), weights, exponent, 9.0 * one, bow, lift, relaxed=one, idle=loaded)
-    rise = find_loaded_path(one_cell().cell, 2000.0, 1e6, 1.0, start).rise
+    cell, openings = one_cell().cell, np.ones((1, 4))
+    start = StepStart(cell, openings, weights, exponent, 9.0 * one, bow, lift, relaxed=one, idle=loaded)
+    rise, _, _ = find_loaded_path(2000.0, 1e6, 1.0, start)
     np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
 
 
@@ -125,7 +126,6 @@ class Setter(Explicit):
     height: float | None
     ways: tuple[float, ...] = ()
 
-    name = "setter"
     order = 1
     nodes = (0.0, 1.0)
 

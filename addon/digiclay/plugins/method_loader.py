@@ -199,9 +199,8 @@ PACKAGE = __package__.rpartition(".")[0]
 
 @dataclass(frozen=True, kw_only=True)
 class OwnRow(Method):
-    """Method of one's own: its name in scene files, and the class of its parameters, which builds it."""
+    """Method of one's own: the class of its parameters, which builds it."""
 
-    name: str
     kind: type[ControlParameters]
     source: MethodSource
 
@@ -212,7 +211,7 @@ class OwnRow(Method):
     def build(self, parameters: Any, device: Any) -> Guarded:
         """Return its controller for a device, guarded; MethodError when that cannot be built."""
         source, own = self.source, copy.deepcopy(device)  # whatever it does to it, the bed's is another
-        return guard(lambda: parameters.build(own), self.name, source.label, source.file, own.period)
+        return guard(lambda: parameters.build(own), source.label, source.file, own.period)
 
 
 def load_method(word: str) -> str:
@@ -258,7 +257,7 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     row = OwnRow(
         module=source.module, parameters=kind.__name__, blister=None if blister is None else dict(blister),
         recovers=bool(getattr(kind, "recovers", False)), by_set=True, digest=source.digest,
-        name=name, kind=kind, source=source,
+        kind=kind, source=source,
     )  # fmt: skip
 
     def reduce(parameters: ControlParameters) -> tuple[Callable[..., Any], tuple[Any, ...]]:

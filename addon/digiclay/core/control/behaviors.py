@@ -42,8 +42,6 @@ class ElasticControl(CellwiseControl):
 
     parameters: Elastic
 
-    name = "elastic"
-
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Let pressed cells give way, and the others spring back; see `Controller`."""
         gains, rest = self.parameters, self.actuator.rest_height
@@ -81,8 +79,6 @@ class PlasticControl(CellwiseControl):
     """
 
     parameters: Plastic
-
-    name = "plastic"
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Let cells give way that are pressed beyond yield, hold the others; see `Controller`."""
@@ -158,7 +154,6 @@ class ViscousControl:
     margin: float
     """How far beyond the displaced cells cells take part, m."""
 
-    name = "viscous"
     rows = 0
 
     def begin(self) -> Spot:

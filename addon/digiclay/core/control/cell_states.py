@@ -152,7 +152,6 @@ class CellStatesControl:
     floor: float = 0.0
     """Force from which on the reading of a cell is no noise, N."""
 
-    name = "cell_states"
     #: A cell remembers how many periods it has been critical.
     rows = 1
 

@@ -130,7 +130,6 @@ class ForceDisplayControl(CellwiseControl):
     period: float
     field: Floats
 
-    name = "force_display"
     rows = 1
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
@@ -242,7 +241,6 @@ class ShapeDisplayControl:
     whole: Disc
     """That holds the bed, m."""
 
-    name = "shape_display"
     rows = 0
 
     def begin(self) -> Progress:
@@ -329,11 +327,6 @@ class Handover:
     raised: Floats | None
     """(n,): Heights of the shape above the bed at rest, m, for a method whose cells go back to rest: it sees
     the bed without them, so that the shape is what its cells go back to."""
-
-    @property
-    def name(self) -> str:
-        """The method's name; the display's where there is none."""
-        return self.method.name if self.method else self.display.name
 
     @property
     def rows(self) -> int:

@@ -1,9 +1,9 @@
 """Extended Kalman filter of the fingertip: position, velocity, size and elongation, from the undersides.
 
 The state is x, y, z of the lowest point, m; their velocities, m/s; the logarithm of the fingertip's size over
-the known one; its elongation along x and along the diagonal (`level_fingertip`). The last three are the
-curvatures of the underside at the lowest point, which take in errors of the model: a pulp that is stiffer
-than known makes the fingertip look flatter, that is larger; a fingertip too long, or tilted, is elongated.
+the known one; its elongation along x and along the diagonal. The last three are the curvatures of the
+underside at the lowest point, which take in errors of the model: a pulp that is stiffer than known makes the
+fingertip look flatter, that is larger; a fingertip too long, or tilted, is elongated.
 The basis of cells are rows 1, x, y, x², x y, y², (6, m).
 """
 
@@ -59,57 +59,6 @@ class _Profile(NamedTuple):
         k = math.exp(size)
         mean, slope, bend, lowest, least, root = self
         return _Profile(mean / (k * k), k * slope, k * bend, k * lowest, k * least, math.sqrt(k) * root)
-
-
-@dataclass(frozen=True, eq=False)
-class LevelFingertip:
-    """Known fingertip, level."""
-
-    fingertip: Fingertip
-
-    @cached_property
-    def elongation(self) -> float:
-        """Elongation n of the known fingertip, below 0 where it is wider than long."""
-        length, width = self.fingertip.length**2, self.fingertip.width**2
-        return (length - width) / (length + width)
-
-    @cached_property
-    def _profile(self) -> _Profile:
-        """What the underside is computed with."""
-        outline = self.fingertip.outline(np.array([[0.0, 0.0, 0.0, *LEVEL]]))
-        (inner, tangent), join = compute_forms(outline)
-        bend, (least, root) = inner[0], join.ravel()
-        lowest = (math.sqrt(bend) - root) ** 2
-        mean, slope = 0.5 * (outline[0, 3] + outline[0, 5]), tangent[3] / outline[0, 3]
-        return _Profile(*map(float, (mean, slope, bend, lowest, least, root)))
-
-    def find_underside(self, place: Place, basis: Floats) -> Floats:
-        """Return the underside over cells, (m,), m."""
-        profile = self._profile.resize(place.size)
-        surfaces = _list_surfaces(profile, place, _find_radius(profile, place))
-        inner, tangent = np.array(surfaces).dot(basis)
-        return join_surfaces(inner, tangent, profile.least, profile.root)
-
-    def measure(self, place: Place, basis: Floats) -> Slopes:
-        """Return the underside over cells, with its slopes."""
-        profile = self._profile.resize(place.size)
-        radius = _find_radius(profile, place)
-        rows = np.empty((8, basis.shape[1]))
-        forms = (*_list_surfaces(profile, place, radius), *_list_slopes(profile, place, radius))
-        np.array(forms).dot(basis, out=rows[:7])
-        under, tangent, slopes = rows[0], rows[1], rows[2:]
-        bend = np.sqrt(np.maximum(under, profile.least))
-        join_surfaces(under, tangent, profile.least, profile.root)
-        # h'(q) of each cell: what the slopes of q are to be multiplied with.
-        np.divide(profile.bend * profile.root, bend, out=bend)
-        bend += profile.slope - profile.bend
-        by_form, by_size = slopes[:5], slopes[0]
-        by_form *= bend
-        # With the size h grows, while q shrinks.
-        by_size += under
-        by_size -= place.z
-        slopes[5] = 1.0
-        return Slopes(under, slopes)
 
 
 def _find_radius(profile: _Profile, place: Place) -> Form:
@@ -212,7 +161,9 @@ class FingerFilter:
             noise[place, speed] = noise[speed, place] = strength * time / 2.0
             noise[speed, speed] = strength
         noise[6, 6] = spread.size**2 * time
-        noise[7, 7] = noise[8, 8] = (2.0 * spread.turn * max(abs(self._level.elongation), LEAST)) ** 2 * time
+        length, width = self.fingertip.length**2, self.fingertip.width**2
+        elongation = abs(length - width) / (length + width)
+        noise[7, 7] = noise[8, 8] = (2.0 * spread.turn * max(elongation, LEAST)) ** 2 * time
         return step, noise
 
     def correct(self, guess: Estimate, at: Slopes, seen: Floats, variance: Floats) -> tuple[Estimate, Floats]:
@@ -239,16 +190,43 @@ class FingerFilter:
     def measure(self, mean: Floats, basis: Floats) -> Slopes:
         """Return the undersides of a fingertip of an estimated state, (9,), over cells, with their slopes."""
         x, y, z, _, _, _, *shape = mean.tolist()
-        return self._level.measure(Place(x, y, z, *shape), basis)
+        place = Place(x, y, z, *shape)
+        profile = self._profile.resize(place.size)
+        radius = _find_radius(profile, place)
+        rows = np.empty((8, basis.shape[1]))
+        forms = (*_list_surfaces(profile, place, radius), *_list_slopes(profile, place, radius))
+        np.array(forms).dot(basis, out=rows[:7])
+        under, tangent, slopes = rows[0], rows[1], rows[2:]
+        bend = np.sqrt(np.maximum(under, profile.least))
+        join_surfaces(under, tangent, profile.least, profile.root)
+        # h'(q) of each cell: what the slopes of q are to be multiplied with.
+        np.divide(profile.bend * profile.root, bend, out=bend)
+        bend += profile.slope - profile.bend
+        by_form, by_size = slopes[:5], slopes[0]
+        by_form *= bend
+        # With the size h grows, while q shrinks.
+        by_size += under
+        by_size -= z
+        slopes[5] = 1.0
+        return Slopes(under, slopes)
 
-    def find_underside(self, place: tuple[float, float, float], like: Estimate, basis: Floats) -> Floats:
+    def find_underside(self, aim: tuple[float, float, float], like: Estimate, basis: Floats) -> Floats:
         """Return the underside over cells, (m,), m, of a fingertip like the estimated one at a place, m."""
-        return self._level.find_underside(Place(*place, *like.mean.tolist()[6:]), basis)
+        place = Place(*aim, *like.mean.tolist()[6:])
+        profile = self._profile.resize(place.size)
+        surfaces = _list_surfaces(profile, place, _find_radius(profile, place))
+        inner, tangent = np.array(surfaces).dot(basis)
+        return join_surfaces(inner, tangent, profile.least, profile.root)
 
     @cached_property
-    def _level(self) -> LevelFingertip:
-        """Underside of the known fingertip."""
-        return LevelFingertip(self.fingertip)
+    def _profile(self) -> _Profile:
+        """Underside of the known fingertip, level."""
+        outline = self.fingertip.outline(np.array([[0.0, 0.0, 0.0, *LEVEL]]))
+        (inner, tangent), join = compute_forms(outline)
+        bend, (least, root) = inner[0], join.ravel()
+        lowest = (math.sqrt(bend) - root) ** 2
+        mean, slope = 0.5 * (outline[0, 3] + outline[0, 5]), tangent[3] / outline[0, 3]
+        return _Profile(*map(float, (mean, slope, bend, lowest, least, root)))
 
 
 def invert_six(matrix: Floats) -> Floats:

@@ -156,8 +156,6 @@ class HybridControl:
     substitute: VirtualMasterControl
     """Method I, for a fingertip that the model does not predict."""
 
-    name = "hybrid"
-
     @cached_property
     def farthest(self) -> float:
         """Distance from the predicted place beyond which a touch is a new one, m."""

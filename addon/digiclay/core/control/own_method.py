@@ -124,8 +124,6 @@ class OwnControl:
     device: DeviceInfo
     drive: Drive
 
-    name = "own"
-
     @property
     def rows(self) -> int:
         """State rows a cell needs."""
@@ -240,10 +238,9 @@ class Guarded:
     """Controller that hands on to another one, and checks what that gives."""
 
     inner: Controller
-    name: str
     origin: str
     file: str
-    """Of the method in scene files; file and class, for messages; file as tracebacks have it."""
+    """File and class, for messages; file as tracebacks have it."""
     period: float
     rows: int
     """Control period, s; state rows a cell needs."""
@@ -308,7 +305,7 @@ class Guarded:
             raise MethodError(f"{self.origin}: {function} {describe_failure(error, self.file)}.") from error
 
 
-def guard(build: Any, name: str, origin: str, file: str, period: float) -> Guarded:
+def guard(build: Any, origin: str, file: str, period: float) -> Guarded:
     """Build a controller of unknown code, and guard it."""
     try:
         inner = build()
@@ -322,7 +319,7 @@ def guard(build: Any, name: str, origin: str, file: str, period: float) -> Guard
         raise
     except BaseException as error:
         raise MethodError(f"{origin}: build {describe_failure(error, file)}.") from error
-    return Guarded(inner, name, origin, file, period, rows)
+    return Guarded(inner, origin, file, period, rows)
 
 
 def describe_failure(error: BaseException, file: str) -> str:

@@ -81,7 +81,6 @@ class PushPullControl:
     period: float
     margin: float
 
-    name = "push_pull"
     rows = 2
 
     def begin(self) -> Listening:

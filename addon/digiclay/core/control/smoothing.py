@@ -61,11 +61,6 @@ class SmoothingControl:
     """From 0 to 1."""
 
     @property
-    def name(self) -> str:
-        """The method's name."""
-        return self.method.name
-
-    @property
     def rows(self) -> int:
         """State rows a cell needs."""
         return self.method.rows

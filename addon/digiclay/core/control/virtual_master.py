@@ -220,8 +220,6 @@ class VirtualMasterControl(BatchControl):
     ground: EdgeGround | OwnGround = GROUNDS["edge"]
     """Surface from which the blister rises."""
 
-    name = "virtual_master"
-
     @property
     def rows(self) -> int:
         """State rows a cell needs."""

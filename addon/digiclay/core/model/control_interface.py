@@ -49,9 +49,6 @@ class Controller(Protocol):
     """Control method with its parameters; its memory is an argument and a result."""
 
     @property
-    def name(self) -> str: ...
-
-    @property
     def rows(self) -> int:
         """State rows a cell needs."""
 

@@ -87,7 +87,6 @@ class PerfectSensors(Sensors):
 class Uncontrolled:
     """No control method: every valve stays shut."""
 
-    name = "none"
     rows = 0
 
     def begin(self) -> None:

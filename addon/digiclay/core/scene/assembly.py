@@ -153,7 +153,7 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
     controller: Controller | None = None
     if scene.control:
         controller = find_method(scene.method).build(scene.control, device)
-    if scene.shape and not (controller and controller.name == "shape_display"):
+    if scene.shape and not (controller and scene.method == "shape_display"):
         from ..control.displays import make_handover
 
         recovers = find_method(scene.method).recovers

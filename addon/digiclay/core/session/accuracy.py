@@ -81,7 +81,6 @@ class Replay:
     grid: Grid
     commands: Floats
 
-    name = "replay"
     rows = 0
 
     @cached_property

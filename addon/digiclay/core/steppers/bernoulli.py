@@ -24,7 +24,7 @@ from ..model.delay import Queue
 from ..model.interfaces import Pulp, Segment
 from ..model.null_parts import Unrelaxed
 from ..model.physics import Cell
-from .closed_form import LARGE, TINY, LoadedPath, StepStart, find_loaded_path, solve_crossing, solve_pressed
+from .closed_form import LARGE, TINY, StepStart, find_loaded_path, solve_crossing, solve_pressed
 
 
 def _legendre(count: int) -> tuple[tuple[float, float], ...]:
@@ -381,7 +381,7 @@ class StepWorkspace:
 
     def _move_near_overflow(
         self, s: int, beyond: Flags, exponent: Floats, deviation: Floats, idle: Flags
-    ) -> LoadedPath:
+    ) -> tuple[Floats, Floats, Floats]:
         """Return the paths over step s, some of whose cells `solve_pressed` is not for."""
         plan, nodes, count = self.plan, self.plan.nodes[s], len(self.steps)
         # Their path bends with the load, not as it would without; or so much that its mean says nothing.
@@ -389,6 +389,7 @@ class StepWorkspace:
         openings = self.opening[nodes, : len(self.near)]
         weights = per_row(plan.weights[nodes], openings.ndim) / plan.cell.actuator.area
         start = StepStart(
+            plan.cell,
             openings,
             weights,
             exponent,
@@ -398,7 +399,7 @@ class StepWorkspace:
             relaxed=self.relaxed,
             idle=idle,
         )
-        return find_loaded_path(plan.cell, plan.numbers[0], plan.to_load, plan.shares[s], start)
+        return find_loaded_path(plan.numbers[0], plan.to_load, plan.shares[s], start)
 
 
 def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:

@@ -14,7 +14,7 @@ to push. ``u = exp(-e)`` obeys the linear equation ``du/ds = decay - growth u`` 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,9 +113,11 @@ def replace_zeros(values: Floats) -> Floats:
     return np.where(np.abs(values) < TINY, TINY, values)
 
 
-class StepStart(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class StepStart:
     """Conditions at the start of a step, for k cells, (k,), or for k cells of b runs, (k, b)."""
 
+    cell: Cell
     openings: Floats
     """(g, ..): Of the valves, at the step's Gauss points."""
     weights: Floats
@@ -133,28 +135,10 @@ class StepStart(NamedTuple):
     idle: NDArray[np.bool_]
     """Cells that it does not push at the start."""
 
-
-class LoadedPath(NamedTuple):
-    """Result of a step."""
-
-    rise: Floats
-    """Of the pin, m, but for its stops."""
-    end: Floats
-    """Exponent at the end."""
-    mean: Floats
-    """Mean of the tension over the step, in units of b/m."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Valve:
-    """Flow through the valves of a step."""
-
-    cell: Cell
-    openings: Floats
-    weights: Floats
-    """See `StepStart`."""
-    pressure: Floats
-    """At the far side of the valve, Pa."""
+    @cached_property
+    def pressure(self) -> Floats:
+        """Pressure at the far side of the valves, Pa."""
+        return self.cell.supply.pressure(self.openings)
 
     def conductance(self, load: Floats) -> Floats:
         """Return the secant conductance under a load, Pa, at each Gauss point."""
@@ -168,15 +152,15 @@ class _Valve:
 
 
 def find_loaded_path(
-    cell: Cell, m: Floats | float, to_load: Floats | float, share: float, start: StepStart
-) -> LoadedPath:
+    m: Floats | float, to_load: Floats | float, share: float, start: StepStart
+) -> tuple[Floats, Floats, Floats]:
     """Return the paths of cells over a step in which some of them are near overflow.
 
-    The contact's exponent m is in 1/m, the pressure `to_load` of a unit of tension in Pa; `share` is that of
-    the tension that pushes, the rest being lost to relaxation within the step.
+    It is the rise of the pin, m, but for its stops; the exponent at the end; and the mean of the tension over
+    the step, in units of b/m. The contact's exponent m is in 1/m, the pressure `to_load` of a unit of tension
+    in Pa; `share` is that of the tension that pushes, the rest being lost to relaxation within the step.
     """
-    valve = _Valve(cell, start.openings, start.weights, cell.supply.pressure(start.openings))
-    decay, free = _mid_load(valve, m, to_load * share, start)
+    decay, free = _mid_load(m, to_load * share, start)
     slip = m * free - start.lift
     exponent, idle = start.exponent, start.idle
     bent = exponent + start.deviation
@@ -187,19 +171,17 @@ def find_loaded_path(
     if crossing.any():
         parts = (values[crossing] for values in (exponent, start.deviation, slip, decay, start.relaxed))
         push[crossing], mean[crossing] = solve_crossing(*parts)
-    rise = _limit(valve, m, to_load, start, free + push / m)
-    return LoadedPath(rise, exponent + (m * rise - start.lift), mean)
+    rise = _limit(m, to_load, start, free + push / m)
+    return rise, exponent + (m * rise - start.lift), mean
 
 
-def _mid_load(
-    valve: _Valve, m: Floats | float, to_load: Floats | float, start: StepStart
-) -> tuple[Floats, Floats]:
+def _mid_load(m: Floats | float, to_load: Floats | float, start: StepStart) -> tuple[Floats, Floats]:
     """Return decay and free rise, m, with the conductance at the predicted load of mid step: second order."""
     grown = middle = _exponential(start.exponent)
     for _ in range(2):
-        conductance = valve.conductance(to_load * np.maximum(middle - start.relaxed, 0.0))
-        decay = m * to_load * (valve.weights * conductance).sum(axis=0) + TINY
-        free = (valve.weights * (conductance * valve.pressure)).sum(axis=0)
+        conductance = start.conductance(to_load * np.maximum(middle - start.relaxed, 0.0))
+        decay = m * to_load * (start.weights * conductance).sum(axis=0) + TINY
+        free = (start.weights * (conductance * start.pressure)).sum(axis=0)
         slip = m * free - start.lift
         push, _ = _press(start.exponent, slip, decay, start.relaxed)
         way = np.where(grown > start.relaxed, slip + push, slip)
@@ -212,21 +194,19 @@ def _press(exponent: Floats, slip: Floats, decay: Floats, relaxed: Floats) -> tu
     return solve_carefully(exponent, replace_zeros(slip + decay * relaxed), slip, decay, relaxed)
 
 
-def _limit(
-    valve: _Valve, m: Floats | float, to_load: Floats | float, start: StepStart, rise: Floats
-) -> Floats:
+def _limit(m: Floats | float, to_load: Floats | float, start: StepStart, rise: Floats) -> Floats:
     """Return a rise, m, held within what the valve can do.
 
     Upwards that is the flow without load. Downwards it is the flow under the largest load there is; and no
     finger pushes a pin deeper than it comes, what the pin falls by itself aside.
     """
-    alone = valve.rises(0.0)
+    alone = start.rises(0.0)
     highest, fall = np.maximum(alone, 0.0).sum(axis=0), np.minimum(alone, 0.0).sum(axis=0)
     # Along the parabola of the fingertip's way, at its middle and its end.
     middle = 0.5 * start.lift + 1.5 * start.finger_deviation
     deepest = np.maximum(start.exponent - np.minimum(np.minimum(middle, start.lift), 0.0), 0.0)
     most = _exponential(deepest + m * highest)
-    pushed = np.minimum(valve.rises(to_load * (most - 1.0)), 0.0).sum(axis=0)
+    pushed = np.minimum(start.rises(to_load * (most - 1.0)), 0.0).sum(axis=0)
     lowest = np.maximum(pushed, fall - deepest / m)
     return np.minimum(np.maximum(rise, lowest), highest)
 
