@@ -20,13 +20,13 @@ from digiclay.core.metrics.force import (
     compute_mean,
     compute_rfd,
     compute_weights,
-    find_first_touch,
     find_weber_fractions,
     measure_amplitude,
     measure_frequency,
     measure_oscillation,
     measure_overshoot,
     measure_settling_time,
+    measure_touchdown,
     perceive,
 )
 from digiclay.core.metrics.metric_table import METRICS
@@ -196,7 +196,8 @@ def test_a_session_without_contact_has_no_rfd_lag_or_loss():
 
 
 def test_the_first_touch_overshoots_by_its_peak_and_settles_within_a_tenth_of_the_set_point():
-    assert find_first_touch(np.array([0.0, 0.0, 0.3, 0.5, 0.0, 0.4])) == slice(1, 4)
+    touched_twice = np.array([0.0, 0.0, 0.3, 0.5, 0.0, 0.9])
+    assert measure_touchdown(np.arange(6.0), touched_twice, np.full(6, 0.4)) == (pytest.approx(0.25), None)
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
     found = compute_metrics(history(total), WHOLE)
     assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)

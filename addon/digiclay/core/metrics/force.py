@@ -33,13 +33,16 @@ def compute_mean(values: Floats, weight: Floats) -> float | None:
     return float(np.sum(weight * values)) / total if total > 0.0 else None
 
 
+def compute_rms(values: Floats, weight: Floats) -> float | None:
+    """Return the weighted root mean square of values (t,), or None without any rows."""
+    square = compute_mean(values**2, weight)
+    return None if square is None else math.sqrt(square)
+
+
 def compute_deviation(values: Floats, weight: Floats) -> float | None:
     """Return the weighted standard deviation about the weighted mean, or None without any rows."""
     middle = compute_mean(values, weight)
-    if middle is None:
-        return None
-    square = compute_mean((values - middle) ** 2, weight)
-    return None if square is None else float(np.sqrt(square))
+    return None if middle is None else compute_rms(values - middle, weight)
 
 
 def measure_overshoot(values: ArrayLike, target: float) -> float | None:
@@ -103,10 +106,7 @@ def measure_oscillation(
         below, above = (np.interp(t[inner] + side * window, t, area) for side in (-0.5, 0.5))
         off.append(y[inner] - (above - below) / window)
         weight.append(compute_weights(t)[inner])
-    if not off:
-        return None
-    square = compute_mean(np.concatenate(off) ** 2, np.concatenate(weight))
-    return None if square is None else float(np.sqrt(square))
+    return compute_rms(np.concatenate(off), np.concatenate(weight)) if off else None
 
 
 #: Force from which on the smaller Weber fractions hold, N.
@@ -164,8 +164,7 @@ def compute_rfd(
     force = np.asarray(total_force, dtype=np.float64)
     wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
     chosen = (find_contact_rows(force) if rows is None else rows) & ~np.isnan(wanted)
-    square = compute_mean((force - wanted)[chosen] ** 2, compute_weights(time)[chosen])
-    return None if square is None else float(np.sqrt(square))
+    return compute_rms((force - wanted)[chosen], compute_weights(time)[chosen])
 
 
 def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
@@ -187,16 +186,6 @@ def find_contact_ends(time: ArrayLike, total_force: ArrayLike) -> Floats:
     return ends[np.diff(ends, prepend=-np.inf) > BOUNCE]
 
 
-def find_first_touch(total_force: ArrayLike) -> slice:
-    """Return the rows from the last one before the first contact to the last one of that contact."""
-    touching = find_contact_rows(total_force)
-    if not np.any(touching):
-        return slice(0, 0)
-    start = int(np.argmax(touching))
-    gone = np.flatnonzero(~touching[start:])
-    return slice(max(0, start - 1), start + int(gone[0]) if gone.size else len(touching))
-
-
 def measure_touchdown(
     time: Floats, total_force: Floats, set_point: Floats
 ) -> tuple[float | None, float | None]:
@@ -204,9 +193,11 @@ def measure_touchdown(
 
     The set point is NaN in rows that ask for no force: in them it is not settled.
     """
-    first = find_first_touch(total_force)
-    if first.stop == first.start:
+    touches = find_stretches(find_contact_rows(total_force))
+    if not touches:
         return None, None
+    # From the last row before the first contact to the last one of that contact.
+    first = slice(max(0, touches[0].start - 1), touches[0].stop)
     beyond, wanted = total_force[first] - set_point[first], set_point[first]
     known = ~np.isnan(wanted)
     typical = compute_mean(wanted[known], compute_weights(time[first])[known])
