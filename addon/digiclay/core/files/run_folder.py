@@ -290,9 +290,9 @@ def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
 
 
 @contextmanager
-def write_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Path]:
+def write_folder(out: Path, *, overwrite: bool) -> Iterator[Path]:
     """Claim a folder and give one to write into, which becomes it: see `claim_folder` and `Claim.write`."""
-    with claim_folder(out, overwrite=overwrite, patience=patience) as claim, claim.write() as folder:
+    with claim_folder(out, overwrite=overwrite) as claim, claim.write() as folder:
         yield folder
 
 

@@ -42,7 +42,8 @@ class Motion:
 
 def make_motion(scene: Scene) -> Motion:
     """Build a scene's cells and the plan of their steps."""
-    stepper = _make_stepper(scene)
+    kind = import_part(*STEPPERS[scene.simulation.stepper])
+    stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
     period = scene.simulation.control_period
     lag = scene.valve_lag or InstantValve()
     cell = Cell(scene.actuator, _make_flow(scene), scene.supply, lag, _make_touch(scene))
@@ -87,13 +88,6 @@ def assemble(scene: Scene) -> System:
             (scene.sensors and scene.sensors.noisy) or (scene.control and find_method(scene.method).by_set)
         ),
     )
-
-
-def _make_stepper(scene: Scene) -> Stepper:
-    """Return how a period is integrated."""
-    kind = import_part(*STEPPERS[scene.simulation.stepper])
-    stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
-    return stepper
 
 
 def _make_flow(scene: Scene) -> Flow:

@@ -98,7 +98,7 @@ class HistoryWriter:
         self.count = count
         # Not filled: numpy gives memory that is to be filled later in large pages, of which the first
         # touch costs a quarter.
-        self._height, self._force, self._command = np.empty((3, count, cells))
+        self._felt, self._command = np.empty((2, count, cells)), np.empty((count, cells))
         self._mode = np.empty((count, cells), np.int8)
         self._now, self._mode_now = np.zeros((2, cells)), np.empty(cells, np.int8)
         self._done = self._given = 0
@@ -106,17 +106,14 @@ class HistoryWriter:
     def begin(self, height: Floats, mode: Modes) -> None:
         """Begin anew with heights and modes (n,) before a session, in which no force acts."""
         self._now[:], self._mode_now[:] = (height, np.zeros_like(height)), mode
-        self._height[0], self._force[0] = self._now
+        self._felt[:, 0] = self._now
         self._done, self._given = 1, 0
 
     def write(self, stretch: Stretch) -> None:
         """Write the next stretch of the session; a cell that takes no part stays as it was."""
         cells, felt = stretch.cells, slice(self._done, self._done + len(stretch.felt))
-        for array, now, values in zip(
-            (self._height, self._force), self._now, stretch.felt.swapaxes(0, 1), strict=True
-        ):
-            array[felt] = now
-            array[felt, cells] = values
+        self._felt[:, felt] = self._now[:, None]
+        self._felt[:, felt, cells] = stretch.felt.swapaxes(0, 1)
         given = slice(self._given, self._given + len(stretch.mode))
         self._command[given], self._mode[given] = 0.0, self._mode_now
         self._command[given, cells], self._mode[given, cells] = stretch.command, stretch.mode
@@ -129,12 +126,11 @@ class HistoryWriter:
         A session cut short between two rows, of `every` periods each, gets one more.
         """
         count = 1 - (-period // every)
-        self._height[count - 1], self._force[count - 1] = self._now
+        self._felt[:, count - 1] = self._now
         self._command[count - 1], self._mode[count - 1] = 0.0, self._mode_now
-        rows = {"period": np.minimum(np.arange(count) * every, period)}
-        for name in ("height", "force", "command", "mode"):
-            rows[name] = getattr(self, f"_{name}")[:count]
-        return rows
+        (height, force), command, mode = self._felt[:, :count], self._command[:count], self._mode[:count]
+        period_of_row = np.minimum(np.arange(count) * every, period)
+        return {"period": period_of_row, "height": height, "force": force, "command": command, "mode": mode}
 
 
 class RunRecording(Recording):

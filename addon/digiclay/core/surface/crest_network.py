@@ -193,26 +193,22 @@ def reaches_out(points: Floats, half: float, pitch: float) -> bool:
 
 def _merge(network: Network) -> None:
     """Make one junction of two that are no further apart than half the feature's width."""
-    merged = True
-    while merged:
-        merged = False
-        for number, branch in list(network.branches.items()):
-            one, two = branch.nodes
-            if one == two or min(len(network.ends(one)), len(network.ends(two))) < 3:
-                continue
-            if branch.length > max(network.half[one], network.half[two]):
-                continue
-            del network.branches[number]
-            network.position[one] = 0.5 * (network.position[one] + network.position[two])
-            network.half[one] = max(network.half[one], network.half[two])
-            for other in network.branches.values():
-                for end in (0, 1):
-                    if other.nodes[end] in (one, two):
-                        other.nodes[end] = one
-                        other.points = other.points.copy()
-                        other.points[-end] = network.position[one]
-            merged = True
-            break
+
+    def is_short(branch: Branch) -> bool:
+        one, two = branch.nodes
+        junctions = one != two and min(len(network.ends(one)), len(network.ends(two))) > 2
+        return junctions and branch.length <= max(network.half[one], network.half[two])
+
+    while short := [number for number, branch in network.branches.items() if is_short(branch)]:
+        one, two = network.branches.pop(short[0]).nodes
+        network.position[one] = 0.5 * (network.position[one] + network.position[two])
+        network.half[one] = max(network.half[one], network.half[two])
+        for branch in network.branches.values():
+            for end in (0, 1):
+                if branch.nodes[end] in (one, two):
+                    branch.nodes[end] = one
+                    branch.points = branch.points.copy()
+                    branch.points[-end] = network.position[one]
 
 
 def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:

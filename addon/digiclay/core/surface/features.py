@@ -282,9 +282,9 @@ def _nearer(region: Region, every: list[Ridge]) -> Floats:
 def _by_label(label: Faces) -> dict[int, Indices]:
     """Return for each label from 0 on where it stands, ascending."""
     order = np.argsort(label, kind="stable")
-    names, starts, counts = np.unique(label[order], return_index=True, return_counts=True)
-    every = zip(names.tolist(), starts.tolist(), counts.tolist(), strict=True)
-    return {name: order[start : start + count] for name, start, count in every if name >= 0}
+    names, starts = np.unique(label[order], return_index=True)
+    places = zip(names.tolist(), np.split(order, starts[1:]), strict=False)  # without labels, one of none
+    return {name: some for name, some in places if name >= 0}
 
 
 def make_table(features: list[Feature]) -> list[tuple[str, ...]]:
