@@ -1,7 +1,8 @@
-"""Files of a command beside the run folder; names of those that an interruption prevents."""
+"""Simulation of a command, its run folder, and files in it; names of those that an interruption prevents."""
 
 from __future__ import annotations
 
+import argparse
 import os
 import shlex
 import subprocess
@@ -10,11 +11,20 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core.base.errors import DigiclayError
+from .. import __version__
+from ..core.base.errors import DigiclayError, ParameterError, SceneError
+from ..core.files.run_folder import Claim
 from ..core.scene.schema import Scene
-from ..core.session.run_scene import History
+from ..core.session.run_scene import History, Result, run, save
+from ..plugins.method_loader import describe_origin, write_code
+from .arguments import say
 from .export import exported, file_names
+from .progress import Bar
 from .render import PICTURE, PLOTS, STILL, draw_still, plotted
+from .stop import STOPPED, Stop
+
+#: Sections whose parameters can make a session too large.
+SIZES = ("layout", "recorder", "simulation", "trajectory", "delay")
 
 
 @dataclass(frozen=True)
@@ -60,27 +70,47 @@ def plan_picture(scene: Scene, history: History) -> Extra:
     )
 
 
-def make_extras(
-    extras: Iterable[Extra], folder: Path, stopped: Callable[[], bool]
-) -> tuple[list[Extra], list[DigiclayError]]:
-    """Make one after the other; return those prevented by a stop, and the errors."""
-    left_out: list[Extra] = []
+def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop) -> Result:
+    """Run the session of a scene under a progress bar; `path`: of its file."""
+    versions = {"digiclay": __version__, **describe_origin(scene)}
+    try:
+        with Bar(sys.stderr, scene.name, scene.simulation.control_period, quiet=arguments.quiet) as bar:
+            return run(scene, progress=bar, stopped=stop, versions=versions)
+    except ParameterError as error:
+        changed = any(setting.key.split(".")[0] in SIZES for setting in arguments.settings)
+        raise SceneError(f"{'--set' if changed else path.name}: {error}") from None
+
+
+def write_run(
+    arguments: argparse.Namespace, claim: Claim, result: Result, extras: Iterable[Extra], stop: Stop,
+    *notes: str, unjudged: bool = False,
+) -> int:  # fmt: skip
+    """Write the folder of a run with its extras, print, and return the exit code.
+
+    `notes`: lines before the summary; `unjudged`: whether a stop prevented the estimation of the errors.
+    """
+    skipped: list[Extra] = []
     wrong: list[DigiclayError] = []
-    for extra in extras:
-        if stopped():
-            left_out.append(extra)
-            continue
-        try:
-            extra.make(folder)
-        except DigiclayError as error:  # the session itself is worth keeping
-            wrong.append(error)
-    return left_out, wrong
-
-
-def print_skipped(left_out: Iterable[Extra], run: Path) -> None:
-    """Print the files that a stop prevented, and the command that makes them."""
-    for extra in left_out:
-        tell_stopped_before(", ".join(extra.files), extra.later(run))
+    with claim.write() as folder:
+        save(result, folder)
+        write_code(result.scene, folder)
+        for extra in extras:
+            if stop():
+                skipped.append(extra)
+                continue
+            try:
+                extra.make(folder)
+            except DigiclayError as error:  # the session itself is worth keeping
+                wrong.append(error)
+    out = claim.out
+    say(arguments, *notes, result.summary(), f"written to {out}")
+    if unjudged:
+        tell_stopped_before("its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"])
+    for extra in skipped:
+        tell_stopped_before(", ".join(extra.files), extra.later(out))
+    if wrong:
+        raise wrong[0]
+    return STOPPED if stop() else 0
 
 
 def tell_stopped_before(what: str, later: Sequence[str]) -> None:

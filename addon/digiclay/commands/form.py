@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import textwrap
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import check_folder, claim_folder, find_name
 from ..core.model.layout import make_grid
@@ -20,14 +18,13 @@ from ..core.scene.assembly import assemble
 from ..core.scene.forming import GESTURES, make_forming_scene
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
-from ..core.session.run_scene import Result, run, save
+from ..core.session.run_scene import Result
 from ..core.shapes.fitting import Fitted, pack
 from ..core.shapes.source_file import find_shape, fit_shape, import_reader, list_shapes
 from .arguments import QUIET, add_command, add_options, add_scene, say, scene_of
 from .export import formats
-from .extras import Extra, make_extras, plan_meshes, print_skipped
-from .progress import Bar
-from .stop import STOPPED, Stop, allow_interrupt, defer_interrupt, require_surface
+from .extras import Extra, plan_meshes, simulate, write_run
+from .stop import Stop, allow_interrupt, defer_interrupt, require_surface
 
 EXAMPLES = f"""\
 examples:
@@ -77,22 +74,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
     with defer_interrupt():
         import_reader(file)
     with allow_interrupt():  # a mesh of millions of triangles takes a while
-        scene, laid = _laid(scene_of(arguments)[0])
+        scene, path = scene_of(arguments)
+        scene, laid = _laid(scene)
         say(arguments, laid.describe())
         if arguments.finger != "scene":
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
-        with Bar(sys.stderr, scene.name, scene.simulation.control_period, quiet=arguments.quiet) as bar:
-            result = run(scene, progress=bar, stopped=stop, versions={"digiclay": __version__})
-        result, lines = _evaluate(result, laid)
-        with claim.write() as folder:
-            save(result, folder)
-            left_out, wrong = make_extras(_exports(result, arguments.export), folder, stop)
-    say(arguments, *lines, result.summary(), f"written to {out}")
-    print_skipped(left_out, out)
-    if wrong:
-        raise wrong[0]
-    return STOPPED if stop() else 0
+        result, lines = _evaluate(simulate(arguments, scene, path, stop), laid)
+        return write_run(arguments, claim, result, _plan_extras(result, arguments.export), stop, *lines)
 
 
 def _laid(scene: Scene) -> tuple[Scene, Fitted]:
@@ -142,7 +131,7 @@ def _evaluate(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
     return replace(result, metrics=metrics), lines
 
 
-def _exports(result: Result, kinds: list[str]) -> list[Extra]:
+def _plan_extras(result: Result, kinds: list[str]) -> list[Extra]:
     """Return the formed surface, and the displayed one."""
     assert result.history is not None
     row = max(before_the_finger(result), 0)

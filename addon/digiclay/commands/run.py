@@ -10,27 +10,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
-from ..core.base.errors import OutputError, ParameterError, SceneError
+from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_folder, find_name
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
-from ..core.session.run_scene import Result, run, save
+from ..core.session.run_scene import Result
 from ..core.studies.omissions import Fitted, find_omissions
-from ..plugins.method_loader import describe_origin, write_code
-from .arguments import QUIET, add_command, add_options, add_scene, length, say, scene_of, told_as_options
+from .arguments import QUIET, add_command, add_options, add_scene, length, scene_of, told_as_options
 from .export import formats
-from .extras import (
-    Extra,
-    make_extras,
-    plan_meshes,
-    plan_picture,
-    plan_plots,
-    print_skipped,
-    tell_stopped_before,
-)
+from .extras import Extra, plan_meshes, plan_picture, plan_plots, simulate, write_run
 from .progress import Bar, Line, table
-from .stop import STOPPED, Stop, refuse_without, refuse_without_blender, require_surface
+from .stop import Stop, refuse_without, refuse_without_blender, require_surface
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
@@ -118,23 +108,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
             fit = within(scene, arguments.budget, quiet=arguments.quiet)
             scene = fit.scene
         with Stop() as stop:
-            result = _simulated(scene, _find_error_origin(arguments, path), stop, quiet=arguments.quiet)
+            result = simulate(arguments, scene, path, stop)
             unjudged = False
             if not arguments.no_errors:
                 result, unjudged = _evaluate(result, stop, quiet=arguments.quiet)
             if fit:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
-            with claim.write() as folder:
-                save(result, folder)
-                write_code(scene, folder)
-                left_out, wrong = make_extras(_extras(arguments, result), folder, stop)
-    say(arguments, result.summary(), f"written to {out}")
-    if unjudged:
-        tell_stopped_before("its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"])
-    print_skipped(left_out, out)
-    if wrong:
-        raise wrong[0]
-    return STOPPED if stop() else 0
+            extras = _plan_extras(arguments, result)
+            return write_run(arguments, claim, result, extras, stop, unjudged=unjudged)
 
 
 def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
@@ -152,22 +133,6 @@ def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
         refuse_without_blender()
 
 
-def _find_error_origin(arguments: argparse.Namespace, path: Path) -> str:
-    """Return what to name when a session is too large: the options that can make it so, or the file."""
-    sizes = ("layout", "recorder", "simulation", "trajectory", "delay")
-    return "--set" if any(one.key.split(".")[0] in sizes for one in arguments.settings) else path.name
-
-
-def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
-    """Run the session under a progress bar."""
-    versions = {"digiclay": __version__, **describe_origin(scene)}
-    try:
-        with Bar(sys.stderr, scene.name, scene.simulation.control_period, quiet=quiet) as bar:
-            return run(scene, progress=bar, stopped=stop, versions=versions)
-    except ParameterError as error:
-        raise SceneError(f"{origin}: {error}") from None
-
-
 def _evaluate(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
     """Return the result with its errors, where they can be estimated, and whether a stop left them out."""
     if result.incomplete or not has_every_command(result.scene):
@@ -177,7 +142,7 @@ def _evaluate(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]
     return (result.with_errors(errors), False) if errors else (result, True)
 
 
-def _extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
+def _plan_extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
     """Return the outputs of the options beside the session."""
     scene, history = result.scene, result.history
     if not history:
