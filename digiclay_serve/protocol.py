@@ -260,20 +260,18 @@ def name_flags(flags: int) -> list[str]:
     return [flag.name.lower() for flag in Flag if flag & flags and flag.name]
 
 
+def format_message(kind: str, **fields: Any) -> str:
+    """Write a message of the server in JSON."""
+    return json.dumps({"version": VERSION, "type": kind, **fields}, allow_nan=False)
+
+
 def format_frame(frame: Frame) -> str:
     """Write a frame in JSON."""
-    message = {
-        "version": VERSION, "type": "state", "period": frame.period, "number": frame.number,
-        "time": frame.time, "total_force": frame.total_force, "position": frame.pose[:3].tolist(),
-        "orientation": frame.pose[3:].tolist(), "heights": frame.heights.tolist(),
-        "forces": frame.forces.tolist(), "flags": name_flags(frame.flags),
-    }  # fmt: skip
-    return json.dumps(message, allow_nan=False)
-
-
-def format_error(message: str) -> str:
-    """Write an error in JSON."""
-    return json.dumps({"version": VERSION, "type": "error", "message": message})
+    return format_message(
+        "state", period=frame.period, number=frame.number, time=frame.time, total_force=frame.total_force,
+        position=frame.pose[:3].tolist(), orientation=frame.pose[3:].tolist(),
+        heights=frame.heights.tolist(), forces=frame.forces.tolist(), flags=name_flags(frame.flags),
+    )  # fmt: skip
 
 
 def _check_version(version: object) -> None:

@@ -16,7 +16,7 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.take import make_take
 from numpy.typing import NDArray
 
-from .doors import Doors, Order
+from .doors import Doors
 from .protocol import name_flags, pack_frame
 from .served_session import PartWriter, Session, follow, make_frame, record, reset
 
@@ -140,7 +140,11 @@ def run_session(
         if order.resets != resets:
             resets = order.resets
             session = _restart(session, writer, room)
-        session = _advance(session, order, count, tell)
+        diverged = session.diverged
+        target = session.pose if order.pose is None else np.array(order.pose)
+        session = follow(session, target, order.number, count)
+        if session.diverged != diverged:
+            tell(f"The session diverged, and went back to {session.kept.period * period:.3f} s.")
         frame = make_frame(session)
         doors.show(pack_frame(frame))
         ended = time.perf_counter()
@@ -162,15 +166,6 @@ def run_session(
         "lateness": lateness.describe(), "flagged": dict(flagged),
     }  # fmt: skip
     return replace(session, recording=None), figures
-
-
-def _advance(session: Session, order: Order, count: int, tell: Callable[[str], None]) -> Session:
-    """Return the session after some control periods, its fingertip at the newest pose."""
-    target = session.pose if order.pose is None else np.array(order.pose)
-    after = follow(session, target, order.number, count)
-    if after.diverged != session.diverged:
-        tell(f"The session diverged, and went back to {after.kept.period * after.system.period:.3f} s.")
-    return after
 
 
 def _restart(session: Session, writer: PartWriter | None, room: int) -> Session:

@@ -11,7 +11,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from digiclay.commands.arguments import add_command, add_scene, scene_of
+from digiclay.commands.arguments import Options, add_command, add_options, add_scene, scene_of, whole_number
 from digiclay.commands.stop import Stop, refuse_unwritable, refuse_without
 from digiclay.core.base.addresses import describe_exposure
 from digiclay.core.base.errors import OutputError
@@ -39,29 +39,34 @@ SCENE = "ridge_mound_valley"
 def add(commands: Any) -> None:
     """Add the command."""
     description = "Run a session in real time for other programs: poses in, forces and heights out."
-    parser = add_command(commands, "serve", "run a session for other programs", EXAMPLES, description)
+    force, most_speed, port = LIMITS.force, 1e3 * LIMITS.speed, whole_number(0, 65535)
+    options: Options = {
+        "--rate HZ": (_within(1, 1000, "Hz"), "control periods a second, 1 to 1000; default: the scene's"),
+        "--host": (str, f"address of this machine to serve at; default: {HOST}", HOST),
+        "--port N": (port, f"of the WebSocket, 0: any; default: {PORT}", PORT),
+        "--osc-port N": (port, f"of OSC, 0: any; default: {OSC_PORT}", OSC_PORT),
+        "--token T": f"token of the clients; default: {VARIABLE}, or one at random",
+        "--most-force N": (
+            _within(1e-3, 1e3, "N"), f"largest total force handed out, N; default: {force:g}", force,
+        ),
+        "--most-speed MM/S": (
+            _within(1.0, 1e4, "mm/s"),
+            f"largest speed of the fingertip, mm/s; default: {most_speed:g}", most_speed,
+        ),
+        "--out DIR": (Path, "record a take into this folder"),
+        "--part S": (
+            _within(0.1, 600.0, "s"),
+            "seconds of a take that a killed process loses at most; default: 10", 10.0,
+        ),
+        "--report FILE": (Path, "write times and counts as JSON in the end"),
+        "--seconds S": (_within(0.0, 1e9, "s"), "stop after this time; default: Ctrl-C"),
+        "--overwrite": "replace the takes in that folder",
+        "--quiet": "print addresses, errors and a random token",
+    }  # fmt: skip
+    purpose = "run a session for other programs"
+    parser = add_command(commands, "serve", purpose, EXAMPLES, description, carry_out=carry_out)
     add_scene(parser, optional=True)
-    rate, force, speed = _within(1.0, 1000.0, "Hz"), _within(1e-3, 1e3, "N"), _within(1.0, 1e4, "mm/s")
-    part, seconds, most_speed = _within(0.1, 600.0, "s"), _within(0.0, 1e9, "s"), 1e3 * LIMITS.speed
-    for name, metavar, kind, default, words in (
-        ("rate", "HZ", rate, None, "control periods a second, 1 to 1000; default: the scene's"),
-        ("host", None, str, HOST, f"address of this machine to serve at; default: {HOST}"),
-        ("port", "N", _port, PORT, f"of the WebSocket, 0: any; default: {PORT}"),
-        ("osc-port", "N", _port, OSC_PORT, f"of OSC, 0: any; default: {OSC_PORT}"),
-        ("token", "T", str, None, f"token of the clients; default: {VARIABLE}, or one at random"),
-        ("most-force", "N", force, LIMITS.force,
-         f"largest total force handed out, N; default: {LIMITS.force:g}"),
-        ("most-speed", "MM/S", speed, most_speed,
-         f"largest speed of the fingertip, mm/s; default: {most_speed:g}"),
-        ("out", "DIR", Path, None, "record a take into this folder"),
-        ("part", "S", part, 10.0, "seconds of a take that a killed process loses at most; default: 10"),
-        ("report", "FILE", Path, None, "write times and counts as JSON in the end"),
-        ("seconds", "S", seconds, None, "stop after this time; default: Ctrl-C"),
-    ):  # fmt: skip
-        parser.add_argument(f"--{name}", metavar=metavar, type=kind, default=default, help=words)
-    parser.add_argument("--overwrite", action="store_true", help="replace the takes in that folder")
-    parser.add_argument("--quiet", action="store_true", help="print addresses, errors and a random token")
-    parser.set_defaults(carry_out=carry_out)
+    add_options(parser, options)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
@@ -125,13 +130,6 @@ def _within(least: float, most: float, unit: str) -> Callable[[str], float]:
         return number
 
     return read
-
-
-def _port(text: str) -> int:
-    """Read the number of a port."""
-    if not text.isdecimal() or len(text) > 5 or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"must be a port from 0 to 65535 (got {text!r})")
-    return int(text)
 
 
 def _tell(line: str) -> None:

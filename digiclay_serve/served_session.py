@@ -7,7 +7,7 @@ import operator
 import queue
 import threading
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -17,7 +17,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputError
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
-from digiclay.core.files.run_folder import Content, claim_folder, write_whole
+from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -159,30 +159,20 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         self.folder, self._overwrite = folder, overwrite
         self.failure = ""
         self._old: list[Path] = []
-        self._made = False
-        self._until_the_end = ExitStack()
+        self._claim = ExitStack()
         self._parts: queue.Queue[tuple[Path, Take] | None] = queue.Queue(WAITING)
         self._thread = threading.Thread(target=self._write_all, daemon=True)
         self._session = self._part = 1
 
     def __enter__(self) -> PartWriter:
         claim = claim_folder(self.folder, overwrite=self._overwrite, content=TAKE)
-        self._until_the_end.enter_context(claim)
-        try:
-            self._old = TAKE.find(self.folder)
-            self._made = not self.folder.exists()
-            self.folder.mkdir(exist_ok=True, parents=True)
-        except OSError as error:
-            self._until_the_end.close()
-            raise OutputError(f"{self.folder} cannot be made: {error.strerror or error}.") from None
+        self._claim.enter_context(claim)
+        self._old = TAKE.find(self.folder)
         self._thread.start()
         return self
 
-    def put(self, take: Take, *, last: bool = False) -> None:
-        """Hand over a part without waiting for the disk; after a failure nothing is written any more.
-
-        `last`: whether the next part begins elsewhere, as after a reset.
-        """
+    def put(self, take: Take) -> None:
+        """Hand over a part without waiting for the disk; after a failure nothing is written any more."""
         if self.failure:
             return
         try:
@@ -190,8 +180,6 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         except queue.Full:
             self.failure = f"The disk is too slow for the take: {self.folder} has what was written until now."
         self._part += 1
-        if last:
-            self.end_session()
 
     def end_session(self) -> None:
         """Have the next part begin a take of its own."""
@@ -219,10 +207,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
 
     def __exit__(self, *raised: object) -> None:
         self._end()
-        if self._made:
-            with suppress(OSError):  # it holds a take
-                self.folder.rmdir()
-        self._until_the_end.close()
+        self._claim.close()
 
     def _write_all(self) -> None:
         """Write what is handed over."""
@@ -230,6 +215,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
             if self.failure:
                 continue
             try:
+                make_folder(self.folder)
                 while self._old:
                     self._old.pop().unlink()
                 write_whole(part[0], to_bytes(part[1]))

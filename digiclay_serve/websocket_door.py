@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import http
-import json
 import math
 from contextlib import suppress
 from dataclasses import asdict
@@ -17,15 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from .door_link import Door, DoorLink, HeldError
-from .protocol import (
-    LARGEST_REQUEST,
-    VERSION,
-    format_error,
-    format_frame,
-    is_token,
-    read_binary,
-    read_json,
-)  # fmt: skip
+from .protocol import LARGEST_REQUEST, format_frame, format_message, is_token, read_binary, read_json
 
 #: Most clients, and most connections that have not said yet who they are: beyond it the oldest is cut.
 MOST_CLIENTS, MOST_SILENT = 64, 512
@@ -177,8 +168,7 @@ class _WebSocketDoor:
 
     async def _send_frames(self, connection: ServerConnection, wishes: Wishes) -> None:
         """Send what the bed is, then frames at the rate of the client, as far as it reads them."""
-        bed = {"version": VERSION, "type": "bed", **asdict(self.link.bed)}
-        await connection.send(json.dumps(bed))
+        await connection.send(format_message("bed", **asdict(self.link.bed)))
         if wishes.rate == 0.0:
             return
         every, due = max(1, round(1.0 / (self.link.bed.period * wishes.rate))), 0
@@ -210,15 +200,14 @@ class _WebSocketDoor:
                 # Answered once a second: poses come a thousand times as often.
                 if clock() - refused >= 1.0:
                     refused = clock()
-                    await connection.send(format_error(str(error)))
+                    await connection.send(format_message("error", message=str(error)))
             except DigiclayError as error:
                 wrong += 1
                 self.link.counts["messages refused"] += 1
-                await connection.send(format_error(str(error)))
+                await connection.send(format_message("error", message=str(error)))
                 if wrong >= WRONG:
                     await connection.close(POLICY, "too many wrong messages")
                     return
             else:
                 if answer is not None:
-                    status = {"version": VERSION, "type": "status", "counts": answer}
-                    await connection.send(json.dumps(status))
+                    await connection.send(format_message("status", counts=answer))
