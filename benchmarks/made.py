@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from digiclay.commands.stop import refuse_unwritable
-from digiclay.compat import scratch
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.model.fingertip import LEVEL
@@ -22,7 +21,7 @@ from digiclay.core.session.render_settings import Still
 from digiclay.device import view
 from digiclay.device.instant import CLEARANCE, Instant
 from digiclay.pictures import stage
-from digiclay.pictures.still import add_picture_scene, apply_style, render_picture
+from digiclay.pictures.still import render_picture, stage_bed
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
 from digiclay.roles import fingertip_of
 from digiclay.sessions.sculpting import begin_session
@@ -237,10 +236,8 @@ def draw_relief(scene: Scene, relief: Floats, lowest: float, out: Path) -> None:
     looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
     rest = Instant.at_rest(scene.layout, scene.actuator)
     instant = replace(rest, height=rest.height + relief)
-    with scratch():
-        drawn = add_picture_scene("Digital Clay Made Thing", looks)
-        bed = view.build(instant, drawn.collection, scene.actuator.rest_height + lowest - CLEAR)
-        apply_style(bed, looks)
+    floor = scene.actuator.rest_height + lowest - CLEAR
+    with stage_bed("Digital Clay Made Thing", instant, looks, floor) as (drawn, bed):
         view.set_form(bed, "skin")
         bed.rotation_euler.z = TURN
         tip = fingertip_of(bed)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge import SCALE
-from ..compat import bpy, quiet, scratch, strips, to_video
+from ..compat import bpy, quiet, strips, to_video
 from ..core.base.arrays import Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
@@ -31,7 +31,7 @@ from ..device.instant import Instant
 from ..roles import fingertip_of
 from . import stage
 from .legend import SHARE, draw_force_plot
-from .still import add_picture_scene, apply_style, failure_reason, render_picture, use_fast_settings
+from .still import failure_reason, render_picture, stage_bed
 
 
 @contextmanager
@@ -111,12 +111,8 @@ def stage_film(
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     height = history["height"][used]
-    with scratch():
-        scene = add_picture_scene("Digital Clay Film", looks)
-        use_fast_settings(scene)
-        first = Instant.of(history, int(rows[0]), **sizes)
-        bed = view.build(first, scene.collection, lowest=float(height.min()))
-        apply_style(bed, looks)
+    first = Instant.of(history, int(rows[0]), **sizes)
+    with stage_bed("Digital Clay Film", first, looks, float(height.min())) as (scene, bed):
         left, right, below, above = stage.MARGINS
         front = stage.set_up(
             scene, bed, first,
@@ -139,11 +135,7 @@ def stage_film(
 @contextmanager
 def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
     """Set the stage for the frames of a bed that turns once about itself."""
-    with scratch():
-        scene = add_picture_scene("Digital Clay Turntable", looks)
-        use_fast_settings(scene)
-        bed = view.build(instant, scene.collection)
-        apply_style(bed, looks)
+    with stage_bed("Digital Clay Turntable", instant, looks) as (scene, bed):
         tip = fingertip_of(bed)
         if tip is not None and not looks.fingertip:
             for part in (*tip.children_recursive, tip):
@@ -213,10 +205,7 @@ def draw_frames(
         if stopped and stopped():
             return False
         shots.show(frame)
-        file = name_frame(folder, frame)
-        part = name_unfinished(file)
-        render_picture(shots.scene, part, out)
-        os.replace(part, file)
+        render_picture(shots.scene, name_frame(folder, frame), out)
         if progress:
             progress(count + 1, len(frames))
     return True

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from ..compat import bpy, has_denoiser, quiet, scratch
 from ..core.base.errors import OutputError
 from ..core.files.formats import is_whole_picture
-from ..core.session.render_settings import Picture, Still
+from ..core.files.run_folder import name_unfinished
+from ..core.session.render_settings import Moving, Picture, Still
 from ..device import view
 from ..device.instant import Instant
 from . import stage
@@ -23,42 +26,44 @@ SPACE = 2**20
 
 def render_still(instant: Instant, out: Path, looks: Still) -> Path:
     """Draw an instant into a PNG file, which appears whole or not at all."""
-    partial = out.with_name(f".{out.name}.{os.getpid()}.partial.png")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        with scratch():
-            scene = add_picture_scene("Digital Clay Still", looks)
-            bed = view.build(instant, scene.collection)
-            apply_style(bed, looks)
-            stage.set_up(scene, bed, instant)
-            render_picture(scene, partial, out)
-        os.replace(partial, out)
-    except OSError as error:
-        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with stage_bed("Digital Clay Still", instant, looks) as (scene, bed):
+        stage.set_up(scene, bed, instant)
+        render_picture(scene, out, out)
     return out
 
 
-def apply_style(bed: Any, looks: Picture) -> None:
-    """Color the pins as asked, and show arrows or not. `bed` bpy.types.Object."""
-    view.color_by(bed, looks.color)
-    view.show_arrows(bed, looks.arrows)
+@contextmanager
+def stage_bed(
+    name: str, instant: Instant, looks: Picture, lowest: float | None = None
+) -> Iterator[tuple[Any, Any]]:
+    """Give a scene that draws pictures and a bed in it, for the block; `lowest` of the pins ever, m."""
+    with scratch():
+        scene = add_picture_scene(name, looks)
+        bed = view.build(instant, scene.collection, lowest)
+        view.color_by(bed, looks.color)
+        view.show_arrows(bed, looks.arrows)
+        yield scene, bed
 
 
-def render_picture(scene: Any, path: Path, out: Path) -> None:
-    """Draw a scene into a PNG file; messages name `out`, which the user knows."""
-    scene.render.filepath = str(path)
+def render_picture(scene: Any, file: Path, out: Path) -> None:
+    """Draw a scene into a PNG file, whole or not at all; messages name `out`, which the user knows."""
+    part = name_unfinished(file)
+    scene.render.filepath = str(part)
     try:
-        path.touch()
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.touch()
         with quiet():
             bpy.ops.render.render(write_still=True, scene=scene.name)
-        if not is_whole_picture(path.read_bytes()):
-            raise OutputError(f"{out} cannot be written: {failure_reason(path)}.")
+        if not is_whole_picture(part.read_bytes()):
+            raise OutputError(f"{out} cannot be written: {failure_reason(part)}.")
+        os.replace(part, file)
     except OSError as error:
         raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
     except RuntimeError as error:
         raise OutputError(f"{out} cannot be drawn: {' '.join(str(error).split())}") from None
+    finally:
+        with suppress(OSError):  # it has its name, or was never made
+            part.unlink()
 
 
 def failure_reason(path: Path) -> str:
@@ -81,13 +86,10 @@ def add_picture_scene(name: str, looks: Picture) -> Any:
         _cycles(scene.cycles, looks.samples)
     else:
         _workbench(scene.display)
+    if isinstance(looks, Moving):  # shadows are two thirds of a frame, and the samples are hardly seen
+        scene.display.shading.show_shadows = False
+        scene.display.render_aa = "8"
     return scene
-
-
-def use_fast_settings(scene: Any) -> None:
-    """Leave out shadows, two thirds of a frame in Workbench, and the samples hardly seen."""
-    scene.display.shading.show_shadows = False
-    scene.display.render_aa = "8"
 
 
 def _cycles(cycles: Any, samples: int) -> None:
