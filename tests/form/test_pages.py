@@ -41,8 +41,6 @@ SENTENCE = re.compile(
     r"|changes|found|moved|moves|recovers|springs)\b",
     re.IGNORECASE,
 )
-#: A speed or a run time: a row of a table, not a sentence.
-TIMING = re.compile(r"\d x real time|\d (?:s|ms|min|minutes) of (?:CPU|processor) time", re.IGNORECASE)
 #: A program and its arguments; a number behind a name is a version.
 COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmarks) (?!\d)(.*)")
 #: Files of the user: a method of one's own, and its copy beside a run.
@@ -124,14 +122,6 @@ def find_sentences(page: Path, text: str) -> list[str]:
     return [heading for heading in _headings(text) if SENTENCE.search(heading)]
 
 
-def find_timings(page: Path, text: str) -> list[str]:
-    """Return the lines outside tables that give a run time."""
-    prose = [line for line, code in _lines(text) if not code and not line.startswith("|")]
-    return [
-        line for line in prose if TIMING.search(re.sub(r"`[^`]*`|\*[^*]+\*", " ", line.replace("**", "")))
-    ]
-
-
 def find_undated(page: Path, text: str) -> list[str]:
     """Return the rows without a date and a commit in tables with a column *commit*."""
     rows, measured = [], False
@@ -185,13 +175,12 @@ def find_refused_commands(page: Path, text: str) -> list[str]:
 
 
 CHECKS = (
-    find_sentences, find_timings, find_undated, find_dead_links, find_absent_modules, find_absent_names,
+    find_sentences, find_undated, find_dead_links, find_absent_modules, find_absent_names,
     find_refused_commands,
 )  # fmt: skip
 #: A page with one fault of each kind, in the order of the checks.
 WRONG = """\
 # Why is it wet?
-It took 3 s of processor time.
 [there](nowhere.md), `core/absent.py`, `simulation.absent_name`, `digiclay run --absent tap`
 
 | commit | s |

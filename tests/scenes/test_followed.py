@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
+from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.scene.assembly import assemble
@@ -16,7 +17,7 @@ from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import followed
 
-METHODS = ("virtual_master", "cell_states")
+BOTH = ("virtual_master", "cell_states")
 RESTING = {int(Mode.REST), int(Mode.HOLD)}
 Way = list[tuple[float, ...]]
 
@@ -46,7 +47,6 @@ LIFT = [(0, 0, 0, 43), (0.8, 0, 0, 36), (1.2, 0, 0, 37), (3.2, 0, 0, 46)]
 @pytest.mark.parametrize(
     ("method", "arrangement"),
     [
-        ("virtual_master", "aligned"),
         *(("cell_states", name) for name in ("aligned", "staggered", "hexagonal")),
     ],
 )
@@ -55,7 +55,7 @@ def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method: str, arrangement
     assert lasting(followed(method, LIFT, layout={"arrangement": arrangement})).row(0).max() > 46e-3
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", BOTH)
 def test_a_finger_that_leaves_at_once_leaves_the_clay_where_it_was_and_is_counted_as_lost(method):
     last = lasting(followed(method, [*LIFT, (3.3, 0, 0, 90), (4.4, 0, 0, 90)]))
     # Pins stood 1.5 mm into the finger; they follow it for some 30 ms, then rise for the loss time of
@@ -64,7 +64,7 @@ def test_a_finger_that_leaves_at_once_leaves_the_clay_where_it_was_and_is_counte
     assert last.memory.losses == 1
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", BOTH)
 def test_a_finger_that_comes_back_elsewhere_is_found_again(method: str) -> None:
     back = [(3.3, 0, 0, 90), (3.6, 12, 12, 60), (4.2, 12, 12, 36), (4.4, 12, 12, 36)]
     assert Mode.FORCE_FOLLOW in lasting(followed(method, [*LIFT, *back])).mode()
@@ -72,13 +72,18 @@ def test_a_finger_that_comes_back_elsewhere_is_found_again(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_sticks_in_a_mode_a_second_after_the_finger_has_left(method: str) -> None:
-    # 12 random sessions a method; a failing one is named by its seed.
+    # A failing session is named by its seed. The display goes to a low shape, all rows at once: its refresh
+    # would take longer than the way.
+    low = {"refresh": "approximate_gradual", "surfaces": 1, "amplitude": 3e-3}
+    control = {"method": method, **(low if method == "shape_display" else {})}
     stuck = {}
-    for seed in range(12):
+    for seed in range(12 if method in BOTH else 3):
+        bed = {"arrangement": ("aligned", "staggered", "hexagonal")[seed % 3]}
         between = {"interpolation": ("smooth", "linear")[seed % 2]}
-        last = lasting(followed(method, random_way(seed), trajectory=between))
+        scene = followed(method, random_way(seed), layout=bed, trajectory=between, control=control)
+        last = lasting(scene)
         modes = set(last.mode().tolist())
-        if not modes <= RESTING:
+        if not modes <= RESTING or not np.isfinite(last.row(0)).all():
             stuck[seed] = sorted(modes - RESTING)
     assert stuck == {}
 

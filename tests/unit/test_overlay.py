@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.base.modes import COLORS, Mode
-from digiclay.device import heat
 from digiclay.overlay.picture import (
     LETTERS,
     LINES,
@@ -56,13 +55,6 @@ def test_letters_and_curves_stand_out_from_any_theme(back: Color, ink: Color | N
     assert contrast((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) == pytest.approx(21.0, rel=1e-12)
 
 
-def test_the_colors_of_the_force_are_explained_while_pins_wear_them() -> None:
-    plain, hot = draw(session()), draw(session(top=0.2))
-    assert len(plain.boxes) == 1
-    assert [box.color for box in hot.boxes[1:]] == list(heat.COLORS)
-    assert "Force on a pin | 0 N | 0.2 N" in said(hot)
-
-
 def draw(told: Readings) -> Picture:
     """Lay out in ordinary room on a dark theme."""
     return lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0)
@@ -77,7 +69,8 @@ WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
              "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister"),
         ("N: beyond",),
     ),
-    "beyond its model": ({"beyond": True}, ("N: beyond 3 mm",), ()),
+    "beyond its model": ({"beyond": True}, ("N: beyond 3 mm",), ("Force on a pin",)),
+    "the colors of the force while pins wear them": ({"top": 0.2}, ("Force on a pin | 0 N | 0.2 N",), ()),
     "a hard knock, which does not flatten the force": ({"force": KNOCK}, (" | 2 N | ",), ()),
     "errors too small to matter": (
         {"errors": (9e-12, 0.0)}, ("Solver error: about 0.01 µm or less, 0.01 mN or less",), ()

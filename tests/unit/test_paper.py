@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.modes import MEANINGS, Mode
-from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE
+from digiclay.core.base.modes import Mode
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
@@ -18,7 +17,6 @@ from digiclay.plots.figure import canvas
 from numpy.typing import NDArray
 
 from digiclay_paper import scenes
-from digiclay_paper.claims import Claim
 from digiclay_paper.evidence import (
     DEVIATIONS,
     WINDOWED,
@@ -37,7 +35,6 @@ from digiclay_paper.evidence import (
     varied,
 )
 from digiclay_paper.figures_session import details, heights_and_force
-from digiclay_paper.page import list_lines
 from digiclay_paper.paper_figures import COLUMNS, NAMED, curves, letter, table
 from digiclay_paper.relief_sections import LIMITS, asked_for, blister_section, sections
 from digiclay_paper.results import AS_IT_IS, SESSION, WAYS, Dragged, Located, Results, Session, Swing
@@ -112,19 +109,6 @@ def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float
     force[100:120] = force[160:] = 0.0
     done = Result(resolve({}), {"time": time, "fingertip": tip, "total_force": force}, 200, 1.0, {})
     assert find_unintended_losses(done) == pytest.approx(times)
-
-
-def test_every_arrow_of_the_controller_and_every_claim_is_a_row_of_the_page() -> None:
-    claim = Claim("said", "one; two", "differs", "because")
-    text = "\n".join(list_lines(results(), [claim], {"a": "caption"}, 1.0, "0"))
-    rows = ("| said | one;<br>two | **differs** | because |", "![caption](a.svg)", "[Data](a.csv)")
-    assert [row for row in rows if row not in text] == []
-    assert [mode for mode in MEANINGS if mode.name in ("REST", "HOLD") and MEANINGS[mode] not in text] == []
-    rows = [line for line in text.splitlines() if line.startswith("| ") and " own force |" in line]
-    places = [line for line in text.splitlines() if line.endswith("nearest cell under the finger |")]
-    assert (len(rows), len(places)) == (len(BY_FORCE), len(BY_PLACE))
-    for arrow, row in zip((*BY_FORCE, *BY_PLACE), rows + places, strict=True):
-        assert f"| {arrow.condition.replace('_', ' ')} |" in row
 
 
 #: A lift of 10 mm/s at its fastest: Method I follows it, Method II's cells rise at 8.7 mm/s at the most.

@@ -63,11 +63,9 @@ def test_shares_of_times_are_those_of_the_sorted_times() -> None:
     for share in (0.5, 0.99, 0.999):
         wanted = np.quantile(times, share, method="inverted_cdf")
         assert counts.find_share(share) == pytest.approx(wanted, abs=1e-5)
-    assert counts.count_above(PERIOD) == np.count_nonzero(times >= PERIOD)
-    told = counts.describe()
-    assert told["longest"] == times.max()
-    assert sum(count for _, count in told["bins"]) == 5000
+    assert counts.describe()["longest"] == times.max()
     late = counts.count_above(PERIOD)
+    assert late == np.count_nonzero(times >= PERIOD)
     for _ in range(5000):
         counts.count(7.0)  # longer than all bins
     assert (counts.find_share(0.9), counts.count_above(PERIOD)) == (7.0, late + 5000)

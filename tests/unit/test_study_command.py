@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
 from pathlib import Path
@@ -15,7 +14,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.point_series import Range, fit_ranges, read_range
-from tests.scene_files import SCENE, interrupt_after, rows
+from tests.scene_files import SCENE, rows
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
@@ -86,18 +85,6 @@ def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_befo
     command = next(line for line in page.splitlines() if line.startswith("    digiclay study"))
     assert main([*command.split()[1:-1], "again", "--workers", "1", "--quiet"]) == 0
     assert files(Path("again")) == files(whole)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_a_study_that_is_stopped_goes_on_from_there(here, whole, monkeypatch, capsys):
-    with monkeypatch.context() as patch:
-        interrupt_after(1, patch)
-        assert main([*STUDY, "--second", "--out", "out"]) == 130
-    said = capsys.readouterr().out
-    assert "of 49 points are done and kept in out. The same command goes on from there." in said
-    assert not (here / "out" / "study.md").exists()
-    assert main([*QUIET, "--second"]) == 0
-    assert files(here / "out") == files(whole)
 
 
 def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here: Path) -> None:

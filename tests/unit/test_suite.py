@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -86,24 +85,6 @@ def test_tables_and_page_name_their_origin(league: Path) -> None:
     for text in ("\n".join(comments), page):
         assert [word for word in (identity, command, "seeds 1 to 2", "noise 2 mN") if word not in text] == []
     assert 'src="rfd.svg"' in page
-
-
-def test_a_finished_suite_runs_no_trial_again_and_no_other_goes_into_its_folder(league, monkeypatch, refused):
-    monkeypatch.chdir(league.parent)
-    said = (
-        f"league holds another suite (4 trials, digiclay {__version__}): choose another folder with --out.\n"
-    )
-    refused([*SHORT, "--methods", "hybrid", "--out", "league", "--quiet"], said)
-    before = {path: path.stat().st_mtime_ns for path in (league / "points").iterdir()}
-    gone = league / "points" / "000003.json"
-    record = json.loads(gone.read_text(encoding="utf-8"))
-    gone.unlink()
-    assert main(BOTH_METHODS) == 0
-    after = {path: path.stat().st_mtime_ns for path in (league / "points").iterdir()}
-    assert [path for path in before if path != gone and before[path] != after[path]] == []
-    again = json.loads(gone.read_text(encoding="utf-8"))["figures"]
-    del again["period_cost"], record["figures"]["period_cost"]
-    assert again == record["figures"]
 
 
 @pytest.mark.parametrize(
