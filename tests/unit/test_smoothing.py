@@ -10,9 +10,10 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.control.drive import DriveParameters
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.smoothing import find_fault, order_periods
+from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
-from digiclay.core.model.control_interface import Controller
+from digiclay.core.model.control_interface import Controller, Measurement
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -47,6 +48,13 @@ def order(system: System, x: float, y: float, radius: float) -> Controller:
     (control,) = order_periods(system.controller, system.grid, system.cell, system.period, row)
     assert control is not None
     return control
+
+
+def measure(system: System, cells: NDArray[np.intp]) -> Measurement:
+    """Return the measurement of some cells at rest."""
+    height, none = np.full(cells.size, 40e-3), np.zeros(cells.size)
+    basis, own = system.grid.compute_basis(cells), np.empty((0, cells.size))
+    return Measurement(basis, height, none, height, np.zeros(cells.size, np.int8), own, cells)
 
 
 def smooth(system: System, state: State, orders: Floats) -> list[Floats]:
@@ -115,6 +123,23 @@ def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
     # Sums over other cells round in another way.
     np.testing.assert_allclose(ends[0][~near], ends[1][~near], rtol=0, atol=1e-12)
     assert (ends[0] - ends[1])[near].max() > 2e-3
+
+
+@pytest.mark.parametrize(
+    ("place", "radius", "held"),
+    [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)],
+)
+def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(place, radius, held):
+    system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
+    touched = measure(system, np.empty(0, np.intp))
+    smoothed = order(bed(method="absent"), *place, radius)
+    discs = [system.controller.locate(memory, touched)[1], smoothed.locate(None, touched)[1]]
+    x, y, whole = order(system, *place, radius).locate(memory, touched)[1]
+    for disc in discs:
+        assert np.hypot(disc[0] - x, disc[1] - y) + disc[2] <= whole * (1.0 + 1e-12)
+    (a, b, one), (c, d, other) = discs
+    least = (np.hypot(a - c, b - d) + one + other) / 2.0
+    assert whole == pytest.approx(least if held is None else (one, other)[held])
 
 
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
