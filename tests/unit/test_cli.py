@@ -80,6 +80,24 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "width": (["render", "my", "--size", "1x1"], "--size must be at least 16 (got 1)."),
     "budget": (["run", "my.toml", "--budget", "0"], "--budget must be above 0 m (got 0 m)."),
     "option": (["run", "my.toml", "--fast"], "digiclay run: unrecognized arguments: --fast. See '"),
+    "form of a misspelt shape": (["form", "craters"], "Did you mean crater?"),
+    "form of nothing": (["form", "nowhere.stl"], "nowhere.stl: there is no such file."),
+    "form beside the bed": (
+        ["form", "dome", "--set", "shape.fit=actual", "--set", "shape.x=1"], "leave the shape over the bed",
+    ),
+    "form without recorder": (["form", "dome", "--set", "recorder=absent"], "form needs a recorder"),
+    "form without shape": (["form", "dome", "--set", "shape=absent"], "form needs a shape"),
+    "form without finger": (
+        ["form", "dome", "--set", "fingertip=absent", "--quiet"], "fingertip must be given to form a shape",
+    ),
+    "form of a row": (["form", "dome", "--set", "layout.rows=1"], "form needs at least 2 x 2 cells"),
+    "methods": (["compare", "my.toml", "--methods", "cell_stats"], "did you mean cell_states"),
+    "no methods": (["compare", "my.toml", "--methods", ","], "must name at least one method"),
+    "method compared": (["compare", "my.toml", "--method", "cell_stats"], "Did you mean cell_states"),
+    "comparison": (["compare", "my.toml", "--out", "my.toml"], "my.toml is a file"),
+    "key of one method": (
+        ["compare", "my.toml", "--set", "control.spring_trigger=1"], "spring_trigger must be a known key",
+    ),
     "job": (["job", "."], ". is no job's folder: it has no job.toml."),
     "benchmark": (["benchmark", "session", "--help"], "run from a checkout: 'python -m benchmarks --help'"),
 }  # fmt: skip

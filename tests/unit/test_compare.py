@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -52,21 +50,6 @@ def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_
     rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
     assert ["lag_max", "mm", "2.5"] in rows
     assert ["rfd", "N", "–"] in rows
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("--methods cell_stats", "did you mean cell_states"),
-        ("--methods ,", "must name at least one method"),
-        ("--method cell_stats", "Did you mean cell_states"),
-        ("--out my.toml", "my.toml is a file"),
-        ("--set control.spring_trigger=1", "control.spring_trigger must be a known key"),
-    ],
-)
-def test_a_mistake_is_one_line_and_leaves_nothing(words: str, said: str, here: Path, refused: Any) -> None:
-    refused(["compare", "my.toml", *words.split()], said)
-    assert [path.name for path in here.iterdir()] == ["my.toml"]
 
 
 def test_every_panel_has_a_bar_for_every_method() -> None:

@@ -301,12 +301,6 @@ def test_features_are_bodies_of_their_own_name_and_groups_only_after_a_search():
     assert (body.groups, body.group.size) == ((), 0)
 
 
-def test_a_surface_without_features_says_what_was_looked_for():
-    place = uneven().position
-    with pytest.raises(OutputError, match=r"no feature of at least 3 pins more than 0\.5 mm off the former"):
-        make_bodies(Formed.of(place, np.full(168, 0.04), 0.04, 0.0, 0), Model(kind="features"))
-
-
 def test_a_skin_of_too_many_points_is_refused_before_it_is_made():
     place = make_grid(Layout(rows=400, columns=400)).positions
     bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
