@@ -16,7 +16,7 @@ from digiclay.commands.evaluation_pool import Evaluation, add_series
 from digiclay.commands.progress import format_duration
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
-from digiclay.core.base.quantity import UNITS, Parameters, list_quantities
+from digiclay.core.base.quantity import UNITS
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.metrics.metric_table import ERRORS
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -25,6 +25,7 @@ from digiclay.core.studies.axes import (
     MOST,
     Point,
     Record,
+    find_quantity,
     find_value,
     place_points,
     read_varied,
@@ -105,23 +106,21 @@ def fit_ranges(ranges: Sequence[Range], path: Path, settings: Sequence[Setting])
 
 def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -> Range:
     """Return a range as the scene's parameter has it."""
-    section, _, name = varied.key.partition(".")
-    part = scene.section(section) if name else None
-    declared = list_quantities(part).get(name) if isinstance(part, Parameters) else None
+    declared = find_quantity(scene, varied.key)
     if declared is None or varied.words:  # an unknown key, or a word: the scene file's own rules tell
         for word in varied.words or (varied.find_word(0.0),):
             load(path, [*settings, Setting(varied.key, word, "--vary")])
         return varied
     factor, measured = UNITS.get(varied.unit, (0.0, "")) if varied.unit else (1.0, declared.unit)
-    value = getattr(part, name)
-    whole = isinstance(value, int) and not isinstance(value, bool)
+    value = find_value(scene, varied.key, "")
+    whole = isinstance(value, int)
     for end in (varied.low, varied.high):
         rule = declared.broken_rule(end * factor)
         if measured != declared.unit:
             rule = f"must be in {declared.unit or 'no unit'} or a multiple of it"
         elif whole and end != int(end):
             rule = "must have whole numbers at LOW and HIGH"
-        elif not isinstance(value, (int, float)) or isinstance(value, bool):
+        elif value == "":
             rule = "must have words as its values: A,B"
         if rule:
             raise ParameterError(f"--vary {varied.key}", "", rule, f"{end:g} {varied.unit}".strip())

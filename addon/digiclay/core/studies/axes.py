@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.errors import ParameterError, SceneError
-from ..base.quantity import list_quantities
+from ..base.quantity import Parameters, Quantity, list_quantities
 from ..files.tables import ReadParts
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
@@ -205,11 +205,16 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
     for number, axis in enumerate(axes):
         scenes = {point.words[number]: point.scene for point in reversed(points) if point.scene}
         values = tuple(find_value(scenes[word], axis.key, word) for word in axis.words)
-        section, _, name = axis.key.partition(".")
-        part = next((scene.section(section) for scene in scenes.values()), None)
-        declared = list_quantities(part).get(name) if name and part else None
+        declared = next((find_quantity(scene, axis.key) for scene in scenes.values()), None)
         columns.append(Column(axis.key, declared.unit if declared else "", values, axis.logarithmic))
     return columns
+
+
+def find_quantity(scene: Scene, key: str) -> Quantity | None:
+    """Return how a parameter of a scene is declared; None where it is not. `key`: section and key."""
+    section, _, name = key.partition(".")
+    part = scene.section(section)
+    return list_quantities(part).get(name) if isinstance(part, Parameters) else None
 
 
 def find_value(scene: Scene, key: str, word: str) -> Any:

@@ -92,9 +92,7 @@ def make_outputs(table: Mapping[str, Any]) -> Outputs:
         own = table[section]
         if not isinstance(own, dict):
             raise ParameterError(section, "", f"must be a section, [{section}]", show_value(own))
-        named: dict[str, Any] = {}
-        for key, value in own.items():
-            named[key if FORMER.get(key, key) in own else FORMER[key]] = value
+        named = {key if FORMER.get(key, key) in own else FORMER[key]: value for key, value in own.items()}
         parts[section] = read_part(section, kind, {}, named)
     return Outputs(tuple(export), errors, **parts)
 

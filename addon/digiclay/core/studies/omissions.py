@@ -108,11 +108,12 @@ def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
             yield Omission("cells", text, partial(_change, section="control", dead_band=band))
 
 
-def find_omissions(scene: Scene, budget: float, *, show: Callable[[str], None] | None = None) -> Fitted:
+def find_omissions(
+    scene: Scene, budget: float, *, show: Callable[[str], object] = lambda text: None
+) -> Fitted:
     """Leave out of a scene what its results can do without."""
     if not (math.isfinite(budget) and budget > 0.0):
         raise ParameterError("run", "budget", "must be above 0 m", f"{budget:g} m")
-    show = show or (lambda text: None)
     show("the full scene")
     own = _own_error(scene)
     if own > budget:

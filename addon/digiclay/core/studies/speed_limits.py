@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -70,20 +71,15 @@ class Drag(Parameters):
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
         """Return the fingertip's path, and when it starts and ends to drag, s, for a surface at `rest`, m."""
-        left, right, down, level = (
-            -0.5 * self.length,
-            0.5 * self.length,
-            rest - self.press,
-            rest + self.height,
-        )
+        right, down, level = 0.5 * self.length, rest - self.press, rest + self.height
         start = 1.3 + max(abs(level - down) / self.approach, REST) + REST
         end = start + self.length / speed
         points = (
-            (0.0, left, rest + 1e-3),
-            (1.0, left, down),
-            (1.3, left, down),
-            (start - REST, left, level),
-            (start, left, level),
+            (0.0, -right, rest + 1e-3),
+            (1.0, -right, down),
+            (1.3, -right, down),
+            (start - REST, -right, level),
+            (start, -right, level),
             (end, right, level),
             (end + REST, right, level),
         )
@@ -125,8 +121,14 @@ def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result
 
 
 def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, float, float]:
-    """Return a scene with a drag or a lift as its trajectory, and start and end of the judged phase, s."""
-    _refuse_small(scene, way)
+    """Return a scene with a drag or a lift as its trajectory, and start and end of the judged phase, s.
+
+    Refuses a bed that the fingertip would leave.
+    """
+    wide = (scene.layout.columns - 1) * scene.layout.pitch
+    if isinstance(way, Drag) and wide < way.length:
+        rule = f"must make the bed at least as wide as the drag, {way.length:g} m"
+        raise ParameterError("layout", "columns", rule, f"{wide:g} m")
     path, start, end = way.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)
     return scene.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()), start, end
@@ -137,28 +139,13 @@ def judge(done: Result, start: float, end: float, speed: float) -> Follows:
     part = select_rows(done.history, start, end)
     sums, total = sum_cells(part), part["total_force"]
     ends = find_contact_ends(done.history["time"], done.history["total_force"])
-    behind, wanted = (
-        measure_lag(sums, part["fingertip"]),
-        find_set_point(done.scene.set_point, sums.following),
-    )
+    behind = measure_lag(sums, part["fingertip"])
+    wanted = find_set_point(done.scene.set_point, sums.following)
     deviates = compute_rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
     losses = int(np.sum((ends > start) & (ends <= end + REST)) + (total[0] <= 0.0))  # or lost before
-    return Follows(
-        speed,
-        losses,
-        float(np.mean(total <= 0.0)),
-        float(behind.max()) if len(behind) else float("inf"),
-        float("inf") if deviates is None else deviates,
-    )
-
-
-def _refuse_small(scene: Scene, way: Drag | Lift) -> None:
-    """Refuse a bed the fingertip would leave."""
-    needed = way.length if isinstance(way, Drag) else 0.0
-    wide = (scene.layout.columns - 1) * scene.layout.pitch
-    if wide < needed:
-        rule = f"must make the bed at least as wide as the drag, {needed:g} m"
-        raise ParameterError("layout", "columns", rule, f"{wide:g} m")
+    lag = float(behind.max()) if len(behind) else math.inf
+    rfd = math.inf if deviates is None else deviates
+    return Follows(speed, losses, float(np.mean(total <= 0.0)), lag, rfd)
 
 
 def bisect(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
@@ -181,14 +168,13 @@ def find_largest_speed(
     low: float = 2e-3,
     high: float = 40e-3,
     resolution: float = 0.5e-3,
-    told: Callable[[Follows], None] | None = None,
+    told: Callable[[Follows], object] = lambda judged: None,
 ) -> float | None:
     """Return the largest speed, m/s, at which a fingertip is followed, by bisection; see `bisect`."""
 
     def holds(speed: float) -> bool:
         judged, _ = track(scene, way, speed)
-        if told:
-            told(judged)
+        told(judged)
         return judged.meets(criterion)
 
     return bisect(holds, low, high, resolution)
