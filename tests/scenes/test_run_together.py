@@ -98,48 +98,28 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
     assert_all_as_alone(scenes, errors=True)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        pytest.param(
-            {
-                "control.force_gain": ("2", "8"), "control.position_gain": ("200", "800"),
-                "control.loss_time": ("0.01", "0.1"), "control.travel": ("1e-3", "4e-3"),
-            },
-            id="control",
-        ),
-        pytest.param({"blister.radius": ("12e-3", "15e-3", "16e-3")}, id="blister"),
-        pytest.param(
-            {"blister.sigma": ("6e-3", "9e-3"), "blister.profile": ("gaussian", "gaussian")}, id="gaussian"
-        ),
-        pytest.param(
-            {
-                "fingertip.length": ("8e-3", "12e-3"), "contact.stiffness": ("150", "400"),
-                "relaxation.times": ("[2e-3, 0.1, 1.0]", "[4e-3, 0.07, 1.4]"),
-            },
-            id="finger",
-        ),
-        pytest.param(
-            {"actuator.bore": ("1.8e-3", "2e-3"), "actuator.rest_height": ("39.8e-3", "40e-3")}, id="cylinder"
-        ),
-        pytest.param({"actuator.bore": ("0.2e-3", "0.3e-3")}, id="the load makes the flow turbulent"),
-        pytest.param(
-            {
-                "supply.high": ("0.4e5", "0.6e5"), "valve.stroke": ("25e-6", "40e-6"),
-                "valve_lag.time_constant": ("1e-3", "3e-3"), "delay.dead_time": ("1e-3", "2e-3"),
-                "fluid.viscosity": ("1e-6", "3e-6"),
-            },
-            id="valve and fluid",
-        ),
-        pytest.param({"fluid.viscosity": ("1.6e-9", "2e-9")}, id="the flow is turbulent"),
-        pytest.param(
-            {"sensors.height_step": ("5e-6", "20e-6"), "sensors.force_step": ("5e-6", "20e-6")}, id="sensors"
-        ),
-        pytest.param({"simulation.control_period": ("4e-3", "5e-3")}, id="period"),
-    ],
-)  # fmt: skip
-def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(changes):
-    settings = [[f"{key}={value}" for value in values] for key, values in changes.items()]
+#: Parameters of which each run of a stack has its own value.
+CHANGES = {
+    "control": "control.force_gain=2|8 control.position_gain=200|800 control.loss_time=0.01|0.1"
+    " control.travel=1e-3|4e-3",
+    "blister": "blister.radius=12e-3|15e-3|16e-3",
+    "gaussian": "blister.sigma=6e-3|9e-3 blister.profile=gaussian|gaussian",
+    "finger": "fingertip.length=8e-3|12e-3 contact.stiffness=150|400"
+    " relaxation.times=[2e-3,0.1,1.0]|[4e-3,0.07,1.4]",
+    "cylinder": "actuator.bore=1.8e-3|2e-3 actuator.rest_height=39.8e-3|40e-3",
+    "the load makes the flow turbulent": "actuator.bore=0.2e-3|0.3e-3",
+    "valve and fluid": "supply.high=0.4e5|0.6e5 valve.stroke=25e-6|40e-6 valve_lag.time_constant=1e-3|3e-3"
+    " delay.dead_time=1e-3|2e-3 fluid.viscosity=1e-6|3e-6",
+    "the flow is turbulent": "fluid.viscosity=1.6e-9|2e-9",
+    "sensors": "sensors.height_step=5e-6|20e-6 sensors.force_step=5e-6|20e-6",
+    "period": "simulation.control_period=4e-3|5e-3",
+}
+
+
+@pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
+def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(changes: str) -> None:
+    pairs = [one.split("=") for one in changes.split()]
+    settings = [[f"{key}={value}" for value in values.split("|")] for key, values in pairs]
     scenes = [sample("tap", "simulation.duration=0.3", *one) for one in zip(*settings, strict=True)]
     assert_all_as_alone(scenes, errors=True)
 
