@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -163,3 +164,13 @@ def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> 
     assert ends[1] >= low + span - slack
     # A step of the axis at most a quarter of the span, and at both ends less than one step more.
     assert ends[1] - ends[0] <= 1.5 * span + slack
+
+
+def test_the_set_point_is_the_dashed_line_at_its_height() -> None:
+    picture = draw(session(set_point=0.25))
+    (dashed,) = (line for line in picture.lines if line.dashed)
+    low, high = (line.points[0, 1] for line in picture.lines[:2])
+    share = (dashed.points[0, 1] - low) / (high - low)
+    axis = next(words.text for words in picture.words if re.fullmatch(r"0\.\d+ N", words.text))
+    top = float(axis.removesuffix(" N"))
+    assert share == pytest.approx(0.25 / top, rel=1e-9)

@@ -73,6 +73,13 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
     assert (heights(back) == 40e-3).all()
 
 
+def test_gestures_kept_do_not_grow_in_number() -> None:
+    hand, session = Hand(), started()
+    for _ in range(sculpting.GESTURES + 3):
+        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
+    assert len(session.gestures) == sculpting.GESTURES
+
+
 def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
     hand = Hand()
     session = hand.press(started())
@@ -194,6 +201,17 @@ def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
     there = late.snapshot, late.pose, late.tick
     session = hand.press(sculpting.restore(late, *here), -6.0)
     assert sculpting.restore(session, *there).path is None
+
+
+def test_a_long_recording_copies_itself_seldom() -> None:
+    session = sculpting.set_recording(started(), True)
+    keep, arrays = session.recording, set()
+    assert keep is not None
+    for moment in range(5000):
+        keep = keep.extend(np.zeros((7, 7)), moment)
+        arrays.add(id(keep.rows))
+    assert len(keep.path) == 35001
+    assert len(arrays) < 12
 
 
 def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is_rewound() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -77,7 +78,9 @@ def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_se
         assert float(row["rfd, half width (N)"]) == pytest.approx(half)
 
 
-def test_tables_and_page_name_their_origin(league: Path) -> None:
+def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(
+    league, refused, monkeypatch
+):
     identity = json.loads((league / "suite.json").read_text(encoding="utf-8"))["scenes"]
     comments, _ = read_table(league / "league.csv")
     page = (league / "index.html").read_text(encoding="utf-8")
@@ -85,6 +88,11 @@ def test_tables_and_page_name_their_origin(league: Path) -> None:
     for text in ("\n".join(comments), page):
         assert [word for word in (identity, command, "seeds 1 to 2", "noise 2 mN") if word not in text] == []
     assert 'src="rfd.svg"' in page
+    monkeypatch.chdir(league.parent)
+    said = (
+        f"league holds another suite (4 trials, digiclay {__version__}): choose another folder with --out.\n"
+    )
+    refused([*SHORT, "--methods", "hybrid", "--out", "league", "--quiet"], said)
 
 
 @pytest.mark.parametrize(
