@@ -14,19 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pythonosc.osc_message import OscMessage
 
+from digiclay_serve import protocol
 from digiclay_serve.osc_door import format_osc_frame, read_osc, read_request
-from digiclay_serve.protocol import (
-    Flag,
-    Frame,
-    Pose,
-    check_pose,
-    format_frame,
-    pack_frame,
-    pack_pose,
-    read_binary,
-    read_json,
-    unpack_frame,
-)
 from digiclay_serve.websocket_door import read_wishes
 from tests.served import load_example
 
@@ -36,10 +25,10 @@ whole = st.integers(0, 2**32 - 1)
 heights = st.lists(st.floats(0.0, 0.09375, width=32), min_size=1, max_size=30)
 
 
-def frame_of(pose: list[float], values: list[float], flags: int) -> Frame:
+def frame_of(pose: list[float], values: list[float], flags: int) -> protocol.Frame:
     """Return a frame of some pins."""
     pins = np.array(values, np.float32)
-    return Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags)
+    return protocol.Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags)
 
 
 def refusal(read: Callable[[Any], Any], data: Any) -> str:
@@ -53,21 +42,21 @@ def refusal(read: Callable[[Any], Any], data: Any) -> str:
 
 @given(poses, whole)
 def test_a_pose_is_read_as_it_was_written_in_both_formats(values: list[float], number: int) -> None:
-    wanted = Pose(check_pose(values), number)
+    wanted = protocol.Pose(protocol.check_pose(values), number)
     said = {"type": "pose", "position": values[:3], "orientation": values[3:], "number": number}
-    assert read_json(json.dumps(said)) == wanted
-    assert read_binary(pack_pose(Pose(tuple(values), number))) == wanted
+    assert protocol.read_json(json.dumps(said)) == wanted
+    assert protocol.read_binary(protocol.pack_pose(protocol.Pose(tuple(values), number))) == wanted
     assert math.hypot(*wanted.pose[3:]) == pytest.approx(1.0)
 
 
 @given(st.builds(frame_of, poses, heights, st.integers(0, 2**31 - 1)))
-def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: Frame) -> None:
-    read = unpack_frame(pack_frame(frame))
-    said = json.loads(format_frame(frame))
+def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: protocol.Frame) -> None:
+    read = protocol.unpack_frame(protocol.pack_frame(frame))
+    said = json.loads(protocol.format_frame(frame))
     datagrams = [OscMessage(one) for one in format_osc_frame(frame, "pins")]
     told = {one.address.removeprefix("/digiclay/"): one.params for one in datagrams}
     assert next(iter(told.items())) == ("flags", [2**40, frame.flags]) == ("flags", [2**40, read.flags])
-    assert said["flags"] == [flag.name.lower() for flag in Flag if frame.flags & flag]
+    assert said["flags"] == [flag.name.lower() for flag in protocol.Flag if frame.flags & flag]
     state = told["state"]
     scalars = [said[name] for name in ("period", "number", "time", "total_force")]
     plain = (*scalars, *said["position"], *said["orientation"])
@@ -90,9 +79,9 @@ keys = st.sampled_from(["type", "version", "position", "orientation", "number", 
     st.one_of(st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)),
 )
 def test_any_bytes_text_or_address_is_a_request_or_refused_in_one_line(data: bytes, text: str) -> None:
-    readers = (read_binary, unpack_frame, lambda data: read_request(*read_osc(data)[1:]))
+    readers = (protocol.read_binary, protocol.unpack_frame, lambda data: read_request(*read_osc(data)[1:]))
     said = [refusal(read, data) for read in readers]
-    said += [refusal(read_json, text)]
+    said += [refusal(protocol.read_json, text)]
     said += [refusal(check_rate, address) for address in (text, f"/?{text}", f"/?rate={text}")]
     assert not any("\n" in one for one in said)
 

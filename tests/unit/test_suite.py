@@ -78,9 +78,7 @@ def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_se
         assert float(row["rfd, half width (N)"]) == pytest.approx(half)
 
 
-def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(
-    league, refused, monkeypatch
-):
+def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(league, refused, monkeypatch):
     identity = json.loads((league / "suite.json").read_text(encoding="utf-8"))["scenes"]
     comments, _ = read_table(league / "league.csv")
     page = (league / "index.html").read_text(encoding="utf-8")
