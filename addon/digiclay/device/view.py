@@ -46,14 +46,20 @@ def picked_pins(bed: Any) -> tuple[int, ...]:
 
 def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
     """Add a bed and its fingertip to a collection."""
-    cells = bridge.points("Digital Clay", len(instant.height))
+    cells = make_cells(instant)
     bed = parts.marked(cells, cells.name, BED, collection)
     bed.modifiers.new(MODIFIER, "NODES").node_group = _make_tree(instant, lowest)
     parts.make_fingertip(collection, bed)
     hold_parts(bed)
-    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
     return bed
+
+
+def make_cells(instant: Instant) -> Any:
+    """Make the mesh of a bed at an instant."""
+    cells = bridge.points("Digital Clay", len(instant.height))
+    bridge.write_cells(cells, instant.position, instant.height, mode=instant.mode, force=instant.force)
+    return cells
 
 
 def _make_tree(instant: Instant, lowest: float | None = None) -> Any:

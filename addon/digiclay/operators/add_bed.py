@@ -16,14 +16,14 @@ from ..core.scene.toml_table import PRESETS, resolve
 from ..core.shapes.request import Shape
 from ..core.shapes.source_file import list_shapes
 from ..core.studies.job_table import embed_heights
-from ..device import palettes, view
+from ..device import palettes, unit, view
 from ..device.instant import Instant, find_ellipsoid, pick_pose, read
 from ..exchange import shape_show
 from ..live import beds
 from ..panels.base import menu
 from ..press.aim import find_free_place
 from ..recorded import takes
-from ..roles import BALL, FINGER, HOUSING, ROLE, bed_of, fingertip_of
+from ..roles import BALL, HOUSING, ROLE, bed_of, fingertip_of
 from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import choice, flag, integer, number, title
@@ -198,32 +198,20 @@ def rebuild(bed: Any) -> Scene:
     """Make a bed anew, at rest, by its settings; its place, fingertip and children stay."""
     scene = properties.read_scene(bed)
     instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
-    old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _drawing(bed)]
-    made = view.build(instant, bed.users_collection[0], lowest=0.0)
-    bed.data = made.data
-    # The modifier stays, and with it how the bed is colored; only what it draws is another.
-    for old, new in zip(_drawing(bed), _drawing(made), strict=False):
-        old.node_group = new.node_group
-    tip = fingertip_of(bed)
-    if tip is None:
-        bed[FINGER] = fingertip_of(made)
-        bed[FINGER].parent = bed
-    else:
-        bridge.resize_fingertip(tip, instant.finger)
-    view.hold_parts(bed)
-    cases = [child for child in bed.children if child.get(ROLE) == HOUSING]
-    _remove([*cases, *made.children_recursive, made])
-    for tree in old_trees:
+    mesh, drawing = bed.data, view.find_modifier(bed)
+    bed.data = view.make_cells(instant)
+    if drawing is not None:  # it stays, and with it how the bed is colored; only what it draws is another
+        tree = drawing.node_group
+        view.add_modifier(bed, instant)
         _discard(tree)
-    if not old_mesh.users:
-        bpy.data.meshes.remove(old_mesh)
+    unit.give_fingertip(bed, scene)
+    bridge.resize_fingertip(fingertip_of(bed), instant.finger)
+    view.hold_parts(bed)
+    _remove(child for child in bed.children if child.get(ROLE) == HOUSING)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
     beds.clear(bed)  # the state of a session is of no use to other pins
     return scene
-
-
-def _drawing(bed: Any) -> list[Any]:
-    """Return the modifiers that draw a bed's pins."""
-    return [modifier for modifier in bed.modifiers if modifier.type == "NODES" and modifier.node_group]
 
 
 def _discard(tree: Any) -> None:
