@@ -47,13 +47,21 @@ class AdjustMixin(Drawing):
     high: float
     snap: float
     pixel: float
-    #: Returns the number of a bed and the tool's settings, and sets it.
-    read: Callable[[Any, Any], float]
-    write: Callable[[Any, Any, float], None]
+    #: The setting of the tool that it is, and what 1 in SI is there.
+    setting: str
+    factor: float
     #: Returns the number with its name and unit.
     describe: Callable[[float], str]
     #: Returns outlines (k, 2), m, about the place pointed at, by fingertip, its turn (wxyz), depth, value.
     outlines: Callable[[Fingertip, Any, float, float], list[Any]]
+
+    def read(self, bed: Any, settings: Any) -> float:
+        """Return the number."""
+        return float(getattr(settings, self.setting)) / self.factor
+
+    def write(self, bed: Any, settings: Any, value: float) -> None:
+        """Set the number."""
+        setattr(settings, self.setting, self.factor * value)
 
     def parse(self, text: str) -> float:
         """Return the number of a typed text; a ValueError tells that it is none."""
@@ -187,18 +195,15 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
     bl_idname = "digiclay.press_depth"
     bl_label = "Press Depth"
     bl_options = {"BLOCKING"}
-    low, high, snap, pixel = SHALLOWEST, DEEPEST, 0.5e-3, 0.05e-3
+    low, high, snap, pixel, factor = SHALLOWEST, DEEPEST, 0.5e-3, 0.05e-3, 1e3
 
     def read(self, bed: Any, settings: Any) -> float:
         """Return the depth, or height, of the tool's brush, m."""
-        self.amount = brush.amount_name(Brush(settings.brush))
-        return 1e-3 * float(getattr(settings, self.amount))
-
-    def write(self, bed: Any, settings: Any, value: float) -> None:
-        setattr(settings, self.amount, 1e3 * value)
+        self.setting = brush.amount_name(Brush(settings.brush))
+        return super().read(bed, settings)
 
     def describe(self, value: float) -> str:
-        return f"{self.amount.title()} {1e3 * value:.2f} mm"
+        return f"{self.setting.title()} {1e3 * value:.2f} mm"
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
         """Return what of the fingertip touches at the depth."""
@@ -212,12 +217,7 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
     bl_label = "Press Strength"
     bl_options = {"BLOCKING"}
     low, high, snap, pixel = 0.01, 1.0, 0.1, 0.005
-
-    def read(self, bed: Any, settings: Any) -> float:
-        return float(settings.strength)
-
-    def write(self, bed: Any, settings: Any, value: float) -> None:
-        settings.strength = value
+    setting, factor = "strength", 1.0
 
     def parse(self, text: str) -> float:
         """Return the share typed: a number of per cent has their sign, or is above 1."""

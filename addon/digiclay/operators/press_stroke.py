@@ -209,11 +209,8 @@ class Press(PressSettings, Polled, bpy.types.Operator):
 
     def _keep_amount(self, context: Any) -> None:
         """Let the next stroke of this brush have the depth or height of this one."""
-        name = brush.amount_name(self.kind)
-        setattr(self, name, 1e3 * self.full)
-        settings = brush.tool_settings(context)
-        if settings is not None:
-            setattr(settings, name, 1e3 * self.full)
+        for owner in filter(None, (self, brush.tool_settings(context))):
+            setattr(owner, brush.amount_name(self.kind), 1e3 * self.full)
 
     def _show(self, context: Any) -> None:
         """Show brush, depth or height, and keys in the status bar."""
