@@ -123,7 +123,7 @@ def test_an_exported_take_is_a_scene_that_runs_as_long(bed: Any, tmp_path: Path)
     assert scene.name == "A press"
     assert scene.simulation.duration == pytest.approx(0.6)
     assert scene.cells == 144
-    assert len(running.find(bed).path) > 1
+    assert len(running.find(bed).recording.path) > 1
     tick.stop(bed.session_uid)
     assert bpy.ops.digiclay.take_remove(take=number) == {"FINISHED"}
     assert number not in [entry.number for entry in takes.list_takes(bed)]

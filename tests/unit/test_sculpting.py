@@ -24,7 +24,7 @@ def test_a_paused_session_stands_still_and_goes_on_without_catching_up() -> None
     session = replace(hand.move(started(), [(0.0, 39.0)] * 5), paused=True)
     before = session.state.period
     session = hand.move(session, [(0.0, 39.0)] * 100)
-    assert (session.state.period, session.factor) == (before, 0.0)
+    assert (session.state.period, session.clock.factor) == (before, 0.0)
     session = hand.move(replace(session, paused=False), [(0.0, 39.0)] * 2)
     assert session.state.period <= before + 7
 
@@ -200,7 +200,7 @@ def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
     late = hand.press(early, 6.0)
     there = late.snapshot, late.pose, late.tick
     session = hand.press(sculpting.restore(late, *here), -6.0)
-    assert sculpting.restore(session, *there).path is None
+    assert sculpting.restore(session, *there).recording is None
 
 
 def test_a_long_recording_copies_itself_seldom() -> None:

@@ -145,12 +145,12 @@ def scene_with_bed(**chosen: Any) -> Iterator[float | None]:
 
 def beds() -> list[Any]:
     """Return the beds of the scene shown."""
-    return [thing for thing in window().scene.objects if part("device.view").is_bed(thing)]
+    return [thing for thing in window().scene.objects if part("roles").is_bed(thing)]
 
 
 def fingertip(number: int = 0) -> Any:
     """Return the fingertip of a bed."""
-    return part("device.view").fingertip_of(beds()[number])
+    return part("roles").fingertip_of(beds()[number])
 
 
 def sessions() -> list[Any]:
@@ -302,13 +302,13 @@ def look(name: str) -> None:
             cells = bridge.read_cells(bed.data)
             found["heights"] = [float(cells["height"].min()), float(cells["height"].max())]
             found["modes"] = np.bincount(cells["mode"], minlength=8).tolist()
-        tip = part("device.view").fingertip_of(bed)
+        tip = part("roles").fingertip_of(bed)
         if tip is not None and not (session and session.blocking_reason):
             found["pose"] = bridge.pose(tip).tolist()
         if session is not None:
             found |= {
                 "period": session.state.period,
-                "factor": session.factor,
+                "factor": session.clock.factor,
                 "paused": session.paused,
                 "waits": session.blocking_reason,
                 "gestures": len(session.gestures),

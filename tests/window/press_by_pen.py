@@ -36,7 +36,7 @@ def draw(blender: Any, row: float, pressure: float, right: float, near: float) -
 def pressed(blender: Any, since: int) -> dict[str, Any]:
     """Return how low the finger came in a recording since a period, mm, and its turns there, w first."""
     (session,) = blender.sessions()
-    poses = session.path[since:, 0]
+    poses = session.recording.path[since:, 0]
     low = poses[:, 2].min()
     return {"lowest": 1e3 * float(low), "inside": poses[poses[:, 2] < low + 1e-5, 3:].tolist()}
 
@@ -48,7 +48,7 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.digiclay.take_record)
     for name, stroke in STROKES.items():
         (session,) = blender.sessions()
-        since = len(session.path)
+        since = len(session.recording.path)
         yield from finish(blender, draw(blender, *stroke))
         note(blender, name)
         (session,) = blender.sessions()

@@ -112,10 +112,7 @@ def tick(context: Any, now: float) -> list[Note]:
     for session in running.list_sessions():
         bed = find_bed(session.uid, session.name)
         if bed is not None:
-            notes += [
-                Note(level, message, session.uid)
-                for level, message in _advance_session(context, bed, session, now, most)
-            ]
+            notes += _advance_session(context, bed, session, now, most)
             continue
         running.drop(session.uid)
         follow.end(session.uid)
@@ -124,10 +121,8 @@ def tick(context: Any, now: float) -> list[Note]:
     return notes
 
 
-def _advance_session(
-    context: Any, bed: Any, session: Running, now: float, most: int
-) -> Iterator[tuple[str, str]]:
-    """Advance one session; yield levels and texts of its messages."""
+def _advance_session(context: Any, bed: Any, session: Running, now: float, most: int) -> Iterator[Note]:
+    """Advance one session; yield its messages."""
     if session.stale > 1:
         # What undo has put back has no place in the world until Blender has evaluated it, which it
         # does before the next tick.
@@ -136,17 +131,18 @@ def _advance_session(
     before = session
     followed, server_news = follow.follow(session.uid, now)
     reason, session, changes = _read_changes(context, bed, session)
-    yield from (("WARNING", f"{bed.name}: {words}") for words in (changes, server_news) if words)
+    news = filter(None, (changes, server_news))
+    yield from (Note("WARNING", f"{bed.name}: {words}", session.uid) for words in news)
     session = replace(session, blocking_reason=reason, name=bed.name)
     if reason:
         waiting = replace(session, clock=session.clock.stopped(), tick=session.tick + 1)
         running.put(waiting)
         beds.write(bed, waiting, session)
         if reason != before.blocking_reason:
-            yield "WARNING", localize("The session of {} waits: {}", bed.name, reason)
+            yield Note("WARNING", localize("The session of {} waits: {}", bed.name, reason), session.uid)
         return
     if before.blocking_reason:
-        yield "INFO", localize("The session of {} goes on", bed.name)
+        yield Note("INFO", localize("The session of {} goes on", bed.name), session.uid)
     seen = _visible_rows(session)
     try:
         # The fingertip of a stroke is where the session has put it.
@@ -156,7 +152,7 @@ def _advance_session(
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)
-        yield "ERROR", localize("The session of {} is paused: {}", bed.name, error)
+        yield Note("ERROR", localize("The session of {} is paused: {}", bed.name, error), session.uid)
     running.put(later)
     moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
     beds.write(bed, later, before)

@@ -89,7 +89,7 @@ def read_session(
         method=scene.method if scene.control else "",
         paused=session.paused,
         waiting=bool(session.blocking_reason),
-        factor=session.factor or None,
+        factor=session.clock.factor or None,
         errors=None if errors is None else (errors.height, errors.force),
         set_point=wanted if math.isfinite(wanted) else None,
         time=trace.time,

@@ -7,7 +7,7 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.quantity import list_quantities
 from ..core.control.methods import list_methods
-from ..core.scene.schema import NEEDS, OPTIONAL, import_parameters
+from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, import_parameters
 from ..core.scene.toml_table import PRESETS
 from ..roles import bed_of, is_edited
 from ..sessions import running
@@ -130,19 +130,8 @@ def in_use(settings: Any, section: str) -> bool:
     return all(getattr(settings, f"use_{name}") for name in switches)
 
 
-#: Parts that the panel Device shows.
-PARTS = (
-    "layout",
-    "actuator",
-    "supply",
-    "fluid",
-    "valve",
-    "conduit",
-    "valve_lag",
-    "delay",
-    "contact",
-    "relaxation",
-)
+#: Parts that the panel Device shows: those before sensors and control, but the fingertip.
+PARTS = [part for part in SECTIONS[: SECTIONS.index("sensors")] if part != "fingertip"]
 CLASSES = (
     presets,
     start,

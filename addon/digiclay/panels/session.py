@@ -77,13 +77,17 @@ def _numbers(layout: Any, session: Running) -> None:
     column.label(text=localize("Simulated: {:.1f} s", session.state.period * period))
     if session.paused:
         column.label(text="Paused", icon="PAUSE")
-    elif session.factor:
-        slow = session.factor < 0.9
-        words = localize("Speed: {:.2f} × real time", session.factor)
-        column.label(text=words, icon="ERROR" if slow else "NONE")
+    elif factor := session.clock.factor:  # 0 while the session waits
+        words = localize("Speed: {:.2f} × real time", factor)
+        column.label(text=words, icon="ERROR" if factor < 0.9 else "NONE")
     draw_lines(column, error_line(session), "NONE")
-    if session.path is not None:
-        column.label(text=localize("Recording: {:.1f} s", (len(session.path) - 1) * period), icon="REC")
+    if session.recording is not None:
+        column.label(text=localize("Recording: {:.1f} s", _measure_recording(session)), icon="REC")
+
+
+def _measure_recording(session: Running) -> float:
+    """Return the length of what a session has recorded, s."""
+    return (len(session.recording.path) - 1) * session.system.period if session.recording else 0.0
 
 
 def error_line(session: Running) -> str:
@@ -98,10 +102,8 @@ def takes_panel(sidebar: Any, context: Any) -> None:
     layout, bed = sidebar.layout, bed_of(context)
     session = running.find(bed)
     if session is not None and session.recording is not None:
-        seconds = (len(session.recording.path) - 1) * session.system.period
-        layout.operator(
-            "digiclay.take_keep", text=localize("Keep Take ({:.1f} s)", seconds), icon="CHECKMARK"
-        )
+        words = localize("Keep Take ({:.1f} s)", _measure_recording(session))
+        layout.operator("digiclay.take_keep", text=words, icon="CHECKMARK")
     else:
         layout.operator("digiclay.take_record", icon="RECORD_ON")
     for entry in takes.list_takes(bed):

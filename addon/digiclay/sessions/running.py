@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..core.base.arrays import Floats
 from ..core.session.accuracy import ErrorMonitor, Errors
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
@@ -53,16 +52,6 @@ class Running(LiveSession):
     last_place: tuple[float, float] | None = None
     #: Stored settings of the bed that `scene` was made of; None: unknown.
     settings: tuple[Any, ...] | None = None
-
-    @property
-    def factor(self) -> float:
-        """Real-time factor of the last second: 1 keeps up; 0 while the session waits."""
-        return self.clock.factor
-
-    @property
-    def path(self) -> Floats | None:
-        """Recorded poses (t + 1, f, 7), row 0 the start; None when nothing is recorded."""
-        return self.recording.path if self.recording else None
 
 
 @dataclass

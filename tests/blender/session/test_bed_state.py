@@ -160,4 +160,4 @@ def test_a_recording_that_undo_has_left_ends_with_a_message(bed: Any, clock: Clo
     clock.tick(3)
     bpy.ops.ed.undo()
     assert ["recording ended" in note.message for note in clock.tick(handlers.STALE)] == [True]
-    assert running.find(only_bed()).path is None
+    assert running.find(only_bed()).recording is None
