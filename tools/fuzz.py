@@ -26,7 +26,6 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.errors import DigiclayError
-from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
 from digiclay.core.engine.system import System
@@ -34,14 +33,7 @@ from digiclay.core.files.tables import parse_tables
 from digiclay.core.metrics.summary import compute_metrics
 from digiclay.core.model.trajectory import Path, Waypoint, interpolate_poses
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import (
-    FINGER_SECTIONS,
-    OPTIONAL,
-    SECTIONS,
-    STEPPERS,
-    UNASKED,
-    import_parameters,
-)
+from digiclay.core.scene.schema import FINGER_SECTIONS, OPTIONAL, SECTIONS, STEPPERS
 from digiclay.core.scene.toml_table import ABSENT, FINGERS, PRESETS, format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.finished_run import SHAPES, read_run
@@ -87,38 +79,39 @@ def odd(chance: np.random.Generator, usual: Any) -> Any:
     return copy.deepcopy(pick(chance, OTHERS))  # lists among them are changed later
 
 
-def table(chance: np.random.Generator) -> dict[str, Any]:
-    """Return the tables of a scene in which some values are odd."""
-    method = pick(chance, WAYS)
-    made: dict[str, Any] = {
-        "preset": pick(chance, list(PRESETS)),
-        "layout": {"rows": int(chance.integers(1, 6)), "columns": int(chance.integers(1, 6))},
-        "simulation": {"stepper": pick(chance, list(STEPPERS))},
-        "control": method if method == ABSENT else {"method": method},
-    }
+def spoil(chance: np.random.Generator, tree: Any) -> None:
+    """Put something odd in place of a value, or sometimes of a whole part, of nested tables and lists."""
+    while places := list(tree) if isinstance(tree, dict) else list(range(len(tree))):
+        place = pick(chance, places)
+        if not isinstance(tree[place], (dict, list)) or chance.random() < 0.2:
+            tree[place] = odd(chance, tree[place])
+            return
+        tree = tree[place]
+
+
+@cache
+def written(method: str) -> str:
+    """Return the text of a small scene under a method, with all of its sections."""
+    sections: dict[str, Any] = {"layout": {"rows": 3, "columns": 3}, "sensors": {}, "shape": {}}
+    sections["control"] = method if method == ABSENT else {"method": method}
     if METHODS.get(method) and METHODS[method].blister is not None:
-        made["blister"] = {"radius": 1e-3, "edge_radius": 1.5e-3, "flat_radius": 5e-4}
-    for section in UNASKED:
-        if chance.random() < 0.2:
-            made[section] = {}
+        sections["blister"] = {"radius": 1e-3, "edge_radius": 1.5e-3, "flat_radius": 5e-4}
+    return format_scene(resolve(sections))
+
+
+def table(chance: np.random.Generator) -> dict[str, Any]:
+    """Return the tables of a scene, some of them left out, in which some values are odd."""
+    made = parse_tables(written(pick(chance, WAYS))) | {"preset": pick(chance, list(PRESETS))}
+    for section in (*SECTIONS, "trajectory"):
+        if section in made and section not in ("layout", "control", "blister") and chance.random() < 0.7:
+            del made[section]
     for section in OPTIONAL:
         if section != "control" and chance.random() < 0.05:
             made[section] = ABSENT
+    made["layout"] |= {side: int(chance.integers(1, 6)) for side in ("rows", "columns")}
+    made["simulation"] = made.get("simulation", {}) | {"stepper": pick(chance, list(STEPPERS))}
     for _ in range(chance.integers(1, 4)):
-        section = pick(chance, SECTIONS)
-        if made.get(section) == ABSENT or (section == "blister" and "blister" not in made):
-            continue
-        known = import_parameters(section, method if method != ABSENT else "virtual_master")
-        fields = list(list_quantities(known))
-        field = pick(chance, fields)
-        made.setdefault(section, {})[field] = odd(chance, getattr(known(), field))
-    if chance.random() < 0.2:
-        points = [{"time": 0.1 * i, "position": [0.0, 0.0, 0.046 - 0.003 * i]} for i in range(4)]
-        point = pick(chance, points)
-        field = pick(chance, ("time", "position", "orientation"))
-        usual = {"orientation": (1.0, 0.0, 0.0, 0.0)}.get(field) or point.get(field)
-        point[field] = odd(chance, tuple(usual) if isinstance(usual, list) else usual)
-        made["trajectory"] = {"waypoints": points, "interpolation": pick(chance, ("smooth", "linear"))}
+        spoil(chance, made)
     if chance.random() < 0.2:
         # The same finger as one or two in a list; the physics refuses two.
         own = {section: made.pop(section) for section in FINGER_SECTIONS if section in made}
@@ -126,18 +119,9 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
     return made
 
 
-@cache
-def written() -> str:
-    """Return the text of a small scene."""
-    small = {"radius": 1e-3, "edge_radius": 1.5e-3, "flat_radius": 5e-4}
-    return format_scene(
-        resolve({"layout": {"rows": 3, "columns": 3}, "blister": small, "sensors": {}, "shape": {}})
-    )
-
-
 def spoilt(chance: np.random.Generator) -> str:
     """Return the text of a scene with some letters, or a value, turned into others."""
-    lines = written().split("\n")
+    lines = written("virtual_master").split("\n")
     for _ in range(chance.integers(1, 3)):
         at = int(chance.integers(len(lines)))
         key, equals, _ = lines[at].partition(" = ")
@@ -185,13 +169,7 @@ def crafted(chance: np.random.Generator, data: bytes) -> bytes:
     for _ in range(chance.integers(1, 4)):
         draw = chance.random()
         if draw < 0.6:
-            where: Any = header
-            while places := list(where) if isinstance(where, dict) else list(range(len(where))):
-                place = pick(chance, places)
-                if not isinstance(where[place], (dict, list)) or chance.random() >= 0.8:
-                    where[place] = odd(chance, where[place])
-                    break
-                where = where[place]
+            spoil(chance, header)
         elif draw < 0.9:
             at = int(chance.integers(len(arrays) // 8)) * 8
             value = pick(chance, NUMBERS)
