@@ -9,11 +9,11 @@ import statistics
 import time
 import tracemalloc
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
@@ -153,9 +153,22 @@ def _time_parts() -> Iterator[defaultdict[str, float]]:
 
 # Ticks while a hand draws
 
-#: Rows and columns of the beds, their pitch and the bore of their pins, m, and the time that 99 of 100 ticks
-#: are to keep to, s.
-BEDS = ((25, 25, 3e-3, 2e-3, 8e-3), (100, 100, 3e-3, 2e-3, 16e-3), (100, 100, 1.5e-3, 1e-3, 16e-3))
+
+class Bed(NamedTuple):
+    """Bed on which a hand draws."""
+
+    rows: int
+    columns: int
+    pitch: float
+    bore: float
+    """Pitch of the pins, and their bore, m."""
+    goal: float
+    """Time that 99 of 100 ticks are to keep to, s."""
+
+
+BEDS = (
+    Bed(25, 25, 3e-3, 2e-3, 8e-3), Bed(100, 100, 3e-3, 2e-3, 16e-3), Bed(100, 100, 1.5e-3, 1e-3, 16e-3),
+)  # fmt: skip
 #: Ticks that are timed, with --quick and without.
 QUICK, FULL = 120, 3000
 #: Shares of the ticks whose times are given; the last one is the largest time.
@@ -190,19 +203,31 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Measure ticks while a hand draws, on every bed, on one core."""
     keep_to_one_core()
     count = QUICK if arguments.quick else FULL
-    beds = [
-        list_parts(draw_circles(*bed[:4], count))
-        for bed in steps.through(BEDS, lambda bed: f"{bed[0]} x {bed[1]}")
+    keys = [f"share_{share:g}_s" for share in SHARES]
+    columns = {"": "part", **{name: f"{key} .2f 1e3" for name, key in zip(NAMES, keys, strict=True)}}
+    rows: list[Row] = []
+    histograms: dict[str, tuple[Floats, float]] = {}
+    lines = [
+        f"\nTicks of a live session at {RATE} a second while a hand draws with the Press tool; one core,",
+        "without drawing. Processor time, ms. evaluate: Blender's geometry nodes; pack and store: the state",
+        "for undo and files; monitor: estimate of the error; other: what is in no part.",
     ]
-    rows = [
-        {
-            "rows": bed[0], "columns": bed[1], "pitch_m": bed[2], "ticks": count, "part": name,
-            **{f"share_{s:g}_s": time for s, time in zip(SHARES, np.quantile(times, SHARES), strict=True)},
-        }
-        for bed, parts in zip(BEDS, beds, strict=True)
-        for name, times in parts.items()
-    ]  # fmt: skip
-    return Report(list(_list_lines(beds, rows)), rows, partial(_draw, beds=beds), (7.2, 2.1 * len(beds)))
+    for bed in steps.through(BEDS, lambda bed: f"{bed.rows} x {bed.columns}"):
+        parts = list_parts(draw_circles(*bed[:4], count))
+        of_bed = [
+            {
+                "rows": bed.rows, "columns": bed.columns, "pitch_m": bed.pitch, "ticks": count, "part": name,
+                **dict(zip(keys, np.quantile(times, SHARES), strict=True)),
+            }
+            for name, times in parts.items()
+        ]  # fmt: skip
+        spent = parts["whole tick"]
+        name = f"{bed.rows} x {bed.columns} at {1e3 * bed.pitch:g} mm, {count} ticks"
+        kept_to = 100.0 * np.mean(spent < bed.goal)
+        lines += [f"\n{name}; {kept_to:.2f} % under {1e3 * bed.goal:g} ms\n", *tabulate(of_bed, columns)]
+        histograms[name] = spent, bed.goal
+        rows += of_bed
+    return Report(lines, rows, partial(_draw, beds=histograms), (7.2, 2.1 * len(BEDS)))
 
 
 def keep_to_one_core() -> None:
@@ -219,35 +244,16 @@ def list_parts(bed: Ticks) -> dict[str, Floats]:
     return {"whole tick": bed.spent, **bed.parts, "other": rest, "whole, elapsed time": bed.elapsed}
 
 
-def _name_bed(bed: tuple[int, int, float, float, float], ticks: int) -> str:
-    return f"{bed[0]} x {bed[1]} at {1e3 * bed[2]:g} mm, {ticks} ticks"
-
-
-def _list_lines(beds: Sequence[dict[str, Floats]], rows: Sequence[Row]) -> Iterator[str]:
-    """Give the lines of the report."""
-    yield f"\nTicks of a live session at {RATE} a second while a hand draws with the Press tool; one core,"
-    yield "without drawing. Processor time, ms. evaluate: Blender's geometry nodes; pack and store: the state"
-    yield "for undo and files; monitor: estimate of the error; other: what is in no part."
-    columns = {name: f"share_{s:g}_s .2f 1e3" for name, s in zip(NAMES, SHARES, strict=True)}
-    for number, (bed, parts) in enumerate(zip(BEDS, beds, strict=True)):
-        spent, goal = parts["whole tick"], bed[-1]
-        kept_to = 100.0 * np.mean(spent < goal)
-        yield f"\n{_name_bed(bed, len(spent))}; {kept_to:.2f} % under {1e3 * goal:g} ms\n"
-        own = rows[number * len(parts) : (number + 1) * len(parts)]
-        yield from tabulate(own, {"": "part", **columns})
-
-
-def _draw(figure: Any, beds: Sequence[dict[str, Floats]]) -> None:
-    """Draw how the times of the ticks are distributed, one panel a bed."""
+def _draw(figure: Any, beds: dict[str, tuple[Floats, float]]) -> None:
+    """Draw how the times of the ticks are distributed, one panel a bed; by name: times and their goal, s."""
     panels = figure.subplots(len(beds), 1, sharex=True, squeeze=False).ravel()
-    spents = [parts["whole tick"] for parts in beds]
-    highest = 1e3 * max(*(float(spent.max()) for spent in spents), *(bed[-1] for bed in BEDS))
-    for panel, bed, spent in zip(panels, BEDS, spents, strict=True):
+    highest = 1e3 * max(max(float(spent.max()), goal) for spent, goal in beds.values())
+    for panel, (name, (spent, goal)) in zip(panels, beds.items(), strict=True):
         panel.hist(1e3 * spent, np.arange(0.0, highest + 0.5, 0.25), color=BLUE, log=True)
-        panel.axvline(1e3 * bed[-1], color=RED, linestyle="--", label=f"goal: {1e3 * bed[-1]:g} ms")
+        panel.axvline(1e3 * goal, color=RED, linestyle="--", label=f"goal: {1e3 * goal:g} ms")
         share = 1e3 * float(np.quantile(spent, 0.99))
         panel.axvline(share, color=INK, linestyle=":", label=f"99 %: {share:.1f} ms")
-        panel.set(title=_name_bed(bed, len(spent)), ylabel="ticks in 0.25 ms")
+        panel.set(title=name, ylabel="ticks in 0.25 ms")
         panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     panels[-1].set_xlabel("processor time of a tick, ms")
 

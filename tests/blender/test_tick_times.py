@@ -16,7 +16,7 @@ from digiclay.sessions import running, sculpting
 
 from benchmarks import tick_times
 from benchmarks.__main__ import main
-from benchmarks.tick_times import DEPTH, PARTS, RATE, SHARES, draw_circles, measure_bed
+from benchmarks.tick_times import DEPTH, PARTS, RATE, SHARES, Bed, draw_circles, measure_bed
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
@@ -65,7 +65,7 @@ def test_the_commands_print_tables_write_figures_and_draw_the_histogram(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pytest.importorskip("matplotlib", reason="the histogram needs it; `make test` has it")
-    monkeypatch.setattr(tick_times, "BEDS", ((*BED, 8e-3), (20, 21, 1.5e-3, 1e-3, 16e-3)))
+    monkeypatch.setattr(tick_times, "BEDS", (Bed(*BED, 8e-3), Bed(20, 21, 1.5e-3, 1e-3, 16e-3)))
     monkeypatch.setattr(tick_times, "VIEWPORT", ((12, 12, 5e-3), (12, 14, 5e-3)))
     for name, count in (("WARM_UP", 5), ("QUICK", 5), ("FEW", 2)):
         monkeypatch.setattr(tick_times, name, count)
