@@ -48,54 +48,32 @@ def find_axes(data: bytes) -> tuple[str, str]:
 CUT = "must end with a whole line: the file is cut off"
 #: Bytes that are worked on at a time.
 BLOCK = 1 << 22
-#: A number in a line has no more letters than this.
-LONGEST_WORD = 64
-#: Numbers of textures and normals at a corner.
-BESIDES = re.compile(rb"/[^\s]*")
 
 
 def read(data: bytes, name: str) -> tuple[Floats, Indices]:
     """Return vertices (v, 3) and triangles (f, 3) of a file's bytes; polygons are cut into fans."""
     data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     vertices, corners = array("d"), array("q")
+    ended = not data or data.endswith((b"\n", b"\r"))
+    if not ended:
+        _refuse_cut_line(data, name)
     first, at = 1, 0
     while at < len(data):
         end = data.find(b"\n", at + BLOCK) + 1 or len(data)
         # A file of the old Macintosh has other ends of lines.
         block = data[at:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        lines = [line.strip() for line in block.split(b"\n")]
-        if not _add_block(lines, vertices, corners):
-            _add_lines(lines, first, name, vertices, corners)
+        lines = block.split(b"\n")
+        _add_lines(lines, first, name, vertices, corners)
         refuse_many_triangles(name, max(len(vertices), len(corners)) // 3)
         first, at = first + len(lines) - 1, end
     places, faces = np.array(vertices).reshape(-1, 3), np.array(corners, np.int64).reshape(-1, 3)
     if faces.size and (faces.min() < 0 or faces.max() >= len(places)):
         content = f"vertex {faces.max() + 1} of {len(places)}"
         raise make_refusal(CORNERS, name, content, "Is the file cut off?")
-    _refuse_cut(data, name, places, faces)
+    if not ended and len(faces) and (unused := len(places) - np.unique(faces).size):
+        content = f"no end of line, and {unused:,} of {len(places):,} vertices without a face"
+        raise make_refusal(CUT, name, content)
     return places, faces
-
-
-def _add_block(lines: list[bytes], vertices: array[float], corners: array[int]) -> bool:
-    """Add lines that are all plain vertices and triangles; return False for all others, and add none."""
-    tables = []
-    for letter, kind in ((b"v", np.float64), (b"f", np.int64)):
-        rows = [line for line in lines if line.startswith((letter + b" ", letter + b"\t"))]
-        text = b" ".join(rows)
-        words = (BESIDES.sub(b"", text) if letter == b"f" else text).split()
-        if len(words) != 4 * len(rows) or set(words[::4]) - {letter}:
-            return False
-        if max(map(len, words), default=0) > LONGEST_WORD:
-            return False
-        try:
-            tables.append(np.array(words).reshape(-1, 4)[:, 1:].astype(kind))
-        except (ValueError, OverflowError):
-            return False
-    if (tables[1] < 1).any():
-        return False
-    vertices.frombytes(tables[0].tobytes())
-    corners.frombytes((tables[1] - 1).tobytes())
-    return True
 
 
 def _add_lines(
@@ -103,13 +81,14 @@ def _add_lines(
 ) -> None:
     """Add lines one by one, with an error that names the line."""
     for number, line in enumerate(lines, first):
-        words = line.partition(b"#")[0].split()
+        kind, *words = line.partition(b"#")[0].split() or [b""]
         try:
-            if words and words[0] == b"v":
-                x, y, z = map(float, words[1:4])
+            if kind == b"v":
+                x, y, z = map(float, words[:3])
                 vertices.extend((x, y, z))
-            elif words and words[0] == b"f":
-                face = [_find_vertex(word, len(vertices) // 3) for word in words[1:]]
+            elif kind == b"f":
+                count = len(vertices) // 3
+                face = [_find_vertex(word, count) for word in words]
                 for one, other in pairwise(face[1:]):
                     corners.extend((face[0], one, other))
         except (ValueError, OverflowError) as error:
@@ -125,16 +104,10 @@ def _find_vertex(word: bytes, count: int) -> int:
     return place - 1 if place > 0 else count + place
 
 
-def _refuse_cut(data: bytes, name: str, places: Floats, faces: Indices) -> None:
-    """Refuse a file whose last line is not whole, or that ends in a line before all vertices have faces."""
-    if not data or data.endswith((b"\n", b"\r")):
-        return
+def _refuse_cut_line(data: bytes, name: str) -> None:
+    """Refuse a file that ends within its last line, which has no end."""
     last = data[max(data.rfind(b"\n"), data.rfind(b"\r")) + 1 :].partition(b"#")[0].split()
     # All corners of a face are given alike, with or without texture and normal.
     forms = {tuple(map(bool, word.split(b"/"))) for word in last[1:]} if last[:1] == [b"f"] else set()
     if last == [b"v"] or (last[:1] == [b"f"] and (len(last) < 4 or len(forms) > 1)):
         raise make_refusal(CUT, name, f"{b' '.join(last)[:40].decode(errors='replace')!r}")
-    unused = len(places) - np.unique(faces).size
-    if unused and len(faces):
-        content = f"no end of line, and {unused:,} of {len(places):,} vertices without a face"
-        raise make_refusal(CUT, name, content)
