@@ -16,7 +16,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.finger_estimate import Estimate
 from digiclay.core.control.hybrid import HybridControl
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.metrics.force import compute_rfd
+from digiclay.core.metrics.summary import compute_rfd
 from digiclay.core.model.control_interface import Controller, find_set_point
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.scene.assembly import assemble

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.finger_path import find_contact_rows
+from digiclay.core.metrics.summary import find_contact_rows
 from digiclay.core.session.run_scene import Result
 from digiclay.core.studies.nominal_relief import evaluate_share, find_nominal, measure_reach
 

@@ -10,14 +10,15 @@ import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.metrics.finger_path import measure_surface_under, sum_cells
-from digiclay.core.metrics.force import (
+from digiclay.core.metrics.summary import (
     compute_deviation,
     compute_rfd,
     compute_weights,
     measure_amplitude,
     measure_frequency,
     measure_settling_time,
+    measure_surface_under,
+    sum_cells,
 )
 from digiclay.core.model.control_interface import find_set_point
 from digiclay.core.scene.assembly import assemble

@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.quantity import find_nearest_name
-from digiclay.core.metrics.finger_path import sum_cells
-from digiclay.core.metrics.force import perceive
 from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
-from digiclay.core.metrics.summary import compute_metrics
+from digiclay.core.metrics.summary import compute_metrics, perceive, sum_cells
 from digiclay.core.model.fingertip import require_one
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.recorder import Recorder

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
-from digiclay.core.metrics.force import find_weber_fractions
+from digiclay.core.metrics.summary import find_weber_fractions
 from digiclay.core.studies.evaluation import FIGURES
 from digiclay.plots.figure import INK, LINES, SHADE, canvas, legend_above
 from digiclay.plots.sweep import read_unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.finger_path import measure_ridge_errors, measure_surface_under, sum_cells
+from digiclay.core.metrics.summary import measure_ridge_errors, measure_surface_under, sum_cells
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

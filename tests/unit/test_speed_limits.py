@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.metrics.force import find_contact_ends
+from digiclay.core.metrics.summary import find_contact_ends
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import RUN_METRICS, Result, run, select_rows

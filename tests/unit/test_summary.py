@@ -10,27 +10,29 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.finger_path import measure_lag, sum_cells
-from digiclay.core.metrics.force import (
+from digiclay.core.metrics.metric_table import METRICS
+from digiclay.core.metrics.summary import (
     BORDER,
     SPATIAL_RESOLUTION,
     WINDOW,
+    compute_cell_area,
     compute_contact_loss_share,
     compute_deviation,
     compute_mean,
+    compute_metrics,
     compute_rfd,
     compute_weights,
     find_weber_fractions,
     measure_amplitude,
     measure_frequency,
+    measure_lag,
     measure_oscillation,
     measure_overshoot,
     measure_settling_time,
     measure_touchdown,
     perceive,
+    sum_cells,
 )
-from digiclay.core.metrics.metric_table import METRICS
-from digiclay.core.metrics.summary import compute_cell_area, compute_metrics
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
 

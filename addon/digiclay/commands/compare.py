@@ -14,8 +14,8 @@ from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
 from ..core.files.run_folder import check_folder, find_name, write_folder
-from ..core.metrics.finger_path import sum_cells
 from ..core.metrics.metric_table import SPEEDS
+from ..core.metrics.summary import sum_cells
 from ..core.model.control_interface import find_set_point
 from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load

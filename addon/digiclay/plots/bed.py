@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.base.arrays import Floats
-from ..core.metrics.finger_path import find_contact_rows
+from ..core.metrics.summary import find_contact_rows
 from ..core.surface.skin_mesh import find_grid_shape, make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.metrics.finger_path import find_contact_rows, sum_cells
 from ..core.metrics.metric_table import METRICS
-from ..core.metrics.summary import compute_metrics
+from ..core.metrics.summary import compute_metrics, find_contact_rows, sum_cells
 from ..core.model.control_interface import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
 from .figure import DASHES, INK, LINES, MM, SHADE, canvas, legend_above

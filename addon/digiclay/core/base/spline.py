@@ -28,10 +28,9 @@ def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
     # Written from the values' difference, so that equal neighbors give exactly their value.
     step = value[cell + 1] - value[cell]
     bent = width * left * right * (left * slope[cell] - right * slope[cell + 1])
-    curve: Floats = value[cell] + right * right * (1.0 + 2.0 * left) * step + bent
+    curve = value[cell] + right * right * (1.0 + 2.0 * left) * step + bent
     beyond = (at - inside)[:, None]
-    whole: Floats = curve + beyond * np.where(beyond < 0.0, slope[0], slope[-1])
-    return whole
+    return np.asarray(curve + beyond * np.where(beyond < 0.0, slope[0], slope[-1]))
 
 
 def compute_inner_slopes(width: Floats, value: Floats) -> Floats:
@@ -63,7 +62,5 @@ def _end(near: np.float64, far: np.float64, first: Floats, second: Floats) -> Fl
     """Return the slope at an end from the widths and secants of the two cells beside it."""
     slope = ((2.0 * near + far) * first - near * second) / (near + far)
     slope = np.where(slope * first > 0.0, slope, 0.0)
-    limited: Floats = np.where(
-        (first * second < 0.0) & (np.abs(slope) > 3.0 * np.abs(first)), 3.0 * first, slope
-    )
-    return limited
+    too_steep = (first * second < 0.0) & (np.abs(slope) > 3.0 * np.abs(first))
+    return np.where(too_steep, 3.0 * first, slope)

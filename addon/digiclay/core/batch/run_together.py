@@ -16,8 +16,7 @@ from ..base.modes import Mode
 from ..engine.simulation import repeat_period, simulate_period
 from ..engine.state import ActiveSet, State
 from ..engine.system import System
-from ..metrics.finger_path import CellSums, sum_row
-from ..metrics.summary import compute_metrics_from_sums
+from ..metrics.summary import CellSums, compute_metrics_from_sums, sum_row
 from ..model.fingertip import require_one
 from ..model.layout import Grid
 from ..model.touch import FingerPath, FingerPeriod

@@ -1,4 +1,4 @@
-"""Metrics of a session: pure functions on the arrays of a history.
+"""Metrics of a session: pure functions on the arrays of a history, or on sums over its cells.
 
 Averages are over time, by the trapezium rule: a row stands for half of the intervals on
 either side of it, so histories with uneven rows are judged alike. *In contact* are the
@@ -8,27 +8,321 @@ exerts is exactly zero.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..base.arrays import Floats
+from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
+from ..base.modes import Mode
 from ..model.control_interface import SetPoint, find_set_point
 from ..surface.skin_mesh import find_grid_shape
-from .finger_path import CellSums, measure_lag, measure_ridge_errors, measure_surface_under, sum_cells
-from .force import (
-    compute_contact_loss_share,
-    compute_deviation,
-    compute_mean,
-    compute_rfd,
-    compute_rms,
-    compute_weights,
-    measure_oscillation,
-    measure_touchdown,
-    perceive,
-)
+
+#: How far the fingertip must have gone on from a cell for it to count as left behind, m.
+AWAY = 12e-3
+#: Distances from a finger to cells looked at at a time: those of a long session on a large bed would not fit
+#: in memory.
+AT_ONCE = 2**17
+
+
+def find_contact_rows(total_force: ArrayLike) -> Flags:
+    """Return which rows have contact, shape (t,), from the total force in N."""
+    return np.asarray(np.asarray(total_force, dtype=np.float64) > 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class CellSums:
+    """Sums over the cells of t rows of n cells, (t,), and the first and last heights, (n,)."""
+
+    total: Floats
+    """Total force, N."""
+    x: Floats
+    y: Floats
+    height: Floats
+    """Sums of the force times place, and times height, N m."""
+    strongest: Floats
+    """Largest force on a cell, N."""
+    following: Cells
+    """How many cells follow the force."""
+    first: Floats
+    last: Floats
+    """Heights in the first and in the last row, m."""
+
+    @property
+    def touching(self) -> Flags:
+        """Which rows have contact, shape (t,)."""
+        return find_contact_rows(self.total)
+
+    @property
+    def shaping(self) -> Flags:
+        """Which rows shape the clay, shape (t,): in contact, and a cell follows the force."""
+        return self.touching & (self.following > 0)
+
+
+def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
+    """Return the sums over the cells of a history, the arrays of ``history.npz``, of at least one row."""
+    total, height, force, position = (
+        np.asarray(history[name], dtype=np.float64) for name in ("total_force", "height", "force", "position")
+    )
+    x, y = (np.broadcast_to(along[:, None], force.T.shape) for along in position.T)
+    _, x, y, lifted, strongest = sum_row(force.T, x, y, height.T)
+    following = np.count_nonzero(np.asarray(history["mode"]) == Mode.FORCE_FOLLOW, axis=1)
+    return CellSums(total, x, y, lifted, strongest, following, height[0], height[-1])
+
+
+def sum_row(force: Floats, x: Floats, y: Floats, height: Floats) -> Floats:
+    """Return total, x, y, height and strongest of `CellSums`, (5, b), of b rows of k cells, all (k, b)."""
+    sums = np.empty((5, force.shape[1]))
+    np.add.reduce(force, out=sums[0])
+    for values, found in zip((x, y, height), sums[1:4], strict=True):
+        np.einsum("kb,kb->b", values, force, out=found)
+    np.maximum.reduce(force, out=sums[4], initial=0.0)
+    return sums
+
+
+def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
+    """Return how far the blister is behind the fingertip, (t, 7), in the rows in contact, m.
+
+    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the lowest point, r_j the positions.
+    """
+    rows = sums.touching
+    centroid = np.column_stack([sums.x, sums.y])[rows] / sums.total[rows, None]
+    return np.asarray(np.hypot(*(np.asarray(fingertip, np.float64)[rows, :2] - centroid).T))
+
+
+def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
+    """Return ``sum F_j H_j / sum F_j - z``, the surface under the fingertip, in the rows in contact, m."""
+    rows, tip = sums.touching, np.asarray(fingertip, dtype=np.float64)
+    return np.asarray(sums.height[rows] / sums.total[rows] - tip[rows, 2])
+
+
+def measure_ridge_errors(
+    position: ArrayLike, final: ArrayLike, fingertip: ArrayLike, rows: Flags, away: float = AWAY
+) -> Floats:
+    """Return how far the cells the fingertip has passed over stand above its path at the end.
+
+    ``e_j = H_j(end) - z(t_j)``, t_j the last row of `rows` in which no cell is nearer to the
+    fingertip than cell j. A cell counts when the fingertip went on, in rows of the same unbroken
+    stretch, to a place at least `away` from it: where it pressed or left is no ridge. Returned are the
+    cells that count, in the order in which the fingertip passed them.
+    """
+    place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
+    chosen = np.flatnonzero(rows)
+    nearest = np.empty(chosen.size, dtype=np.intp)
+    several = max(1, AT_ONCE // max(len(place), 1))
+    for first in range(0, chosen.size, several):
+        part = slice(first, first + several)
+        square = (tip[chosen[part], 0, None] - place[:, 0]) ** 2
+        square += (tip[chosen[part], 1, None] - place[:, 1]) ** 2
+        nearest[part] = np.argmin(square, axis=1)
+    last = {int(cell): i for i, cell in enumerate(nearest)}
+    stretch = np.concatenate([[0], np.cumsum(np.diff(chosen) > 1)]) if chosen.size else chosen
+    errors = []
+    for cell, i in sorted(last.items(), key=lambda pair: pair[1]):
+        after = chosen[i:][stretch[i:] == stretch[i]]
+        if np.max(np.hypot(*(tip[after, :2] - place[cell]).T)) >= away:
+            errors.append(float(np.asarray(final)[cell]) - float(tip[chosen[i], 2]))
+    return np.array(errors)
+
+
+#: Window of the moving average that is taken off for an oscillation, s. What is left of a sine of f Hz is
+#: 1 - sinc(f WINDOW): less than a tenth below 1 Hz, where fingers move on purpose, and all of it at 4 Hz; a
+#: controller on its limit of stability oscillates at 4 to 10 Hz (digiclay paper).
+WINDOW = 0.25
+
+
+def compute_weights(time: ArrayLike) -> Floats:
+    """Return the time each row stands for, (t,), s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half at the ends."""
+    moment = np.asarray(time, dtype=np.float64)
+    if len(moment) < 2:  # nothing to average over
+        return np.ones(len(moment))
+    half = 0.5 * np.diff(moment)
+    return np.asarray(np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half]))
+
+
+def compute_mean(values: Floats, weight: Floats) -> float | None:
+    """Return the weighted mean of values (t,), or None when there is nothing to average."""
+    total = float(np.sum(weight))
+    return float(np.sum(weight * values)) / total if total > 0.0 else None
+
+
+def compute_rms(values: Floats, weight: Floats) -> float | None:
+    """Return the weighted root mean square of values (t,), or None without any rows."""
+    square = compute_mean(values**2, weight)
+    return None if square is None else math.sqrt(square)
+
+
+def compute_deviation(values: Floats, weight: Floats) -> float | None:
+    """Return the weighted standard deviation about the weighted mean, or None without any rows."""
+    middle = compute_mean(values, weight)
+    return None if middle is None else compute_rms(values - middle, weight)
+
+
+def measure_overshoot(values: ArrayLike, target: float) -> float | None:
+    """Return how far a signal goes beyond its target, as a share of its way there.
+
+    ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; None for a signal at its target from the start.
+    """
+    signal = np.asarray(values, dtype=np.float64)
+    if not len(signal) or signal[0] == target:
+        return None
+    way = target - float(signal[0])
+    return max(0.0, float(np.max((signal - target) / way)))
+
+
+def measure_settling_time(time: ArrayLike, values: ArrayLike, target: float, band: float) -> float | None:
+    """Return the time after which ``|y_i - y_target| <= band`` to the end, s; None when it never does."""
+    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    outside = np.flatnonzero(~(np.abs(signal - target) <= band))
+    if not len(signal) or (outside.size and outside[-1] == len(signal) - 1):
+        return None
+    return float(moment[outside[-1] + 1] - moment[0]) if outside.size else 0.0
+
+
+def measure_amplitude(values: ArrayLike) -> float:
+    """Return half the distance from a signal's lowest to its highest value."""
+    return 0.5 * float(np.ptp(np.asarray(values, dtype=np.float64)))
+
+
+def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
+    """Return how often a signal rises through its mean, Hz; None when it does so less than three times."""
+    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    above = signal > signal.mean() if len(signal) else np.empty(0, dtype=bool)
+    rises = np.flatnonzero(~above[:-1] & above[1:])
+    if rises.size < 3:
+        return None
+    return float((rises.size - 1) / (moment[rises[-1]] - moment[rises[0]]))
+
+
+def find_stretches(rows: Flags) -> list[slice]:
+    """Return the unbroken stretches of chosen rows, in order. `rows` bool (t,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
+    return [slice(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def measure_oscillation(
+    time: ArrayLike, values: ArrayLike, rows: Flags, window: float = WINDOW
+) -> float | None:
+    """Return the rms over time of a signal less its moving average.
+
+    ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window, s, around row i. A row
+    counts when its whole window is within an unbroken stretch of the chosen rows; None when no row does.
+    """
+    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    off: list[Floats] = []
+    weight: list[Floats] = []
+    for stretch in find_stretches(rows):
+        t, y = moment[stretch], signal[stretch]
+        area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
+        # Half a millionth of the window: an edge on the first row is within.
+        inner = (t - 0.5 * window >= t[0] - 5e-7 * window) & (t + 0.5 * window <= t[-1] + 5e-7 * window)
+        below, above = (np.interp(t[inner] + side * window, t, area) for side in (-0.5, 0.5))
+        off.append(y[inner] - (above - below) / window)
+        weight.append(compute_weights(t)[inner])
+    return compute_rms(np.concatenate(off), np.concatenate(weight)) if off else None
+
+
+#: Force from which on the smaller Weber fractions hold, N.
+BORDER = 0.5
+#: Smallest and largest Weber fraction of forces from `BORDER` on, and of smaller ones.
+ABOVE, BELOW = (0.07, 0.10), (0.15, 0.27)
+#: Groove of the finest grating whose direction a fingertip tells, m.
+SPATIAL_RESOLUTION = 0.94e-3
+
+
+def find_weber_fractions(force: float) -> tuple[float, float]:
+    """Return the smallest and the largest Weber fraction of a force, N; ParameterError unless above 0."""
+    if not (math.isfinite(force) and force > 0.0):
+        raise ParameterError("Perception", "force", "must be above 0 N and finite", f"{force:g} N")
+    return ABOVE if force >= BORDER else BELOW
+
+
+def perceive(
+    deviation: float | None, force: float | None, unevenness: float | None
+) -> dict[str, float | None]:
+    """Return the `METRICS` in units of touch; None where there is nothing to compute from.
+
+    `deviation`: of the force from its reference, N; `force`: reference force, N; `unevenness`: of a surface,
+    m. Raises ParameterError when a deviation is negative or not finite, or the force is no reference.
+    """
+    for name, value, unit in (("deviation", deviation, "N"), ("unevenness", unevenness, "m")):
+        if value is not None and not (math.isfinite(value) and value >= 0.0):
+            raise ParameterError("Perception", name, f"must be at least 0 {unit} and finite", f"{value:g}")
+    least = most = None
+    if deviation is not None and force is not None:
+        fine, coarse = find_weber_fractions(force)
+        least, most = deviation / (coarse * force), deviation / (fine * force)
+    resolutions = None if unevenness is None else unevenness / SPATIAL_RESOLUTION
+    return {"rfd_jnd_least": least, "rfd_jnd_most": most, "ridge_unevenness_touch": resolutions}
+
+
+#: Settled is a force this near to its set point, as a share of it.
+BAND = 0.1
+#: Ends of contact no farther apart are bounces of one parting, s: Method I's loss time.
+BOUNCE = 0.05
+
+
+def compute_rfd(
+    time: ArrayLike, total_force: ArrayLike, set_point: ArrayLike, rows: Flags | None = None
+) -> float | None:
+    """Return the reference force deviation, N.
+
+    ``RFD = sqrt(sum w_i (F_i - F_ref,i)² / sum w_i)`` with the `weights` of the rows.
+
+    `time` (t,), s; `total_force` (t,), N; `set_point` (t,) or (), total force asked for, N; rows in which it
+    is NaN are left out; `rows` bool (t,), rows to judge; those in contact by default. They include touching
+    down, and leave out the gaps when the fingertip is lost: read it next to `compute_contact_loss_share`.
+    Returns none when there is no such row.
+    """
+    force = np.asarray(total_force, dtype=np.float64)
+    wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
+    chosen = (find_contact_rows(force) if rows is None else rows) & ~np.isnan(wanted)
+    return compute_rms((force - wanted)[chosen], compute_weights(time)[chosen])
+
+
+def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
+    """Return the share of the time from first to last contact without contact; None: no contact.
+
+    A pause the session makes on purpose, with the fingertip lifted, counts as well.
+    """
+    touching = find_contact_rows(total_force)
+    if not np.any(touching):
+        return None
+    first, after = int(np.argmax(touching)), len(touching) - int(np.argmax(touching[::-1]))
+    return compute_mean(1.0 - touching[first:after], compute_weights(time)[first:after])
+
+
+def find_contact_ends(time: ArrayLike, total_force: ArrayLike) -> Floats:
+    """Return when contact ends, s, shape (ends,), bounces counted once, from times, s, and forces (t,), N."""
+    touching = find_contact_rows(total_force)
+    ends: Floats = np.asarray(time, dtype=np.float64)[1:][touching[:-1] & ~touching[1:]]
+    return ends[np.diff(ends, prepend=-np.inf) > BOUNCE]
+
+
+def measure_touchdown(
+    time: Floats, total_force: Floats, set_point: Floats
+) -> tuple[float | None, float | None]:
+    """Return overshoot, as a share, and settling time, s, of the force at first touch; None: no set point.
+
+    The set point is NaN in rows that ask for no force: in them it is not settled.
+    """
+    touches = find_stretches(find_contact_rows(total_force))
+    if not touches:
+        return None, None
+    # From the last row before the first contact to the last one of that contact.
+    first = slice(max(0, touches[0].start - 1), touches[0].stop)
+    beyond, wanted = total_force[first] - set_point[first], set_point[first]
+    known = ~np.isnan(wanted)
+    typical = compute_mean(wanted[known], compute_weights(time[first])[known])
+    if typical is None:
+        return None, None
+    # Without contact the force is below its set point by all of it.
+    passed = measure_overshoot(np.concatenate([[-typical], beyond[known]]), 0.0)
+    return passed, measure_settling_time(time[first], beyond / wanted, 0.0, BAND)
+
 
 #: All cells.
 ALL = slice(None)
@@ -63,7 +357,7 @@ def compute_metrics_from_sums(
     fingertip: Floats,
     position: Floats,
     set_point: SetPoint | None,
-    near: NDArray[np.intp] | slice = ALL,
+    near: Cells | slice = ALL,
 ) -> dict[str, float | None]:
     """Return every metric of a session of t rows, (t,) or (t, 7), and n cells, (n, 2); see `compute_metrics`.
 

@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..control.blister import Blister
-from ..metrics.finger_path import find_contact_rows
-from ..metrics.force import find_stretches
-from ..metrics.summary import compute_cell_area
+from ..metrics.summary import compute_cell_area, find_contact_rows, find_stretches
 from ..scene.schema import Scene
 
 #: Rows of a history of which one is taken.

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..metrics.finger_path import measure_lag, sum_cells
-from ..metrics.force import compute_rfd, find_contact_ends
+from ..metrics.summary import compute_rfd, find_contact_ends, measure_lag, sum_cells
 from ..model.control_interface import find_set_point
 from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
