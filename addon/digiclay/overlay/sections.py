@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -87,24 +87,38 @@ class Pen:
                 self.picture.words.append(Words(x, y, size, color, text, at_right))
         return top - ROW * self.scale
 
-    def frame(self, top: float, low: str, high: str) -> Box:
-        """Draw the frame of a plot with the ends of its axis; return the box of its curves."""
+    def plot(self, told: Readings, top: float, ends: tuple[float, float], unit: str) -> Box:
+        """Draw the frame of a plot, its axis and the time shown; return the box of its curves."""
         box = Box(self.x, top - PLOT * self.scale, self.width, PLOT * self.scale, self.look.back)
         step, size = 3.0 * self.scale, SMALL * self.scale
-        for y, label, lift in ((box.y, low, step), (top, high, -size)):
-            edge = np.array([[box.x, y], [box.x + box.width, y]])
-            self.picture.lines.append(Line(edge, self.look.frame, self.scale))
+        for y, value, lift in ((box.y, ends[0], step), (top, ends[1], -size)):
+            self.level(box, y, self.look.frame, 1.0)
+            label = f"{value:g} {unit}"
             self.picture.words.append(Words(box.x + step, y + lift, size, self.look.faint, label))
+        self.row(box.y, "", localize("last {:g} s", told.seconds), small=True)
         return box
 
-    def curve(
-        self, told: Readings, value: Floats, ends: tuple[float, float], box: Box, pin: int = -1
-    ) -> None:
-        """Draw a curve (t,) into the box of a plot, in the color of a picked pin, or of the force (-1)."""
-        color = self.look.force if pin < 0 else self.look.pins[pin]
+    def level(self, box: Box, y: float, color: Color, width: float, *, dashed: bool = False) -> None:
+        """Draw a level line across the box of a plot."""
+        line = np.array([[box.x, y], [box.x + box.width, y]])
+        self.picture.lines.append(Line(line, color, width * self.scale, dashed))
+
+    def curve(self, told: Readings, value: Floats, ends: tuple[float, float], box: Box, color: Color) -> None:
+        """Draw a curve (t,) into the box of a plot."""
         points = scale_curve(told.time, value, told.window, ends, box)
         if len(points) > 1:
             self.picture.lines.append(Line(points, color, 1.5 * self.scale))
+
+    def entries(self, top: float, columns: int, entries: Iterable[tuple[Color, str]]) -> None:
+        """Draw dots and what they stand for, row by row."""
+        radius, size = 4.0 * self.scale, (SMALL + 1.0) * self.scale
+        for place, (color, text) in enumerate(entries):
+            row, column = divmod(place, columns)
+            x, y = self.x + column * self.width / columns, top - (row + 0.75) * ROW * self.scale
+            middle = y + 0.36 * size
+            self.picture.dots.append(Dot(x + radius, middle, radius + self.scale, self.look.frame))
+            self.picture.dots.append(Dot(x + radius, middle, radius, color))
+            self.picture.words.append(Words(x + 3.5 * radius, y, size, self.look.ink, text))
 
 
 def error_message(errors: tuple[float, float] | None) -> str:
@@ -149,13 +163,11 @@ def _draw_force(told: Readings, pen: Pen, top: float) -> None:
         largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
     largest = max(largest, LEAST_FORCE)
     ends = (0.0, round_axis(0.0, largest)[1])
-    box = pen.frame(top, "0 N", f"{ends[1]:g} N")
+    box = pen.plot(told, top, ends, "N")
     if told.set_point is not None:
         y = box.y + told.set_point / ends[1] * box.height
-        line = np.array([[box.x, y], [box.x + box.width, y]])
-        pen.picture.lines.append(Line(line, pen.look.set_point, 1.5 * pen.scale, dashed=True))
-    pen.curve(told, told.force, ends, box)
-    pen.row(box.y, "", localize("last {:g} s", told.seconds), small=True)
+        pen.level(box, y, pen.look.set_point, 1.5, dashed=True)
+    pen.curve(told, told.force, ends, box, pen.look.force)
 
 
 def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
@@ -170,14 +182,12 @@ def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     spare = max(0.0, LEAST_SPAN - (high - low)) / 2
     ends = round_axis(low - spare, high + spare)
-    box = pen.frame(top, f"{ends[0]:g} mm", f"{ends[1]:g} mm")
-    for place in range(len(told.pins)):
-        pen.curve(told, values[:, place], ends, box, pin=place)
-    top, column = pen.row(box.y, "", localize("last {:g} s", told.seconds), small=True), pen.width / 3
-    for place, pin in enumerate(told.pins):
-        x, y = pen.x + place % 3 * column, top - (place // 3 + 0.75) * ROW * pen.scale
+    box, entries = pen.plot(told, top, ends, "mm"), []
+    for place, (pin, color) in enumerate(zip(told.pins, pen.look.pins, strict=False)):
+        pen.curve(told, values[:, place], ends, box, color)
         now = f" {values[-1, place]:.1f} mm" if len(values) and np.isfinite(values[-1, place]) else ""
-        _entry(pen, x, y, pen.look.pins[place], f"{pin}:{now}")
+        entries.append((color, f"{pin}:{now}"))
+    pen.entries(box.y - ROW * pen.scale, 3, entries)
 
 
 def _draw_scale(told: Readings, pen: Pen, top: float) -> None:
@@ -193,25 +203,13 @@ def _draw_scale(told: Readings, pen: Pen, top: float) -> None:
 def _draw_modes(told: Readings, pen: Pen, top: float) -> None:
     """List how many pins are in each mode that occurs, with its color."""
     top = pen.row(top, localize("Pins by mode"), f"{int(told.modes.sum())}")
-    for place, code in enumerate(np.flatnonzero(told.modes)):
-        x, y = pen.x + place % 2 * pen.width / 2, top - (place // 2 + 0.75) * ROW * pen.scale
-        mode = Mode(int(code))
-        name = localize(mode.name.lower().replace("_", " "))
-        _entry(pen, x, y, told.colors[mode], f"{told.modes[code]} {name}")
+    names = {mode: localize(mode.name.lower().replace("_", " ")) for mode in Mode if told.modes[mode]}
+    pen.entries(top, 2, [(told.colors[mode], f"{told.modes[mode]} {name}") for mode, name in names.items()])
 
 
 def _size(error: float, unit: str) -> str:
     """Return the text of an error."""
     return f"{error:.2g} {unit}" if error >= 0.01 else localize("0.01 {} or less", unit)
-
-
-def _entry(pen: Pen, x: float, y: float, color: tuple[float, float, float], text: str) -> None:
-    """Draw a dot and what it stands for."""
-    radius, size = 4.0 * pen.scale, (SMALL + 1.0) * pen.scale
-    middle = y + 0.36 * size
-    pen.picture.dots.append(Dot(x + radius, middle, radius + pen.scale, pen.look.frame))
-    pen.picture.dots.append(Dot(x + radius, middle, radius, color))
-    pen.picture.words.append(Words(x + 3.5 * radius, y, size, pen.look.ink, text))
 
 
 def _draw_brief(told: Readings, pen: Pen, top: float) -> None:
