@@ -124,9 +124,8 @@ def blisters(results: Results) -> Any:
         first.plot([], [], **DASHED, label="bed at rest")
         first.plot([], [], color=INK, linewidth=1.2, label="fingertip")
         first.plot([], [], "o", color=INK, label="cell that feels it")
-        handles, labels = first.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper right", ncols=5, bbox_to_anchor=(0.99, 0.998),
-                      handlelength=1.6, columnspacing=1.2)  # fmt: skip
+        figure.legend(*first.get_legend_handles_labels(), loc="upper right", ncols=5,
+                      bbox_to_anchor=(0.99, 0.998), handlelength=1.6, columnspacing=1.2)  # fmt: skip
     return figure
 
 
@@ -197,10 +196,12 @@ def oscillation(results: Results) -> Any:
         place,
     ):
         detail = place("detail", 0.85, 4.4, 11.7, 2.25)
-        set_point = _details(detail, results, middle)
-        detail.axhline(set_point, **DASHED)
+        _details(detail, results, middle)
+        set_point = results.printed[METHODS[0]].scene.set_point
+        assert set_point is not None  # Method I has one
+        detail.axhline(set_point.force, **DASHED)
         detail.set(xlabel="time after the press (s)", ylabel="total force (N)", xlim=(-0.2, 2.4))
-        detail.set_ylim(0.0, 2.5 * set_point)
+        detail.set_ylim(0.0, 2.5 * set_point.force)
         detail.set_title(f"$K_p$ = {middle:g} 1/m (beyond the frame: the press itself)")
         legend_above(detail)
         swing = place("amplitude", 0.85, 0.75, 5.4, 2.6)
@@ -231,19 +232,13 @@ def _scale_gains(axes: Any, highest: float, label: str) -> None:
     axes.set(xlabel=label, ylim=(0.0, None))
 
 
-def _details(axes: Any, results: Results, position_gain: float) -> float:
+def _details(axes: Any, results: Results, position_gain: float) -> None:
     """Draw the force at the lowest gain, at the last one that is calm, and at the first that is not."""
-    gains = sorted(gain for gain, known in results.details if known == position_gain)
-    calm, wild = results.onset(position_gain)
-    chosen = list(dict.fromkeys(gain for gain in (gains[0], calm, wild) if gain is not None))
+    lowest = min(gain for gain, known in results.details if known == position_gain)
+    chosen = dict.fromkeys(gain for gain in (lowest, *results.onset(position_gain)) if gain is not None)
     for color, gain in zip(LINES, chosen, strict=False):
-        done, quick = results.details[gain, position_gain]
-        axes.plot(
-            done.history["time"] - quick, done.history["total_force"], color=color,
-            linewidth=1.4, label=f"$K_f$ = {gain:g} 1/N",
-        )  # fmt: skip
-    assert done.scene.set_point is not None  # Method I has one
-    return done.scene.set_point.force
+        label = f"$K_f$ = {gain:g} 1/N"
+        axes.plot(*results.details[gain, position_gain], color=color, linewidth=1.4, label=label)
 
 
 def tracking(results: Results) -> Any:
@@ -257,12 +252,13 @@ def tracking(results: Results) -> Any:
         for name, label, factor, limit, axes in panels:
             for marker, method in zip(MARKERS, COMPARED, strict=False):
                 row, color = results.tracks.get(method, []), METHOD_COLORS[method]
-                speed = [one.speed * MM for one in row]
-                value = [getattr(one, name) * factor for one in row]
-                axes.plot(speed, value, color=color, alpha=0.9, label=NAMES[method] if row else None)
-                for one, x, y in zip(row, speed, value, strict=True):
-                    fill = color if one.losses == 0 and one.loss_share == 0.0 else "white"
-                    axes.plot(x, y, marker, color=color, markerfacecolor=fill, markersize=7)
+                speed = np.array([one.speed * MM for one in row])
+                value = np.array([getattr(one, name) * factor for one in row])
+                lost = np.array([one.losses > 0 or one.loss_share > 0.0 for one in row], dtype=bool)
+                look: dict[str, Any] = {"color": color, "markersize": 7}
+                title = NAMES[method] if row else None
+                axes.plot(speed, value, marker=marker, label=title, **look)
+                axes.plot(speed[lost], value[lost], marker, markerfacecolor="white", **look)
             axes.axhline(limit * factor, **DASHED)
             axes.axvline(PAPER_SPEED * MM, **DOTTED)
             axes.set(xlabel="finger's speed (mm/s)", ylabel=label, xlim=(0, None), ylim=(0, None))
@@ -271,9 +267,8 @@ def tracking(results: Results) -> Any:
         first.plot([], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost")
         first.plot([], [], **DASHED, label="criterion")
         first.plot([], [], **DOTTED, label="the paper's 15 mm/s")
-        handles, labels = first.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper left", ncols=6, bbox_to_anchor=(0.005, 0.93),
-                      fontsize=10, handlelength=1.2, columnspacing=0.8)  # fmt: skip
+        figure.legend(*first.get_legend_handles_labels(), loc="upper left", ncols=6, fontsize=10,
+                      bbox_to_anchor=(0.005, 0.93), handlelength=1.2, columnspacing=0.8)  # fmt: skip
     return figure
 
 
@@ -339,21 +334,17 @@ def _gains(axes: Any, results: Results) -> None:
 def _radius(axes: Any, results: Results) -> None:
     kinds = sorted({(one.thresholds, one.radius) for one in results.located})
     least = min(radius for _, radius in kinds)
-    for known, radius in kinds:
-        row = [
-            one
-            for one in sorted(results.located, key=lambda one: one.noise)
-            if (one.thresholds, one.radius) == (known, radius) and one.scatter is not None
-        ]
+    for thresholds, radius in kinds:
+        row = [one for one in sorted(results.located) if (one.thresholds, one.radius) == (thresholds, radius)]
         # With thresholds both lie upon each other: the smaller markers on top.
-        near = f"$r_{{VM}}$ = {radius * MM:g} mm" if radius == least else "no radius"
-        axes.plot(
-            [one.noise * MM for one in row], [(one.scatter or 0.0) * MM for one in row],
-            color=LINES[int(radius != least)], marker="os"[int(radius != least)],
-            markersize=5 if radius == least else 9, zorder=3 if radius == least else 2,
-            linestyle="--" if known else "-", markerfacecolor="white" if known else None,
-            label=near + (", thresholds" if known else ""),
-        )  # fmt: skip
+        near = radius == least
+        name = f"$r_{{VM}}$ = {radius * MM:g} mm" if near else "no radius"
+        look: dict[str, Any] = {"markersize": 5, "zorder": 3} if near else {"markersize": 9, "zorder": 2}
+        look |= {"linestyle": "--", "markerfacecolor": "white"} if thresholds else {}
+        noise = [one.noise * MM for one in row]
+        scatter = [np.nan if one.scatter is None else one.scatter * MM for one in row]
+        name += ", thresholds" if thresholds else ""
+        axes.plot(noise, scatter, color=LINES[not near], marker="os"[not near], label=name, **look)
     axes.set(xlabel="noise of a cell's force sensor (mN)", ylabel="scatter of the master (mm)")
     axes.set(title="Method I, finger held still", xlim=(0.0, None), ylim=(0.0, None))
     axes.legend(loc="upper left", borderaxespad=0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from digiclay.core.base.arrays import Floats
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result
 from digiclay.core.studies.speed_limits import Criterion, Drag, Follows
@@ -155,7 +156,7 @@ class Results:
     fastest: dict[tuple[str, str], float | None] = field(default_factory=dict)
     lifting: dict[str, float | None] = field(default_factory=dict)
     swings: list[Swing] = field(default_factory=list)
-    details: dict[tuple[float, float], tuple[Result, float]] = field(default_factory=dict)
+    details: dict[tuple[float, float], tuple[Floats, Floats]] = field(default_factory=dict)
     quicker: list[Swing] = field(default_factory=list)
     quicker_speed: float = 0.0
     wild: Session | None = None

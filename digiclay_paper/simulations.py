@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from digiclay.core.base.modes import Mode
@@ -100,8 +101,7 @@ def vary(results: Results, extent: Extent, told: Told) -> None:
         for method in methods:
             for name in extent.ways:
                 told(f"drag {variant}, {name}, {method}")
-                changed = load(find(SESSION), [Setting("control.method", method), setting])
-                results.dragged[variant, method, name] = dragged(changed, WAYS[name])[0]
+                results.dragged[variant, method, name] = dragged(_load(method, setting), WAYS[name])[0]
     for noise in extent.noises:
         told(f"finger located under a noise of {noise * 1e3:g} mN")
         for thresholds in (False, True):
@@ -167,13 +167,11 @@ def simulate(extent: Extent, told: Told) -> Results:
     for method in METHODS:
         _track(results, method, extent, told)
     sessions(results, told)
-    for position_gain in extent.position_gains:
-        for gain in extent.gains:
-            told(f"oscillation, K_p {position_gain:g} 1/m, K_f {gain:g} 1/N")
-            found, done, quick = _swing(gain, position_gain)
-            results.swings.append(found)
-            small = {name: done.history[name] for name in ("time", "total_force")}
-            results.details[gain, position_gain] = replace(done, history=small), quick
+    for position_gain, gain in product(extent.position_gains, extent.gains):
+        told(f"oscillation, K_p {position_gain:g} 1/m, K_f {gain:g} 1/N")
+        found, done, quick = _swing(gain, position_gain)
+        results.swings.append(found)
+        results.details[gain, position_gain] = done.history["time"] - quick, done.history["total_force"]
     for gain in extent.gains:
         told(f"oscillation, a quicker device, K_f {gain:g} 1/N")
         found, done, _ = _swing(gain, extent.position_gains[0], QUICKER)
@@ -205,7 +203,7 @@ def _run_third(results: Results, extent: Extent, told: Told) -> None:
         wider = replace(extent, drags=(extent.drags[0], highest), speeds=(*extent.speeds, *more))
         _track(results, THIRD, wider, told)
     told(f"the paper's session, {THIRD}")
-    scene = load(find(SESSION), [Setting("control.method", THIRD)])
+    scene = _load(THIRD)
     results.printed[THIRD] = results.session[THIRD] = _boiled_down(_run(scene))
     if results.slow > 1.0:
         results.session[THIRD] = _boiled_down(_run(scenes.slowed(scene, results.slow)))
@@ -216,15 +214,14 @@ def _go_wild(results: Results, told: Told) -> None:
     first = results.onset(results.printed[METHODS[0]].gain("position_gain"))[1]
     if first is not None:
         told(f"the paper's session, K_f {first:g} 1/N")
-        settings = [Setting("control.method", METHODS[0]), Setting("control.force_gain", f"{first!r}")]
-        found = load(find(SESSION), settings)
+        found = _load(METHODS[0], Setting("control.force_gain", f"{first!r}"))
         shorter = replace(found.simulation, duration=DETAIL)
         results.wild = _boiled_down(_run(replace(found, simulation=shorter)))
 
 
 def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
     """Measure how fast a fingertip a method follows; every drag of the bisection is one more of `tracks`."""
-    found = load(find(SESSION), [Setting("control.method", method)])
+    found = _load(method)
     for name, way in DRAGS.items():
         told(f"drag at {PAPER_SPEED * 1e3:g} mm/s, {name}, {method}")
         results.dragged[AS_IT_IS, method, name], done = one, _ = dragged(found, way)
@@ -260,8 +257,7 @@ def sessions(results: Results, told: Told, session: str = SESSION) -> None:
     """Run the paper's session at its times, and again slowly where a method loses the fingertip."""
     for method in METHODS:
         told(f"the paper's session, {method}")
-        found = load(find(session), [Setting("control.method", method)])
-        results.printed[method] = _boiled_down(_run(found))
+        results.printed[method] = _boiled_down(_run(_load(method, session=session)))
     results.session = dict(results.printed)
     if not any(done.lost for done in results.printed.values()):
         return
@@ -275,6 +271,11 @@ def sessions(results: Results, told: Told, session: str = SESSION) -> None:
         results.session[method] = _boiled_down(_run(slowly))
 
 
+def _load(method: str, *settings: Setting, session: str = SESSION) -> Scene:
+    """Return the scene of a session with a method and other settings."""
+    return load(find(session), [Setting("control.method", method), *settings])
+
+
 def _run(scene: Scene) -> Result:
     """Run a scene with a row a control period."""
     return run(replace(scene, recorder=Recorder()))
@@ -283,13 +284,9 @@ def _run(scene: Scene) -> Result:
 def _boiled_down(done: Result) -> Session:
     """Return what is drawn and judged of a session: its whole history takes a hundred megabytes."""
     follow = np.sum(done.history["mode"] == Mode.FORCE_FOLLOW, axis=1)
-    kept = {
-        name: np.concatenate([done.history[name][:-1:THINNED], done.history[name][-1:]])
-        for name in ("time", "height", "total_force", "fingertip")
-    }
-    wanted = find_set_point(done.scene.set_point, follow)
-    for name, values in (("set_point", wanted), ("following", follow)):
-        kept[name] = np.concatenate([values[:-1:THINNED], values[-1:]])
+    rows = {name: done.history[name] for name in ("time", "height", "total_force", "fingertip")}
+    rows |= {"set_point": find_set_point(done.scene.set_point, follow), "following": follow}
+    kept = {name: np.concatenate([values[:-1:THINNED], values[-1:]]) for name, values in rows.items()}
     kept["position"] = done.history["position"]
     followers = float(follow[follow > 0].mean()) if np.any(follow) else 0.0
     early = done.history["time"] <= DETAIL
