@@ -127,9 +127,13 @@ def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -
     return replace(varied, whole=whole, si=declared.unit, factor=factor)
 
 
+#: Index of the unchanged scene among the points.
+UNCHANGED = 0
+
+
 @dataclass(frozen=True)
 class Subject:
-    """Scene, varied parameters and metrics."""
+    """Scene, varied parameters and metrics of a study or a tuning, and its points."""
 
     #: The scene's file, what the options change of it at every point, and the scene with that.
     path: Path
@@ -148,6 +152,64 @@ class Subject:
     def keys(self) -> tuple[str, ...]:
         """The varied parameters."""
         return tuple(varied.key for varied in self.ranges)
+
+    @property
+    def unchanged(self) -> Point:
+        """The unchanged scene."""
+        return Point(UNCHANGED, (), self.scene)
+
+    def make_points(self, shares: Floats, first: int, progress: Any = None) -> list[Point]:
+        """Return the points at shares (points, parameters) of the ranges. `first`: index of the first."""
+        rows = [tuple(map(Range.find_word, self.ranges, row)) for row in shares]
+        return place_points(self.path, self.settings, self.keys, rows, first=first, progress=progress)
+
+    def open_folder(self, path: Path, name: str, plan: Mapping[str, Any]) -> AbstractContextManager[Folder]:
+        """Open the folder of a study or a tuning, see `open_points`. `plan`: what else points depend on."""
+        description = {
+            "digiclay": __version__,
+            "ranges": {varied.key: str(varied) for varied in self.ranges},
+            **plan,
+            "scene": hash_points([self.unchanged]),
+        }
+
+        def describe(there: Mapping[str, Any]) -> str:
+            for key, here in description.items():
+                if there.get(key) != here:
+                    plain = isinstance(there.get(key), (int, str)) and key != "scene"
+                    return f"{key} {there[key]}" if plain else f"with another {key.removesuffix('s')}"
+            return "of another kind"
+
+        return open_points(path, name, description, describe)
+
+    def evaluate_unchanged(self, evaluation: Evaluation, *, quiet: bool) -> Record | None:
+        """Return the record of the unchanged scene, None after a stop; print how long others take."""
+        evaluation.finish([(self.unchanged,)], ())
+        records = evaluation.collect()
+        record = records.get(UNCHANGED)
+        if record is not None and "error" in record:
+            raise DigiclayError(f"The unchanged scene fails: {record['error']}")
+        left = evaluation.total - len(records)
+        if record is not None and left and not quiet:
+            time = format_duration(left * record["figures"]["run_time"])
+            runs = f"{left} runs: about {time} of one core if each is run by itself, less in batches"
+            print(runs, flush=True)
+        return record
+
+    def write_table(
+        self, path: Path, points: Sequence[Point], records: Mapping[int, Record], *extra: str
+    ) -> None:
+        """Write a table of points, in SI units; the unchanged scene has its own values.
+
+        `extra`: metrics beside those of the subject.
+        """
+        own = tuple(find_value(self.scene, key, "") for key in self.keys)
+        rows = [
+            (point.index, *(tuple(map(Range.convert, self.ranges, point.words)) or own)) for point in points
+        ]
+        varied = [("point", ""), *((each.key, each.si) for each in self.ranges)]
+        results = [records[point.index] for point in points]
+        names = dict.fromkeys((*self.names, *extra))
+        write_whole(path, format_table(varied, rows, results, list(names)).encode())
 
 
 def add_subject(parser: argparse.ArgumentParser, metrics: str) -> None:
@@ -171,66 +233,3 @@ def refuse_too_many(option: str, points: int) -> None:
     """Refuse a plan of more points than a sweep may have. `option`: the one that sets their number."""
     if points > MOST:
         raise ParameterError(option, "", f"must come to {MOST} points at most", f"{points} points")
-
-
-def make_points(subject: Subject, shares: Floats, first: int, progress: Any = None) -> list[Point]:
-    """Return the points at shares (points, parameters) of the ranges. `first`: index of the first point."""
-    rows = [tuple(map(Range.find_word, subject.ranges, row)) for row in shares]
-    return place_points(subject.path, subject.settings, subject.keys, rows, first=first, progress=progress)
-
-
-#: Index of the unchanged scene among the points.
-UNCHANGED = 0
-
-
-def open_folder(
-    path: Path, name: str, subject: Subject, plan: Mapping[str, Any]
-) -> AbstractContextManager[Folder]:
-    """Open the folder of a study or a tuning, see `open_points`. `plan`: what else the points depend on."""
-    description = {
-        "digiclay": __version__,
-        "ranges": {varied.key: str(varied) for varied in subject.ranges},
-        **plan,
-        "scene": hash_points([Point(UNCHANGED, (), subject.scene)]),
-    }
-
-    def describe(there: Mapping[str, Any]) -> str:
-        for key, here in description.items():
-            if there.get(key) != here:
-                plain = isinstance(there.get(key), (int, str)) and key != "scene"
-                return f"{key} {there[key]}" if plain else f"with another {key.removesuffix('s')}"
-        return "of another kind"
-
-    return open_points(path, name, description, describe)
-
-
-def evaluate_unchanged(evaluation: Evaluation, subject: Subject, *, quiet: bool) -> Record | None:
-    """Return the record of the unchanged scene, None after a stop; print how long the other points take."""
-    evaluation.finish([(Point(UNCHANGED, (), subject.scene),)], ())
-    records = evaluation.collect()
-    record = records.get(UNCHANGED)
-    if record is not None and "error" in record:
-        raise DigiclayError(f"The unchanged scene fails: {record['error']}")
-    left = evaluation.total - len(records)
-    if record is not None and left and not quiet:
-        time = format_duration(left * record["figures"]["run_time"])
-        print(f"{left} runs: about {time} of one core if each is run by itself, less in batches", flush=True)
-    return record
-
-
-def write_points(
-    path: Path,
-    subject: Subject,
-    points: Sequence[Point],
-    records: Mapping[int, Record],
-    extra: Sequence[str] = (),
-) -> None:
-    """Write a table of points, in SI units; the unchanged scene has its own values."""
-    own = tuple(find_value(subject.scene, key, "") for key in subject.keys)
-    rows = [
-        (point.index, *(tuple(map(Range.convert, subject.ranges, point.words)) or own)) for point in points
-    ]
-    varied = [("point", ""), *((each.key, each.si) for each in subject.ranges)]
-    names = dict.fromkeys((*subject.names, *extra))
-    results = [records[point.index] for point in points]
-    write_whole(path, format_table(varied, rows, results, list(names)).encode())

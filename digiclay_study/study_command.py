@@ -35,17 +35,7 @@ from .indices import (
     make_response,
     sample_shares,
 )
-from .point_series import (
-    UNCHANGED,
-    Subject,
-    add_subject,
-    evaluate_unchanged,
-    make_points,
-    open_folder,
-    read_subject,
-    refuse_too_many,
-    write_points,
-)
+from .point_series import UNCHANGED, Subject, add_subject, read_subject, refuse_too_many
 
 EXAMPLES = """\
 examples:
@@ -99,18 +89,18 @@ def carry_out(arguments: argparse.Namespace) -> int:
     plan = {"samples": arguments.samples, "seed": arguments.seed, "orders": orders}
     with Counted(sys.stderr, "study", "points read", quiet=arguments.quiet) as bar:
         shares = sample_shares(arguments.samples, count, arguments.seed, second=second)
-        points = make_points(subject, shares, 1, bar)
+        points = subject.make_points(shares, 1, bar)
         bundles = make_bundles(points, errors=subject.errors)
 
     def evaluate(evaluation: Evaluation) -> None:
-        if evaluate_unchanged(evaluation, subject, quiet=arguments.quiet):
+        if subject.evaluate_unchanged(evaluation, quiet=arguments.quiet):
             evaluation.finish(bundles.every, subject.keys)
 
     def write(records: dict[int, Record]) -> list[str]:
         lines = _write(arguments, subject, points, records)
         return [*lines, *bundles.describe(), f"written to {arguments.out}: start with study.md"]
 
-    opened = open_folder(arguments.out, "study", subject, plan)
+    opened = subject.open_folder(arguments.out, "study", plan)
     return run_series(
         arguments, "study", total + 1, opened, evaluate, write, errors=subject.errors,
         pieces=len(bundles.every),
@@ -143,11 +133,10 @@ def _write(
     unchanged = records[UNCHANGED]["figures"]
     findings = Findings(arguments, subject, len(points), unchanged, responses, indices)
     out: Path = arguments.out
-    every = (Point(UNCHANGED, (), subject.scene), *points)
-    write_points(out / "points.csv", subject, every, records, [LOSS])
+    subject.write_table(out / "points.csv", [subject.unchanged, *points], records, LOSS)
     write_whole(out / "indices.csv", format_index_table(findings).encode())
     save(draw_indices(subject.keys, indices, f"Sobol indices, {subject.scene.name}"), out / PICTURE)
-    write_whole(out / "study.md", format_page(findings, [PICTURE]).encode())
+    write_whole(out / "study.md", format_page(findings).encode())
     return [*_summarize(findings), *notes]
 
 
@@ -211,12 +200,12 @@ def format_index_table(findings: Findings) -> str:
     return format_csv(rows)
 
 
-def format_page(findings: Findings, pictures: Sequence[str]) -> str:
-    """Return the page of a study in Markdown. `pictures`: files beside it."""
-    return "\n".join(_write_page(findings, pictures)) + "\n"
+def format_page(findings: Findings) -> str:
+    """Return the page of a study in Markdown."""
+    return "\n".join(_write_page(findings)) + "\n"
 
 
-def _write_page(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
+def _write_page(findings: Findings) -> Iterator[str]:
     arguments, subject = findings.arguments, findings.subject
     yield f"# Sensitivity of {subject.scene.name}, digiclay {__version__}\n"
     yield f"    {_format_call(arguments, subject)}\n"
@@ -240,7 +229,7 @@ def _write_page(findings: Findings, pictures: Sequence[str]) -> Iterator[str]:
         "parameter has no effect on the output within its range. ± is half the width of the "
         f"{CONFIDENCE:.0%} interval, from resampling.\n"
     )
-    yield from (f"![Indices]({name})\n" for name in pictures)
+    yield f"![Indices]({PICTURE})\n"
     keys = subject.keys
     for name, indices in findings.indices.items():
         yield f"### `{name}`\n"

@@ -24,17 +24,7 @@ from digiclay.plots.sweep import read_unit
 from numpy.typing import NDArray
 
 from .indices import find_excess_losses, get_figure
-from .point_series import (
-    UNCHANGED,
-    Subject,
-    add_subject,
-    evaluate_unchanged,
-    make_points,
-    open_folder,
-    read_subject,
-    refuse_too_many,
-    write_points,
-)
+from .point_series import UNCHANGED, Subject, add_subject, read_subject, refuse_too_many
 
 EXAMPLES = """\
 examples:
@@ -80,7 +70,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         return [*_write(arguments, subject, points, records, choice), f"written to {arguments.out}"]
 
     return run_series(
-        arguments, "tune", total, open_folder(arguments.out, "tuning", subject, plan),
+        arguments, "tune", total, subject.open_folder(arguments.out, "tuning", plan),
         lambda evaluation: _evolve(arguments, subject, evaluation, points), write, errors=subject.errors,
         pieces=-(-arguments.population // 4),
     )  # fmt: skip
@@ -99,12 +89,12 @@ def _evolve(
 ) -> None:
     """Evaluate all generations, or those before a stop, and add their points to those that are done."""
     generations = propose_generations(len(subject.ranges), arguments.population, arguments.seed)
-    unchanged = evaluate_unchanged(evaluation, subject, quiet=arguments.quiet)
+    unchanged = subject.evaluate_unchanged(evaluation, quiet=arguments.quiet)
     if unchanged is None:
         return
     shares = next(generations)
     while True:
-        points = make_points(subject, shares, len(done) + 1)
+        points = subject.make_points(shares, len(done) + 1)
         _refuse_others(evaluation.folder.path, subject, points, evaluation.records)
         evaluation.finish(make_bundles(points, errors=subject.errors).every, subject.keys)
         records = evaluation.collect()
@@ -143,15 +133,15 @@ def _write(
 
     from .study_plots import draw_front
 
-    every = (Point(UNCHANGED, (), subject.scene), *points)
+    every = [subject.unchanged, *points]
     trials = judge_trials(subject.names, [records[point.index] for point in every], records[UNCHANGED])
     front = trials.find_front()
     knee = find_knee(trials.values[front])
     least = {name: int(np.argmin(trials.values[front, i])) for i, name in enumerate(subject.names)}
     chosen = int(front[{KNEE: knee, **least}[choice]])
     out: Path = arguments.out
-    write_points(out / "points.csv", subject, every, records)
-    write_points(out / "front.csv", subject, [every[index] for index in front], records)
+    subject.write_table(out / "points.csv", every, records)
+    subject.write_table(out / "front.csv", [every[index] for index in front], records)
     outputs = _describe(subject.names, trials.values[chosen])
     text = f"Chosen by digiclay tune from {len(points)} runs, {choice} of the front: {outputs}"
     scene = every[chosen].scene

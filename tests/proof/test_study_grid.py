@@ -18,7 +18,7 @@ from tests.scene_files import SMALL_BLISTER
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
-from digiclay_study.point_series import Subject, fit_ranges, make_points, read_range
+from digiclay_study.point_series import Subject, fit_ranges, read_range
 from digiclay_study.tune_command import find_front
 
 Floats = NDArray[np.float64]
@@ -56,7 +56,7 @@ def grid(scene: Path) -> Floats:
     ranges = tuple(fit_ranges([read_range(said) for said in VARIED], scene, ()))
     middles = (np.arange(COUNT) + 0.5) / COUNT
     shares = np.stack(np.meshgrid(middles, middles, indexing="ij"), axis=-1).reshape(-1, 2)
-    points = make_points(Subject(scene, (), load(scene), ranges, NAMES), shares, 0)
+    points = Subject(scene, (), load(scene), ranges, NAMES).make_points(shares, 0)
     found: list[Any] = evaluate_bundle(points)
     values = np.array([[record["figures"][name] for name in NAMES] for record in found])
     return values.reshape(COUNT, COUNT, 2)

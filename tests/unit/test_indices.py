@@ -26,7 +26,7 @@ from digiclay_study.indices import (
     make_response,
     sample_shares,
 )
-from digiclay_study.point_series import Range, Subject, open_folder
+from digiclay_study.point_series import Range, Subject
 
 #: Ishigami's function sin x1 + A sin² x2 + B x3⁴ sin x1 on [-π, π]³, and its indices by integration.
 A, B = 7.0, 0.1
@@ -67,7 +67,7 @@ def run_study(out: Path, samples: int, seed: int, *, second: bool) -> Indices:
     points = [Point(index, row, None) for index, row in enumerate(words, 1)]
     bundles = [points[first : first + 64] for first in range(0, len(points), 64)]
     subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
-    with open_folder(out, "study", subject, {"samples": samples}) as folder:
+    with subject.open_folder(out, "study", {"samples": samples}) as folder:
         assert evaluate_with(evaluate_ishigami, folder, bundles).failed == {}
         records = folder.read_records()
     reference: Record = {"figures": {}}
@@ -109,7 +109,7 @@ def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path)
     points = [Point(index, ("0.5", "0.5", "0.5"), None) for index in range(1, 5)]
     bundles = [points[:2], points[2:]]
     subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
-    with open_folder(tmp_path / "out", "study", subject, {}) as folder:
+    with subject.open_folder(tmp_path / "out", "study", {}) as folder:
         failed = evaluate_with(die, folder, bundles).failed
         assert failed == {index: {"error": "A worker died twice of this."} for index in (1, 2)}
         assert set(folder.read_records()) == {3, 4}
