@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands.gallery import WIDTH
-from digiclay.commands.job_steps import Work, find_frames, is_done, make_frames
+from digiclay.commands.job_steps import Work, find_frames, is_done
 from digiclay.commands.render import ARRAYS, stage_moving
 from digiclay.compat import scratch
 from digiclay.core.files.run_folder import lock_name
@@ -146,7 +146,7 @@ def test_frames_drawn_in_ranges_are_those_of_the_film(job: Path, capsys: pytest.
     name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
     asked = iter([False, True])
     with pytest.raises(KeyboardInterrupt):
-        make_frames(Work(JOB, RUN, outputs, lambda: next(asked), lambda step, share: None), "film", "2-4")
+        Work(JOB, RUN, outputs, lambda: next(asked), lambda step, share: None).make_frames("film", "2-4")
     assert list_missing(folder, range(COUNT)) == [0, 1, 4]
     assert name_frame(folder, 3).stat().st_mtime_ns == kept
     np.testing.assert_array_equal(read_picture(name_frame(folder, 2)), read_picture(name_frame(whole, 2)))

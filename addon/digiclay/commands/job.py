@@ -23,22 +23,7 @@ from ..core.studies.series import describe_error
 from ..plugins.method_loader import CODE, resolve_word
 from .arguments import add_command, load_by_option, say
 from .batch_folder import note_failure, read_batch, refresh_page
-from .job_steps import (
-    ERROR,
-    FILES,
-    PROGRESS,
-    RUNS,
-    TIMING,
-    RunState,
-    Tell,
-    Work,
-    check_outputs,
-    judge_run,
-    list_lacking,
-    make_film,
-    make_frames,
-    make_outputs,
-)
+from .job_steps import ERROR, FILES, PROGRESS, RUNS, TIMING, RunState, Tell, Work, check_outputs, judge_run
 from .progress import Counted
 from .stop import FAILED, STOPPED, WRONG, Stop
 
@@ -145,9 +130,9 @@ def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Te
     if only not in MOVING:
         return _do_run(arguments, work)
     if frames is not None:
-        drawn = make_frames(work, only, frames)
+        drawn = work.make_frames(only, frames)
         return f"frames {frames} of {out / only}.mp4 {'drawn' if drawn else 'were there already'}"
-    made = make_film(work, only)
+    made = work.make_film(only)
     return f"{'written to' if made else 'was done already:'} {out / only}.mp4"
 
 
@@ -163,8 +148,7 @@ def _do_run(arguments: argparse.Namespace, work: Work) -> str:
     done = arguments.overwrite or judge_run(work.job, work.run) is not RunState.WHOLE
     if done:
         done = _write_run(arguments, work, wanted)
-    for kind in list_lacking(work.run, wanted):
-        done |= make_film(work, kind)
+    done |= work.make_films(wanted)
     return f"written to {work.run}" if done else f"was done already: {work.run}"
 
 
@@ -184,7 +168,7 @@ def _write_run(arguments: argparse.Namespace, work: Work, outputs: Outputs) -> b
         if state in (RunState.CHANGED, RunState.INCOMPLETE):
             say(arguments, f"The run in {out} is {state.value}: it is done again.")
         with claim.write() as staged:
-            make_outputs(work, scene, outputs, staged, timing)
+            work.make_outputs(scene, outputs, staged, timing)
             # As they were given: by them a batch recognizes what this is the run of.
             for file in (SCENE, JOB, *([CODE] if (folder / CODE).is_file() else [])):
                 shutil.copyfile(folder / file, staged / file)

@@ -150,6 +150,27 @@ def read_fraction(lines: list[str]) -> float:
 #: Seconds between two lines of progress.
 PAUSE = 0.2
 
+
+def check_outputs(scene: Scene, outputs: Outputs) -> None:
+    """Refuse, before any work, what is bound to fail after it."""
+    if outputs.export:
+        try:
+            formats(",".join(outputs.export))
+        except argparse.ArgumentTypeError as error:
+            raise OutputError(f"export: {error}.") from None
+        require_surface(scene, "export")
+    if (outputs.needs_blender or outputs.export) and scene.recorder is None:
+        raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
+    if outputs.needs_blender:
+        refuse_without_blender()
+
+
+def find_frames(run: Path, kind: str) -> Path:
+    """Return the folder of a film's frames, its own for each definition and each version of digiclay."""
+    parts = [__version__.encode(), *((run / name).read_bytes() for name in (SCENE, JOB))]
+    return run / f"frames-{kind}-{hashlib.sha256(b'|'.join(parts)).hexdigest()[:12]}"
+
+
 #: Gets a step, and how much of the whole job is done.
 Tell = Callable[[str, float], None]
 
@@ -166,145 +187,125 @@ class Work:
     stopped: Callable[[], bool]
     tell: Tell
 
+    def make_outputs(self, scene: Scene, outputs: Outputs, out: Path, timing: dict[str, Any]) -> None:
+        """Run the session, and make all outputs in a folder; `timing` gets the seconds of each step."""
+        names = ["run", *(n for n in ("errors", "export", "still", *MOVING) if getattr(outputs, n))]
+        drawn, stopped = 0.0, self.stopped
 
-def check_outputs(scene: Scene, outputs: Outputs) -> None:
-    """Refuse, before any work, what is bound to fail after it."""
-    if outputs.export:
-        try:
-            formats(",".join(outputs.export))
-        except argparse.ArgumentTypeError as error:
-            raise OutputError(f"export: {error}.") from None
-        require_surface(scene, "export")
-    if (outputs.needs_blender or outputs.export) and scene.recorder is None:
-        raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
-    if outputs.needs_blender:
+        @contextmanager
+        def step(name: str) -> Iterator[Callable[[int, int], None]]:
+            """Time a step; give the callback of its progress."""
+
+            def progress(done: int, total: int) -> None:
+                nonlocal drawn
+                if time.monotonic() - drawn >= PAUSE:
+                    drawn = time.monotonic()
+                    self.tell(name, (names.index(name) + done / total) / len(names))
+
+            if stopped():
+                raise KeyboardInterrupt
+            began = time.perf_counter()
+            yield progress
+            timing[name] = time.perf_counter() - began
+
+        with step("run") as progress:
+            versions = {"digiclay": __version__, **describe_origin(scene)}
+            result = run(scene, progress=progress, stopped=stopped, versions=versions)
+            if result.incomplete:
+                raise KeyboardInterrupt
+        if outputs.errors:
+            with step("errors") as progress:
+                if has_every_command(scene):
+                    errors = estimate_errors(scene, result.history, progress=progress, stopped=stopped)
+                    if errors is None:
+                        raise KeyboardInterrupt
+                    result = result.with_errors(errors)
+        with step("save"):
+            save(result, out)
+        history = result.history
+        if not history:
+            return
+        if outputs.export:
+            with step("export"):
+                exported(scene, history, -1, outputs.export, out, outputs.mesh)
+        if outputs.still:
+            with step("still"):
+                draw_still(scene, history, outputs.still, out / "still.png")
+        for kind in MOVING:
+            if looks := getattr(outputs, kind):
+                with step(kind) as progress:
+                    if not draw_moving(scene, history, looks, out / f"{kind}.mp4", progress, stopped):
+                        raise KeyboardInterrupt
+        with step("thumbnail"):
+            if outputs.still:
+                of_picture(out / "still.png", out)
+            else:
+                of_heights(history["height"][-1], scene.layout.rows, scene.layout.columns, out)
+
+    def make_frames(self, kind: str, text: str) -> bool:
+        """Draw the missing frames of a range of a film, see `read_range`; return whether there were any."""
+        looks, run = self._find_looks(kind), self.run
+        if kind not in list_lacking(run, self.outputs):
+            return False
+        frames = read_range(text, looks.count(read_run(run, "time").history["time"]))
+        folder = find_frames(run, kind)
+        if not list_missing(folder, frames):
+            return False
         refuse_without_blender()
+        began = time.perf_counter()
+        with lock_name(make_folder(folder) / format_range(frames)):
+            self._draw(read_run(run, *ARRAYS), looks, kind, frames, folder)
+        note_film(run, kind, time.perf_counter() - began, encoded=False)
+        return True
 
+    def make_film(self, kind: str) -> bool:
+        """Make the film of its frames, and draw those that are missing; return whether there was none yet."""
+        looks, run, out = self._find_looks(kind), self.run, self.run / f"{kind}.mp4"
+        if kind not in list_lacking(run, self.outputs):
+            return False
+        refuse_without_blender()
+        from ..compat import scratch
+        from ..pictures.film import encode_film
 
-def make_outputs(work: Work, scene: Scene, outputs: Outputs, out: Path, timing: dict[str, Any]) -> None:
-    """Run the session, and make all outputs in a folder; `timing` gets the seconds of each step."""
-    names = ["run", *(n for n in ("errors", "export", "still", *MOVING) if getattr(outputs, n))]
-    drawn, stopped = 0.0, work.stopped
+        began = time.perf_counter()
+        with claim_files([out], PATIENCE):
+            found = read_run(run, *ARRAYS)
+            frames = range(looks.count(found.history["time"]))
+            folder = make_folder(find_frames(run, kind))
+            self._draw(found, looks, kind, frames, folder)
+            with scratch():
+                encode_film([name_frame(folder, frame) for frame in frames], out, looks)
+            note_film(run, kind, time.perf_counter() - began, encoded=True)
+            shutil.rmtree(folder, ignore_errors=True)
+        return True
 
-    @contextmanager
-    def step(name: str) -> Iterator[Callable[[int, int], None]]:
-        """Time a step; give the callback of its progress."""
+    def make_films(self, outputs: Outputs) -> bool:
+        """Make those films of some outputs that the run lacks; return whether there were any."""
+        made = [self.make_film(kind) for kind in list_lacking(self.run, outputs)]
+        return any(made)
+
+    def _find_looks(self, kind: str) -> Any:
+        """Return the settings of a film; refuse one that the job does not have, or that has no run yet."""
+        looks = getattr(self.outputs, kind)
+        if looks is None:
+            raise OutputError(f"{self.job / JOB} has no section [{kind}].")
+        state = judge_run(self.job, self.run)
+        if state is not RunState.WHOLE:
+            rule = f"the run in {self.run} is {state.value}: do 'digiclay job {self.job} --only run' first"
+            raise OutputError(f"--only {kind} needs a finished run, and {rule}.")
+        return looks
+
+    def _draw(self, run: Run, looks: Any, kind: str, frames: range, folder: Path) -> None:
+        """Draw those frames that are missing; what killed processes have left of others is removed."""
+        remove_abandoned(folder)
+        if not list_missing(folder, frames):
+            return
+        from ..pictures.film import draw_frames
 
         def progress(done: int, total: int) -> None:
-            nonlocal drawn
-            if time.monotonic() - drawn >= PAUSE:
-                drawn = time.monotonic()
-                work.tell(name, (names.index(name) + done / total) / len(names))
+            self.tell(kind, done / total)
 
-        if stopped():
-            raise KeyboardInterrupt
-        began = time.perf_counter()
-        yield progress
-        timing[name] = time.perf_counter() - began
-
-    with step("run") as progress:
-        versions = {"digiclay": __version__, **describe_origin(scene)}
-        result = run(scene, progress=progress, stopped=stopped, versions=versions)
-        if result.incomplete:
-            raise KeyboardInterrupt
-    if outputs.errors:
-        with step("errors") as progress:
-            if has_every_command(scene):
-                errors = estimate_errors(scene, result.history, progress=progress, stopped=stopped)
-                if errors is None:
-                    raise KeyboardInterrupt
-                result = result.with_errors(errors)
-    with step("save"):
-        save(result, out)
-    history = result.history
-    if not history:
-        return
-    if outputs.export:
-        with step("export"):
-            exported(scene, history, -1, outputs.export, out, outputs.mesh)
-    if outputs.still:
-        with step("still"):
-            draw_still(scene, history, outputs.still, out / "still.png")
-    for kind in MOVING:
-        if looks := getattr(outputs, kind):
-            with step(kind) as progress:
-                if not draw_moving(scene, history, looks, out / f"{kind}.mp4", progress, stopped):
-                    raise KeyboardInterrupt
-    with step("thumbnail"):
-        if outputs.still:
-            of_picture(out / "still.png", out)
-        else:
-            of_heights(history["height"][-1], scene.layout.rows, scene.layout.columns, out)
-
-
-def find_frames(run: Path, kind: str) -> Path:
-    """Return the folder of a film's frames, its own for each definition and each version of digiclay."""
-    parts = [__version__.encode(), *((run / name).read_bytes() for name in (SCENE, JOB))]
-    return run / f"frames-{kind}-{hashlib.sha256(b'|'.join(parts)).hexdigest()[:12]}"
-
-
-def make_frames(work: Work, kind: str, text: str) -> bool:
-    """Draw the missing frames of a range of a film, see `read_range`; return whether there were any."""
-    looks, run = _find_looks(work, kind), work.run
-    if kind not in list_lacking(run, work.outputs):
-        return False
-    frames = read_range(text, looks.count(read_run(run, "time").history["time"]))
-    folder = find_frames(run, kind)
-    if not list_missing(folder, frames):
-        return False
-    refuse_without_blender()
-    began = time.perf_counter()
-    with lock_name(make_folder(folder) / format_range(frames)):
-        _draw(work, read_run(run, *ARRAYS), looks, kind, frames, folder)
-    note_film(run, kind, time.perf_counter() - began, encoded=False)
-    return True
-
-
-def make_film(work: Work, kind: str) -> bool:
-    """Make the film of its frames, and draw those that are missing; return whether there was none yet."""
-    looks, run, out = _find_looks(work, kind), work.run, work.run / f"{kind}.mp4"
-    if kind not in list_lacking(run, work.outputs):
-        return False
-    refuse_without_blender()
-    from ..compat import scratch
-    from ..pictures.film import encode_film
-
-    began = time.perf_counter()
-    with claim_files([out], PATIENCE):
-        found = read_run(run, *ARRAYS)
-        frames = range(looks.count(found.history["time"]))
-        folder = make_folder(find_frames(run, kind))
-        _draw(work, found, looks, kind, frames, folder)
-        with scratch():
-            encode_film([name_frame(folder, frame) for frame in frames], out, looks)
-        note_film(run, kind, time.perf_counter() - began, encoded=True)
-        shutil.rmtree(folder, ignore_errors=True)
-    return True
-
-
-def _find_looks(work: Work, kind: str) -> Any:
-    """Return the settings of a film; refuse one that the job does not have, or that has no run yet."""
-    looks = getattr(work.outputs, kind)
-    if looks is None:
-        raise OutputError(f"{work.job / JOB} has no section [{kind}].")
-    state = judge_run(work.job, work.run)
-    if state is not RunState.WHOLE:
-        rule = f"the run in {work.run} is {state.value}: do 'digiclay job {work.job} --only run' first"
-        raise OutputError(f"--only {kind} needs a finished run, and {rule}.")
-    return looks
-
-
-def _draw(work: Work, run: Run, looks: Any, kind: str, frames: range, folder: Path) -> None:
-    """Draw those frames that are missing; what killed processes have left of others is removed."""
-    remove_abandoned(folder)
-    if not list_missing(folder, frames):
-        return
-    from ..pictures.film import draw_frames
-
-    def progress(done: int, total: int) -> None:
-        work.tell(kind, done / total)
-
-    out = work.run / f"{kind}.mp4"
-    with stage_moving(run.scene, run.history, looks) as shots:
-        if not draw_frames(shots, list_missing(folder, frames), folder, out, progress, work.stopped):
-            raise KeyboardInterrupt
+        out = self.run / f"{kind}.mp4"
+        with stage_moving(run.scene, run.history, looks) as shots:
+            if not draw_frames(shots, list_missing(folder, frames), folder, out, progress, self.stopped):
+                raise KeyboardInterrupt
