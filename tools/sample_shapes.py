@@ -282,8 +282,8 @@ def picture(path: Path) -> None:
     import matplotlib.pyplot as plt
     from digiclay.core.model.actuator import Actuator
     from digiclay.core.model.layout import Layout, make_grid
+    from digiclay.core.shapes.fitting import fit_shape, list_shapes
     from digiclay.core.shapes.request import Shape
-    from digiclay.core.shapes.source_file import fit_shape, list_shapes
     from matplotlib.colors import LightSource
 
     bed = make_grid(Layout(rows=49, columns=49, pitch=2e-3))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.scene.scene_source import SAMPLES, find, list_samples, load
-from digiclay.core.shapes.source_file import list_shapes
+from digiclay.core.shapes.fitting import list_shapes
 from digiclay.operators.add_bed import SceneFiles
 from digiclay.recorded import takes
 from digiclay.roles import fingertip_of, is_bed

@@ -258,7 +258,7 @@ def test_a_file_that_is_no_picture_is_refused(tmp_path: Path) -> None:
 
 def test_the_sample_pictures_are_the_same_to_blender_and_to_pillow() -> None:
     pillow = pytest.importorskip("PIL.Image")
-    from digiclay.core.shapes.source_file import find_shape
+    from digiclay.core.shapes.fitting import find_shape
 
     for name in ("crater", "face"):
         path = find_shape(name)

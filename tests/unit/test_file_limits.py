@@ -24,9 +24,9 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.memory_limit import measure_available_memory
 from digiclay.core.session.take import Take, from_bytes, to_bytes
+from digiclay.core.shapes.fitting import read as read_shape
 from digiclay.core.shapes.heightmap import make_height_map
 from digiclay.core.shapes.request import Shape
-from digiclay.core.shapes.source_file import read as read_shape
 
 #: What refusing may take, bytes.
 LITTLE = 4_000_000

@@ -23,8 +23,8 @@ from digiclay.core.scene.forming import (
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import run
+from digiclay.core.shapes.fitting import fit_shape
 from digiclay.core.shapes.request import Shape
-from digiclay.core.shapes.source_file import fit_shape
 
 SMALL = ["--set", "layout.rows=13", "--set", "layout.columns=13"]
 BED = make_grid(Layout(13, 13))

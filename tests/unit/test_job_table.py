@@ -13,7 +13,7 @@ from digiclay.core.model.layout import make_grid
 from digiclay.core.scene.scene_source import SAMPLES, load
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.render_settings import Film, Still, Turntable
-from digiclay.core.shapes.source_file import fit_shape
+from digiclay.core.shapes.fitting import fit_shape
 from digiclay.core.studies.job_table import Outputs, make_outputs, read_jobs, read_outputs
 
 #: More settings than a batch may have.

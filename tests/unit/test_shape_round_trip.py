@@ -11,10 +11,9 @@ from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Grid, Layout, make_grid
-from digiclay.core.shapes.fitting import Fitted, fit_relief
+from digiclay.core.shapes.fitting import Fitted, fit_relief, read
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape
-from digiclay.core.shapes.source_file import read
 from digiclay.core.surface.formed import Formed
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")

@@ -17,9 +17,9 @@ from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.scene_source import load
+from digiclay.core.shapes.fitting import SAMPLES, find_shape, fit_shape, list_shapes, read
 from digiclay.core.shapes.mesh_relief import ShapeMesh
 from digiclay.core.shapes.request import Shape
-from digiclay.core.shapes.source_file import SAMPLES, find_shape, fit_shape, list_shapes, read
 from digiclay.core.surface.formed import Body
 
 ROOT = Path(__file__).parents[2]

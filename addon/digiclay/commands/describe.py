@@ -14,7 +14,7 @@ from ..core.engine.system import System
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import SECTIONS, Scene
 from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
-from ..core.shapes.source_file import fit_shape
+from ..core.shapes.fitting import fit_shape
 from .arguments import add_command, add_options, add_scene, scene_of
 
 EXAMPLES = """\

@@ -19,8 +19,7 @@ from ..core.scene.forming import GESTURES, make_forming_scene
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import Result
-from ..core.shapes.fitting import Fitted, pack
-from ..core.shapes.source_file import find_shape, fit_shape, import_reader, list_shapes
+from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
 from .arguments import QUIET, add_command, add_options, add_scene, say, scene_of
 from .export import formats
 from .extras import Extra, plan_meshes, simulate, write_run

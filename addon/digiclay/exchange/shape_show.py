@@ -18,10 +18,9 @@ from ..core.scene.assembly import assemble
 from ..core.scene.forming import compute_display_time, find_display, find_touch_height
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
-from ..core.shapes.fitting import Fitted, Relief, fit_relief, pack
+from ..core.shapes.fitting import Fitted, Relief, fit_relief, fit_shape, pack
 from ..core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
 from ..core.shapes.request import Shape
-from ..core.shapes.source_file import fit_shape
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..live import beds

@@ -13,8 +13,8 @@ from ..core.model.trajectory import sample_poses
 from ..core.scene.scene_source import find, list_samples, load
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS, resolve
+from ..core.shapes.fitting import list_shapes
 from ..core.shapes.request import Shape
-from ..core.shapes.source_file import list_shapes
 from ..core.studies.job_table import embed_heights
 from ..device import palettes, unit, view
 from ..device.instant import Instant, find_ellipsoid, pick_pose, read

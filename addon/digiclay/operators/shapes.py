@@ -6,9 +6,8 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.shapes.fitting import pack
+from ..core.shapes.fitting import KINDS, list_shapes, pack
 from ..core.shapes.request import LENGTHS, UPWARDS, Shape
-from ..core.shapes.source_file import KINDS, list_shapes
 from ..exchange import shape_show
 from ..roles import bed_of
 from ..sessions import running

@@ -141,7 +141,7 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
     dead_time = scene.delay.dead_time if scene.delay else 0.0
     device = DeviceInfo(bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time)
     if scene.shape:
-        from ..shapes.source_file import fit_shape
+        from ..shapes.fitting import fit_shape
 
         device = replace(device, heights=fit_shape(scene.shape, bed, cell.actuator).heights)
     controller: Controller | None = None

@@ -24,8 +24,7 @@ from ..model.layout import make_grid
 from ..scene.scene_source import SAMPLES, Setting, find, load, read_table
 from ..scene.schema import Scene
 from ..session.render_settings import Film, Still, Turntable
-from ..shapes.fitting import pack
-from ..shapes.source_file import fit_shape
+from ..shapes.fitting import fit_shape, pack
 
 #: Pictures a job can leave, by their section.
 PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable, "film": Film}
