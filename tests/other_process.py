@@ -10,7 +10,9 @@ from typing import Any
 
 from tests.timeouts import TIMEOUT
 
-ADDON = Path(__file__).parents[1] / "addon"
+ROOT = Path(__file__).parents[1]
+#: Where the packages of this checkout are, also when another one is installed.
+PACKAGES = os.pathsep.join([str(ROOT / "addon"), str(ROOT)])
 #: The command line as a script.
 PROGRAM = "from digiclay.cli import console; console()"
 
@@ -26,7 +28,7 @@ def start(script: str, *arguments: str, env: dict[str, str] | None = None, **opt
     """Start Python on a script that may import the package."""
     return subprocess.Popen(
         [sys.executable, "-c", script, *arguments], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ADDON), **(env or {})}, **options,
+        stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": PACKAGES, **(env or {})}, **options,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -228,25 +229,20 @@ def test_a_process_is_known_by_the_time_it_was_started() -> None:
 
 def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None:
     record = here / "record"
-    with (
-        hold_record(record, "It is held."),
-        pytest.raises(OutputError, match=r"^It is held\.$"),
-        hold_record(record, "It is held."),
-    ):
+    hold = partial(hold_record, record, "It is held.")
+    with hold(), pytest.raises(OutputError, match=r"^It is held\.$"), hold():
         pass
     assert not record.exists()
     record.write_text(f"{find_host()} {dead()}\n", encoding="utf-8")  # left by a crash
-    with hold_record(record, "It is held."):
+    with hold():
         assert record.read_text(encoding="utf-8").split() == [find_host(), str(os.getpid())]
     record.write_text("", encoding="utf-8")  # the disk was full, long ago
     os.utime(record, (0.0, 0.0))
-    with hold_record(record, "It is held."):
+    with hold():
         pass
     record.write_text("elsewhere 1\n", encoding="utf-8")
-    with (
-        pytest.raises(OutputError, match=r"begun on elsewhere; if nothing runs there, remove .*record"),
-        hold_record(record, "It is held."),
-    ):
+    rule = r"begun on elsewhere; if nothing runs there, remove .*record"
+    with pytest.raises(OutputError, match=rule), hold():
         pass
 
 

@@ -38,14 +38,6 @@ TOTAL = np.array([BY_FIRST + BY_PAIR, BY_SECOND, BY_PAIR]) / VARIANCE
 ANGLES = tuple(Range(f"x.{name}", -np.pi, np.pi) for name in "abc")
 
 
-def evaluate_ishigami(bundle: Sequence[Point]) -> list[Record | None]:
-    """Evaluate points as a worker does, by the words of their values."""
-    angles = np.array([[float(word) for word in point.words] for point in bundle])
-    x, y, z = angles.T
-    values = np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
-    return [{"figures": {"rfd": float(value)}} for value in values]
-
-
 def evaluate_with(
     task: Callable[[Sequence[Point]], list[Record | None]], folder: Folder, bundles: Sequence[Sequence[Point]]
 ) -> Evaluation:
@@ -60,20 +52,11 @@ def evaluate_with(
     return evaluation
 
 
-def run_study(out: Path, samples: int, seed: int, *, second: bool) -> Indices:
-    """Have Ishigami's function sampled, evaluated as a series in a folder, and analyzed."""
-    shares = sample_shares(samples, len(ANGLES), seed, second=second)
-    words = [tuple(one.find_word(share) for one, share in zip(ANGLES, row, strict=True)) for row in shares]
-    points = [Point(index, row, None) for index, row in enumerate(words, 1)]
-    bundles = [points[first : first + 64] for first in range(0, len(points), 64)]
-    subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
-    with subject.open_folder(out, "study", {"samples": samples}) as folder:
-        assert evaluate_with(evaluate_ishigami, folder, bundles).failed == {}
-        records = folder.read_records()
-    reference: Record = {"figures": {}}
-    found = [records[point.index] for point in points]
-    response = make_response("rfd", found, find_excess_losses(found, reference))
-    indices = compute_indices(response.values, len(ANGLES), seed, second=second)
+def analyze_ishigami(samples: int, seed: int, *, second: bool) -> Indices:
+    """Have Ishigami's function sampled and analyzed."""
+    x, y, z = np.pi * (2.0 * sample_shares(samples, 3, seed, second=second) - 1.0).T
+    values = np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
+    indices = compute_indices(values, 3, seed, second=second)
     assert indices is not None
     return indices
 
@@ -84,13 +67,13 @@ def is_within(found: Indices, order: str, wanted: Any, part: Any = slice(None)) 
     return bool(np.all(np.abs(index - wanted) <= interval) and interval.max() < 0.45)
 
 
-def test_the_indices_of_ishigami_are_within_their_intervals(tmp_path: Path) -> None:
+def test_the_indices_of_ishigami_are_within_their_intervals() -> None:
     # 95 % intervals: with these seeds each index is within its own.
-    found = run_study(tmp_path / "out", 128, 1, second=True)
+    found = analyze_ishigami(128, 1, second=True)
     assert is_within(found, "first", FIRST)
     assert is_within(found, "total", TOTAL)
     assert is_within(found, "second", np.array([0.0, BY_PAIR, 0.0]) / VARIANCE, np.triu_indices(3, 1))
-    alone = run_study(tmp_path / "alone", 128, 2, second=False)
+    alone = analyze_ishigami(128, 2, second=False)
     assert list(alone) == ["first", "total"]
     assert is_within(alone, "first", FIRST)
     assert is_within(alone, "total", TOTAL)
@@ -101,10 +84,13 @@ def test_the_indices_of_ishigami_are_within_their_intervals(tmp_path: Path) -> N
 
 
 def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path) -> None:
+    def work(bundle: Sequence[Point]) -> list[Record | None]:
+        return [{"figures": {"rfd": 1.0}} for _ in bundle]
+
     def die(bundle: Sequence[Point]) -> list[Record | None]:
         if bundle[0].index == 1:
             raise DigiclayError("A worker died twice of this.")
-        return evaluate_ishigami(bundle)
+        return work(bundle)
 
     points = [Point(index, ("0.5", "0.5", "0.5"), None) for index in range(1, 5)]
     bundles = [points[:2], points[2:]]
@@ -113,7 +99,7 @@ def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path)
         failed = evaluate_with(die, folder, bundles).failed
         assert failed == {index: {"error": "A worker died twice of this."} for index in (1, 2)}
         assert set(folder.read_records()) == {3, 4}
-        assert evaluate_with(evaluate_ishigami, folder, bundles).failed == {}
+        assert evaluate_with(work, folder, bundles).failed == {}
         assert set(folder.read_records()) == {1, 2, 3, 4}
 
 
