@@ -12,7 +12,6 @@ import os
 import posixpath
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +68,7 @@ together; [tasks](../tasks.md#python) has a first program.
 | package | content |
 |---|---|
 """
-#: Page that lists the packages of the code; the pages of the packages follow it in the navigation.
+#: Page that lists the packages of the code; their pages follow it in the navigation, *Reference > Python*.
 PACKAGES_PAGE = "reference/python.md"
 #: Head of a page whose results of a search come after those of the pages for readers.
 BEHIND = "---\nsearch:\n  boost: 0.0005\n---\n"
@@ -108,10 +107,10 @@ def _section(name: str, method: str) -> list[str]:
         "| Symbol | Name | Unit | Meaning | Range | Default | Source |",
         "|---|---|---|---|---|---|---|",
     ]
-    for field, known in list_quantities(kind).items():
-        default, meaning = write_value(getattr(kind(), field)), describe_meaning(known)
-        cells = (f"`{name}.{field}`", known.unit, meaning, write_range(known), default, known.source)
-        lines.append("| " + " | ".join((known.symbol, *cells)) + " |")
+    for field, declared in list_quantities(kind).items():
+        default, meaning = write_value(getattr(kind(), field)), describe_meaning(declared)
+        cells = (f"`{name}.{field}`", declared.unit, meaning, write_range(declared), default, declared.source)
+        lines.append("| " + " | ".join((declared.symbol, *cells)) + " |")
     return lines
 
 
@@ -160,11 +159,8 @@ def make_packages_page(packages: dict[str, list[str]]) -> str:
 def find_place(path: str) -> str:
     """Return the place in the site of a file of the repository, or "" if it has none."""
     moved = {file: page for page, file in ELSEWHERE.items()}
-    if path in moved:
-        return moved[path]
-    if path.startswith("docs/"):
-        return path.removeprefix("docs/")
-    return path if path.startswith("benchmarks/results/") and path.endswith(".png") else ""
+    picture = path if path.startswith("benchmarks/results/") and path.endswith(".png") else ""
+    return path.removeprefix("docs/") if path.startswith("docs/") else moved.get(path, picture)
 
 
 def relink(text: str, source: str, page: str) -> str:
@@ -173,11 +169,11 @@ def relink(text: str, source: str, page: str) -> str:
     `source`: file of the text in the repository; `page`: its place in the site.
     """
 
-    def place(found: re.Match[str]) -> str:
-        picture, label, target = found.groups()
+    def place(link: re.Match[str]) -> str:
+        picture, label, target = link.groups()
         name, mark, anchor = target.partition("#")
         if not name or "://" in target or target.startswith("mailto:"):
-            return found[0]
+            return link[0]
         file = posixpath.normpath(posixpath.join(posixpath.dirname(source), name))
         there = find_place(file)
         if not there:
@@ -187,25 +183,13 @@ def relink(text: str, source: str, page: str) -> str:
     return LINK.sub(place, text)
 
 
-def _lists(nav: list[Any]) -> Iterator[list[Any]]:
-    """Yield the lists of a navigation, from the outside inwards."""
-    yield nav
-    for entry in nav:
-        for inside in entry.values() if isinstance(entry, dict) else ():
-            if isinstance(inside, list):
-                yield from _lists(inside)
-
-
 def on_config(config: Any) -> None:
     """Set the form of the anchors, and add the packages to the navigation."""
     config.mdx_configs.setdefault("toc", {})["slugify"] = make_anchor
     pages = [{name: f"reference/python/{name}.md"} for name in list_packages()]
-    places = [one for one in _lists(config.nav) if PACKAGES_PAGE in one]
-    if len(places) != 1:
-        raise ValueError(
-            f"mkdocs.yml: nav must have {PACKAGES_PAGE} once, got {len(places)}: packages are added there"
-        )
-    places[0].extend(pages)
+    sections = {title: entries for entry in config.nav for title, entries in entry.items()}
+    reference = {title: entries for entry in sections["Reference"] for title, entries in entry.items()}
+    reference["Python"].extend(pages)
 
 
 def on_files(files: Any, config: Any) -> None:
