@@ -40,24 +40,24 @@ GIT = ("git", "-c", "safe.directory=*")
 
 
 def stop(reason: str) -> NoReturn:
-    """Say in one line why there is no zip."""
+    """End with the reason, in one line, why there is no zip."""
     sys.exit(f"The extension is not built: {reason}")
 
 
 def carry_out(command: list[str | Path], what: str) -> str:
     """Run a command; return what it printed, or stop with the last of it."""
     done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, cwd=ROOT)
-    said = f"{done.stdout}\n{done.stderr}".strip()
+    output = f"{done.stdout}\n{done.stderr}".strip()
     if done.returncode:
-        print(said, file=sys.stderr)
+        print(output, file=sys.stderr)
         stop(f"{what} failed with status {done.returncode}.")
-    return said
+    return output
 
 
 def blender_scripts() -> Path:
     """Return the folder of scripts of this Python's Blender module."""
-    found = importlib.util.find_spec("bpy")
-    places = [Path(place) for place in (found.submodule_search_locations or [])] if found else []
+    spec = importlib.util.find_spec("bpy")
+    places = [Path(place) for place in (spec.submodule_search_locations or [])] if spec else []
     scripts = [tool.parents[3] for place in places for tool in place.glob(f"*/scripts/{TOOL}")]
     if not scripts:
         stop(f"{sys.executable} has no Blender module with its tool {TOOL}.")
@@ -125,12 +125,12 @@ def repack_zip(archive: Path, instant: int) -> None:
     made = archive.with_name(f"{archive.name}.new")
     with zipfile.ZipFile(archive) as old, zipfile.ZipFile(made, "w") as new:
         # The metadata of a wheel stand last, as its specification recommends.
-        for one in sorted(old.infolist(), key=lambda one: (".dist-info/" in one.filename, one.filename)):
-            entry = zipfile.ZipInfo(one.filename, when)
-            entry.compress_type = one.compress_type
+        for part in sorted(old.infolist(), key=lambda part: (".dist-info/" in part.filename, part.filename)):
+            entry = zipfile.ZipInfo(part.filename, when)
+            entry.compress_type = part.compress_type
             entry.create_system = 3  # Unix, wherever it is built: the modes are Unix's
-            entry.external_attr = ZIPPED_FOLDER if one.is_dir() else ZIPPED_FILE
-            new.writestr(entry, old.read(one), compresslevel=9)
+            entry.external_attr = ZIPPED_FOLDER if part.is_dir() else ZIPPED_FILE
+            new.writestr(entry, old.read(part), compresslevel=9)
     made.replace(archive)
 
 
@@ -151,9 +151,9 @@ def build(out: Path) -> Path:
         )
         (archive,) = made.glob("*.zip")
         repack_zip(archive, read_instant())
-        said = carry_out([*tool, "validate", *tags, archive], "Blender's tool for validating")
-        if re.search(r"\b(warning|error)\b", said, re.IGNORECASE):
-            stop(f"Blender's tool does not find it valid: {said}")
+        output = carry_out([*tool, "validate", *tags, archive], "Blender's tool for validating")
+        if re.search(r"\b(warning|error)\b", output, re.IGNORECASE):
+            stop(f"Blender's tool does not find it valid: {output}")
         out.mkdir(parents=True, exist_ok=True)
         return Path(shutil.move(archive, out / archive.name))
 

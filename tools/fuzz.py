@@ -3,7 +3,7 @@
 usage: python tools/fuzz.py {scenes,states,takes,runs} [--count 100000] [--seed 0] [--first 0]
 
 Case number n of a seed is always the same one, whatever the count. What was neither taken nor refused is
-told with its number, and makes the exit code 1.
+listed with its number, and makes the exit code 1.
 """
 
 from __future__ import annotations
@@ -143,12 +143,12 @@ def scene(chance: np.random.Generator) -> None:
             return
     else:
         made = table(chance)
-    found = resolve(made)
-    assert resolve(parse_tables(format_scene(found))) == found
-    if found.cells > CELLS or found.cells * found.periods > RECORDED:
+    resolved = resolve(made)
+    assert resolve(parse_tables(format_scene(resolved))) == resolved
+    if resolved.cells > CELLS or resolved.cells * resolved.periods > RECORDED:
         return
     asked = itertools.count(1)
-    json.dumps(run(found, stopped=lambda: next(asked) >= PERIODS).metrics, allow_nan=False)
+    json.dumps(run(resolved, stopped=lambda: next(asked) >= PERIODS).metrics, allow_nan=False)
 
 
 @cache
@@ -181,8 +181,8 @@ def crafted(chance: np.random.Generator, data: bytes) -> bytes:
             arrays[int(chance.integers(len(arrays)))] = int(chance.integers(256))
     start = START
     if chance.random() < 0.2:
-        start, held = FIRST, header.get("gathered")
-        header["gathered"] = held | {"reach": None} if isinstance(held, dict) else held
+        start, gathered = FIRST, header.get("gathered")
+        header["gathered"] = gathered | {"reach": None} if isinstance(gathered, dict) else gathered
     head = json.dumps(header).encode()
     return start + len(head).to_bytes(4, "little") + head + bytes(arrays)
 
@@ -192,11 +192,11 @@ def state(chance: np.random.Generator) -> None:
     system, data = kept(pick(chance, list(METHODS)))
     finger = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1, 1))
     for take_up in (snapshot.load, snapshot.transfer_heights):
-        found = take_up(system, crafted(chance, data))
+        reached = take_up(system, crafted(chance, data))
         for _ in range(PERIODS):
             (way,) = trace_fingers(system, interpolate_poses(finger, system.instants / system.period))
-            found = advance(system, found, way)
-        snapshot.dump(system, found)
+            reached = advance(system, reached, way)
+        snapshot.dump(system, reached)
 
 
 def odd_array(chance: np.random.Generator, usual: NDArray[Any]) -> NDArray[Any]:
@@ -236,10 +236,10 @@ def pack(chance: np.random.Generator, arrays: dict[str, NDArray[Any]]) -> bytes:
 def recorded() -> tuple[Result, Take]:
     """Return a short run of a small bed, and a take of the same."""
     small = {"layout": {"rows": 6, "columns": 11}, "simulation": {"duration": 0.05}, "recorder": {}}
-    found = resolve(small)
-    rest, poses = begin(assemble(found)), np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (4, 1, 1))
-    start = snapshot.dump(assemble(found), rest)
-    return run(found), Take(found, start, poses, start, np.tile([0.0, 0.0, 5e-3, 0.5], (3, 1)))
+    bed = resolve(small)
+    rest, poses = begin(assemble(bed)), np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (4, 1, 1))
+    start = snapshot.dump(assemble(bed), rest)
+    return run(bed), Take(bed, start, poses, start, np.tile([0.0, 0.0, 5e-3, 0.5], (3, 1)))
 
 
 def take(chance: np.random.Generator) -> None:
@@ -256,9 +256,9 @@ def folder(chance: np.random.Generator) -> None:
     with tempfile.TemporaryDirectory() as name:
         (FolderPath(name) / "scene.toml").write_text(format_scene(done.scene), encoding="utf-8")
         (FolderPath(name) / "history.npz").write_bytes(pack(chance, done.history))
-        found = read_run(FolderPath(name), *SHAPES)
-    json.dumps(compute_metrics(found.history, found.scene.set_point), allow_nan=False)
-    features.find(fit_skin(make_formed(found.history, -1), "bilinear", 1, 0.0))
+        finished = read_run(FolderPath(name), *SHAPES)
+    json.dumps(compute_metrics(finished.history, finished.scene.set_point), allow_nan=False)
+    features.find(fit_skin(make_formed(finished.history, -1), "bilinear", 1, 0.0))
 
 
 #: Types of arrays that no file of ours has.
@@ -294,15 +294,15 @@ def main() -> int:
     arguments = parser.parse_args()
     taken, failures = 0, collections.defaultdict(list)
     for number in range(arguments.first, arguments.first + arguments.count):
-        told = failure(arguments.kind, arguments.seed, number)
-        taken += told == ""
-        if told:
-            failures[told].append(number)
+        outcome = failure(arguments.kind, arguments.seed, number)
+        taken += outcome == ""
+        if outcome:
+            failures[outcome].append(number)
     failed = sum(map(len, failures.values()))
     refused = arguments.count - taken - failed
     print(f"{arguments.count} {arguments.kind}: {taken} taken, {refused} refused, {failed} neither")
-    for told, numbers in sorted(failures.items(), key=lambda item: -len(item[1])):
-        print(f"  {len(numbers)} x {told}  (number {', '.join(map(str, numbers[:3]))})")
+    for outcome, numbers in sorted(failures.items(), key=lambda item: -len(item[1])):
+        print(f"  {len(numbers)} x {outcome}  (number {', '.join(map(str, numbers[:3]))})")
     return 1 if failed else 0
 
 

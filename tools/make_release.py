@@ -94,11 +94,11 @@ def repack_tar(archive: Path, instant: int) -> None:
         tarfile.open(archive) as old,
         tarfile.open(fileobj=packed, mode="w", format=tarfile.PAX_FORMAT) as new,
     ):
-        for one in sorted(old.getmembers(), key=lambda one: one.name):
-            entry = tarfile.TarInfo(one.name)
-            entry.type, entry.size, entry.mtime = one.type, one.size, instant
-            entry.mode = 0o755 if one.isdir() or one.mode & 0o100 else 0o644
-            new.addfile(entry, old.extractfile(one) if one.isfile() else None)
+        for member in sorted(old.getmembers(), key=lambda member: member.name):
+            entry = tarfile.TarInfo(member.name)
+            entry.type, entry.size, entry.mtime = member.type, member.size, instant
+            entry.mode = 0o755 if member.isdir() or member.mode & 0o100 else 0o644
+            new.addfile(entry, old.extractfile(member) if member.isfile() else None)
     # Without name and time of the tar: gzip would write both into its header.
     with archive.open("wb") as file, gzip.GzipFile("", "wb", 9, file, mtime=instant) as compressed:
         compressed.write(packed.getvalue())

@@ -29,7 +29,7 @@ class OnePage(Treeprocessor):
     def run(self, root: Element) -> None:
         """Change the tree of the page."""
         for parent in list(root.iter()):
-            for child in [one for one in parent if one.tag == "p" and one.find("img") is not None]:
+            for child in [part for part in parent if part.tag == "p" and part.find("img") is not None]:
                 parent.remove(child)
         for link in root.iter("a"):
             if not link.get("href", "").startswith("#"):

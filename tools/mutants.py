@@ -176,8 +176,10 @@ def list_files() -> list[str]:
     """Return the files of tests that import what is changed, or assemble it."""
     mark = re.compile(rf"core\.({'|'.join(PACKAGES)}|scene\.schema)\b|tests\.(assemble|reliefs)")
     files = (path for name in FOLDERS for path in sorted((ROOT / "tests" / name).glob("test_*.py")))
-    found = [str(path.relative_to(ROOT)) for path in files if mark.search(path.read_text(encoding="utf-8"))]
-    return sorted({*found, *EVERY})
+    importing = [
+        str(path.relative_to(ROOT)) for path in files if mark.search(path.read_text(encoding="utf-8"))
+    ]
+    return sorted({*importing, *EVERY})
 
 
 def trace(workers: int, folder: Path) -> tuple[Lines, dict[str, float]]:
@@ -193,9 +195,9 @@ def trace(workers: int, folder: Path) -> tuple[Lines, dict[str, float]]:
             print((folder / f"{name}.txt").read_text(errors="replace")[-4000:])
             raise SystemExit(f"mutants: FAILED (the first run of the tests ended with status {status})")
     for output in outputs:
-        found, took = pickle.loads(output.read_bytes())
+        traced, took = pickle.loads(output.read_bytes())
         times |= took
-        for line, tests in found.items():
+        for line, tests in traced.items():
             lines[line] |= tests
     failed = [test for test, took in times.items() if took == math.inf]
     if any(test.startswith(EVERY) for test in failed):
@@ -250,19 +252,21 @@ def read_arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def judge_all(chosen: Sequence[Mutant], given: argparse.Namespace, started: float) -> tuple[int, list[str]]:
+def judge_all(
+    chosen: Sequence[Mutant], arguments: argparse.Namespace, started: float
+) -> tuple[int, list[str]]:
     """Judge mutants; return how many are noticed, and the lines of those that survive."""
     killed, survivors = 0, []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        lines, times = trace(given.workers, folder)
+        lines, times = trace(arguments.workers, folder)
         todo, by_name = Tasks(), {f"mutant{number}": mutant for number, mutant in enumerate(chosen)}
         for name, mutant in by_name.items():
             tests = choose(mutant, lines, times)
             limit = int(ALLOWANCE + PATIENCE * sum(times.get(test, 0.0) for test in tests))
             # It may wait, and other programs may run.
             todo[name] = functools.partial(judge, mutant, tests, limit), 4.0 * limit
-        for name, status in run(todo, given.workers, started + given.limit, folder):
+        for name, status in run(todo, arguments.workers, started + arguments.limit, folder):
             if status == 0:
                 survivors.append(f"survived: {by_name[name].describe()}")
                 print(survivors[-1], flush=True)  # seen also where the run is broken off
@@ -275,32 +279,32 @@ def judge_all(chosen: Sequence[Mutant], given: argparse.Namespace, started: floa
 
 def main() -> int:
     """Judge what the command line asks for, and write the report."""
-    given, known, started = read_arguments(), list_modules(), time.monotonic()
+    arguments, modules, started = read_arguments(), list_modules(), time.monotonic()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # ends its processes too
-    unknown = [module for module in given.modules if module not in known]
+    unknown = [module for module in arguments.modules if module not in modules]
     if unknown:
-        raise SystemExit(f"MODULES must be of {', '.join(known)} (got {', '.join(unknown)})")
+        raise SystemExit(f"MODULES must be of {', '.join(modules)} (got {', '.join(unknown)})")
     os.chdir(ROOT)
     os.environ["DIGICLAY_HYPOTHESIS"] = "first_failure"
     for name in ("numpy", "hypothesis", "scipy.integrate", "scipy.interpolate"):
         importlib.import_module(name)  # once, and not in every fork
 
-    every = [mutant for module in given.modules or known for mutant in mutants(module)]
-    chosen = every if given.modules else sample(every, given.count)
-    killed, survivors = judge_all(chosen, given, started)
+    every = [mutant for module in arguments.modules or modules for mutant in mutants(module)]
+    chosen = every if arguments.modules else sample(every, arguments.count)
+    killed, survivors = judge_all(chosen, arguments, started)
     judged = killed + len(survivors)
     share = len(survivors) / judged if judged else 1.0
     # A sample most of which there was no time for is none.
-    bad = share > given.most or judged <= len(chosen) // 2
+    bad = share > arguments.most or judged <= len(chosen) // 2
     text = (
         f"mutants: {'FAILED' if bad else 'passed'}: {judged} judged of {len(chosen)} out of {len(every)}: "
-        f"{killed} noticed, {len(survivors)} survived ({share:.0%}; {given.most:.0%} may), "
+        f"{killed} noticed, {len(survivors)} survived ({share:.0%}; {arguments.most:.0%} may), "
         f"in {time.monotonic() - started:.0f} s\n" + "".join(f"{line}\n" for line in sorted(survivors))
     )
     print(text, end="")
-    if given.report:
-        given.report.parent.mkdir(exist_ok=True)
-        given.report.write_text(text, encoding="utf-8")
+    if arguments.report:
+        arguments.report.parent.mkdir(exist_ok=True)
+        arguments.report.write_text(text, encoding="utf-8")
     return int(bad)
 
 

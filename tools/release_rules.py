@@ -38,11 +38,11 @@ def tag_of(version: str) -> str:
 
 def read_versions(root: Path) -> dict[str, str]:
     """Return the version in each file that has one, empty where there is none."""
-    found = re.search(r'^__version__ = "([^"]*)"$', (root / INIT).read_text(encoding="utf-8"), re.MULTILINE)
+    version = re.search(r'^__version__ = "([^"]*)"$', (root / INIT).read_text(encoding="utf-8"), re.MULTILINE)
     manifest = tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
     heading = HEADING.search((root / CHANGELOG).read_text(encoding="utf-8"))
     return {
-        INIT: found[1] if found else "",
+        INIT: version[1] if version else "",
         MANIFEST: str(manifest.get("version", "")),
         CHANGELOG: heading[1].split(" ")[0] if heading else "",
     }

@@ -2,7 +2,7 @@
 
 A part has passed when pytest ended with status 0 and at least one test passed: nothing
 collected, everything skipped, a crash or a hang after the summary are all failures. Its
-summary line goes to the report file, for whoever prints the verdict.
+summary line goes to the report file, which the caller prints with the verdicts.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def run(command: list[str], limit: float) -> tuple[int | None, str]:
         assert process.stdout is not None
         for line in process.stdout:
             print(line, end="", flush=True)
-            found = SUMMARY.match(line.rstrip())
-            summary = found[1] if found else summary
+            match = SUMMARY.match(line.rstrip())
+            summary = match[1] if match else summary
         status = process.wait()
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
