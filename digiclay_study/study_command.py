@@ -12,8 +12,7 @@ import numpy as np
 from digiclay import __version__
 from digiclay.commands.arguments import add_command, add_options
 from digiclay.commands.evaluation_pool import Evaluation, run_series
-from digiclay.commands.extras import format_command
-from digiclay.commands.progress import Counted
+from digiclay.commands.progress import Counted, format_command
 from digiclay.commands.stop import refuse_without
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.commands import extras
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
-from digiclay.commands.extras import plan_meshes
+from digiclay.commands.run import plan_meshes
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session.finished_run import find_row
 from digiclay.core.session.run_scene import RunRecording
@@ -84,7 +83,7 @@ def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(
     command: list[str], made: list[str], here: Path, stopped: Any
 ) -> None:
     assert main([*command, "--out", "whole"]) == 0
-    commands = stopped(extras, "save", *command)
+    commands = stopped(run_command, "save", *command)
     assert list(commands) == made
     assert files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
     assert not json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
@@ -123,7 +122,7 @@ def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says
 
 @pytest.mark.parametrize("step", ["scene_of", "fit_shape", "make_forming_scene"])
 def test_form_that_is_stopped_before_its_session_writes_nothing(step, here, monkeypatch, capsys):
-    monkeypatch.setattr(extras, "run", lambda *given, **known: pytest.fail("It went on."))
+    monkeypatch.setattr(run_command, "run", lambda *given, **known: pytest.fail("It went on."))
     stop_before(monkeypatch, form_command, step)
     assert main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
     assert capsys.readouterr().err == "Stopped; no file is half-written.\n"

@@ -22,7 +22,7 @@ from ..core.session.run_scene import Result
 from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
 from .arguments import QUIET, add_command, add_options, add_scene, say, scene_of
 from .export import formats
-from .extras import Extra, plan_meshes, simulate, write_run
+from .run import Extra, plan_meshes, simulate, write_run
 from .stop import Stop, allow_interrupt, defer_interrupt, require_surface
 
 EXAMPLES = f"""\

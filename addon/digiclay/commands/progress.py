@@ -1,8 +1,11 @@
-"""Output on a terminal: tables, and a progress line that is redrawn in place and removed at the end."""
+"""Output on a terminal: tables, commands, and a progress line, redrawn in place and removed at the end."""
 
 from __future__ import annotations
 
+import os
+import shlex
 import shutil
+import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from typing import Self, TextIO
@@ -113,3 +116,9 @@ def format_duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def format_command(arguments: Sequence[str]) -> str:
+    """Return a command of this program as it is typed into a terminal."""
+    words = ["digiclay", *arguments]
+    return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)
