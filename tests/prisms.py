@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from digiclay.core.surface.skin_mesh import find_base_level, make_skin
+from digiclay.core.surface.formed import find_base_level, make_skin
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

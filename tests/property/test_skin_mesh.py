@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.surface.skin_mesh import make_solid
+from digiclay.core.surface.formed import make_solid
 from hypothesis import example, given
 from hypothesis import strategies as st
 

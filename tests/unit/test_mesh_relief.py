@@ -15,7 +15,7 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes.fitting import fit_shape
 from digiclay.core.shapes.mesh_relief import SMALL, ShapeMesh, fill_holes, make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape, Tops
-from digiclay.core.surface.skin_mesh import take_corners
+from digiclay.core.surface.formed import take_corners
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 

@@ -10,15 +10,15 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.spline import interpolate_monotone
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface import skins
-from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.pins_solid import BRIDGE, make_parts, make_pins_solid
-from digiclay.core.surface.skin_mesh import (
+from digiclay.core.surface.formed import (
     BASE_THICKNESS,
+    Formed,
     find_base_level,
     find_grid_shape,
     make_skin,
     make_solid,
 )
+from digiclay.core.surface.pins_solid import BRIDGE, make_parts, make_pins_solid
 from digiclay.core.surface.skins import SKINS, SurfaceGrid, fit_skin
 from digiclay.device.instant import Instant
 from digiclay.device.skin_lattice import KINDS, MOST_POINTS, choose_parts, interpolate, make_lattice

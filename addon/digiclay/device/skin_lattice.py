@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.base.arrays import Floats
-from ..core.surface.skin_mesh import find_grid_shape, take_corners, take_outline
+from ..core.surface.formed import find_grid_shape, take_corners, take_outline
 from .instant import Instant
 
 Indices = NDArray[np.int32]

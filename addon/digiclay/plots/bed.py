@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.base.arrays import Floats
 from ..core.metrics.summary import find_contact_rows
-from ..core.surface.skin_mesh import find_grid_shape, make_skin, make_solid
+from ..core.surface.formed import find_grid_shape, make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
 
 if TYPE_CHECKING:  # only named in annotations

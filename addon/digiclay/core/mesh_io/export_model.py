@@ -10,9 +10,8 @@ from ..base.arrays import Faces, Floats, Indices
 from ..base.errors import OutputError, ParameterError
 from ..base.quantity import Parameters, quantity
 from ..surface.features import Feature, Finding, find
-from ..surface.formed import NO_PIN, Body, Formed
+from ..surface.formed import BASE_THICKNESS, NO_PIN, Body, Formed, make_solid
 from ..surface.pins_solid import make_pins_solid
-from ..surface.skin_mesh import BASE_THICKNESS, make_solid
 from ..surface.skins import SKINS, SurfaceGrid, fit_skin
 
 #: Kinds of mesh, by name, with their lines in the help.

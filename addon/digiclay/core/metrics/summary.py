@@ -19,7 +19,7 @@ from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..model.control_interface import SetPoint, find_set_point
-from ..surface.skin_mesh import find_grid_shape
+from ..surface.formed import find_grid_shape
 
 #: How far the fingertip must have gone on from a cell for it to count as left behind, m.
 AWAY = 12e-3

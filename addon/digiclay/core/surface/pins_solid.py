@@ -14,8 +14,7 @@ import numpy as np
 
 from ..base.arrays import Faces, Floats, Indices
 from ..model.layout import list_steps
-from .formed import Formed
-from .skin_mesh import BASE_THICKNESS, find_base_level, take_corners
+from .formed import BASE_THICKNESS, Formed, find_base_level, take_corners
 
 #: Half the width of a bridge, in pitches along x and rows along y.
 BRIDGE = 0.05

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Faces, Floats
-from .skin_mesh import measure_areas
+from .formed import measure_areas
 
 #: The contour keeps this share of an edge away from both its ends, so that no triangle is without area.
 #: At a pitch of 3 mm it is 3 µm.

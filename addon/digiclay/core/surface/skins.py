@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Faces, Floats
 from ..base.spline import interpolate_monotone
-from .formed import NO_PIN, Formed
-from .skin_mesh import make_skin
+from .formed import NO_PIN, Formed, make_skin
 
 #: The skin is as wanted when no point would move further than this under its own pull, m.
 STILL = 1e-9
@@ -239,13 +238,13 @@ class SurfaceGrid:
         )
         return np.asarray(of_pins[(row[:, None] * self.formed.columns + column).ravel()])
 
-    def values(self) -> dict[str, NDArray[np.float64]]:
+    def values(self) -> dict[str, Floats]:
         """Return height, force and mode at each point: force straight between pins, mode of the nearest."""
         force = interpolate_skin(self.formed, self.formed.force, "bilinear", self.parts, 0.0)
         mode = self.nearest(self.formed.mode).astype(np.float64)
         return {"height": self.height, "force": force, "mode": mode}
 
-    def values_with_base(self, level: float) -> dict[str, NDArray[np.float64]]:
+    def values_with_base(self, level: float) -> dict[str, Floats]:
         """Return the same, and after it that of as many points of a base: no force, and no pin's mode."""
         base = {"height": level, "force": 0.0, "mode": float(NO_PIN)}
         return {
