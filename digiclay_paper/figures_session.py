@@ -40,17 +40,16 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
             shade_contact(heights, history)
             draw_force(force, history, history["set_point"], "set point")
             ends = history["time"][0], history["time"][-1]
-            heights.set(ylim=(lowest, highest), title=NAMES[method], xlim=ends)
+            heights.set(ylim=(lowest, highest), ylabel="height (mm)", title=NAMES[method])
             heights.tick_params(labelbottom=False)
-            force.set(ylim=(0.0, strongest), xlabel="time (s)", title="Total force", xlim=ends)
-            if column == 0:
-                heights.set_ylabel("height (mm)")
-                force.set_ylabel("force (N)")
-                handles, _ = heights.get_legend_handles_labels()
+            force.set(ylim=(0.0, strongest), ylabel="force (N)", title="Total force")
+            for axes in (heights, force):
+                axes.set(xlim=ends, xlabel="time (s)")
+                axes.yaxis.label.set_visible(column == 0)
+            heights.xaxis.label.set_visible(False)
         figure.text(0.85 / across, 1.0 - 0.78 / 7.4, "Cells at x, y (mm):")
-        figure.legend(
-            handles, names, loc="upper left", ncols=6, bbox_to_anchor=(2.77 / across, 1.0 - 0.5 / 7.4)
-        )
+        place_right = {"loc": "upper left", "bbox_to_anchor": (2.77 / across, 1.0 - 0.5 / 7.4)}
+        figure.legend(*heights.get_legend_handles_labels(), ncols=6, **place_right)
     return figure
 
 
@@ -74,13 +73,14 @@ def details(results: Results) -> Any:
                 style: dict[str, Any] = {"color": LINES[number], "linewidth": 1.5, "label": f"x = {away}"}
                 heights.plot(time[press], height[press, number], **style)
                 swing.plot(time[lift], _swinging(time[lift], height[lift, number]) * 1e3, **style)
-            heights.set(title=name, xlabel="time (s)", xlim=PRESSING, ylim=(36.5, 40.5))
-            swing.set(title="the same cells, lifted", xlabel="time (s)", xlim=LIFTING, ylim=(-20, 20))
-            if column == 0:
-                heights.set_ylabel("height (mm)")
-                swing.set_ylabel("height less its course (µm)")
-                handles, names = heights.get_legend_handles_labels()
-        figure.legend(handles, names, loc="upper right", ncols=len(names), bbox_to_anchor=(0.99, 0.955))
+            heights.set(title=name, xlim=PRESSING, ylim=(36.5, 40.5), ylabel="height (mm)")
+            swing.set(title="the same cells, lifted", xlim=LIFTING, ylim=(-20, 20))
+            swing.set_ylabel("height less its course (µm)")
+            for axes in (heights, swing):
+                axes.set_xlabel("time (s)")
+                axes.yaxis.label.set_visible(column == 0)
+        legend = figure.axes[0].get_legend_handles_labels()
+        figure.legend(*legend, loc="upper right", ncols=len(cells), bbox_to_anchor=(0.99, 0.955))
     return figure
 
 
@@ -162,6 +162,6 @@ def profiles(results: Results) -> Any:
                 )
             axes.set(title=one.name, xlabel="y (mm)" if one.name.startswith("across") else "x (mm)")
             axes.set_ylabel("height over rest (mm)")
-        handles, names = axes.get_legend_handles_labels()
-        figure.legend(handles, names, loc="upper right", ncols=6, bbox_to_anchor=(0.99, 0.955))
+        legend = axes.get_legend_handles_labels()
+        figure.legend(*legend, loc="upper right", ncols=6, bbox_to_anchor=(0.99, 0.955))
     return figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -38,37 +38,17 @@ def curves(figure: Any) -> Iterator[tuple[str, str, float, str, float | str, str
         title = axes.get_title(loc="left")
         if not title.startswith("("):
             continue
-        names = tuple(_name(figure, axes, way) for way in "xy")
-        called = _called(axes)
+        names = [text.get_text() for text in axes.get_yticklabels()]
+        x_axis, y_axis = _plain(axes.get_xlabel()), _plain(axes.get_ylabel())
         for line in axes.get_lines():
             label = line.get_label()
             if label.startswith("_") or line.get_transform() != axes.transData:
                 continue
-            x, y = (np.asarray(values, dtype=float) for values in line.get_data())
-            for one, other in zip(x, y, strict=True):
-                if not (np.isnan(one) or np.isnan(other)):
-                    y_value = called(float(other)) if called else float(other)
-                    yield title[1], _plain(label), float(one), names[0], y_value, names[1]
-
-
-def _name(figure: Any, axes: Any, way: str) -> str:
-    """Return what an axis is called, in this panel or in one that has the same ends."""
-
-    def known(panel: Any) -> tuple[str, tuple[float, float]]:
-        return getattr(panel, f"get_{way}label")(), getattr(panel, f"get_{way}lim")()
-
-    own, ends = known(axes)
-    others = (label for label, other in map(known, figure.axes) if label and other == ends)
-    return _plain(own or next(others, ""))
-
-
-def _called(axes: Any) -> Callable[[float], str] | None:
-    """Return what gives the name of the nearest tick of a vertical axis of names; None for numbers."""
-    if axes.get_gid() != NAMED:
-        return None
-    ticks = axes.get_yticks()
-    names = [text.get_text() for text in axes.get_yticklabels()]
-    return lambda value: names[int(np.argmin(np.abs(np.asarray(ticks) - value)))]
+            points = line.get_xydata()
+            for x, y in points[~np.isnan(points).any(axis=1)].tolist():
+                nearest = int(np.argmin(np.abs(np.asarray(axes.get_yticks()) - y)))
+                value = names[nearest] if axes.get_gid() == NAMED else y
+                yield title[1], _plain(label), x, x_axis, value, y_axis
 
 
 def _plain(text: str) -> str:
@@ -95,6 +75,8 @@ def list_methods(results: Mapping[Any, Any]) -> list[str]:
 
 #: Color, marker and its size of each profile.
 PROFILES = {"cone": (LINES[0], "o", 8.0), "gaussian": (LINES[1], "s", 5.0)}
+#: Ends of the heights of each shape of a blister, mm.
+HEIGHTS = {"convex": (36, 64), "concave": (28, 43)}
 #: Instants of a drag that are drawn.
 INSTANTS = 5
 #: Line of what was asked for, of a limit, or of the bed at rest.
@@ -108,7 +90,7 @@ def blisters(results: Results) -> Any:
     height = 0.8 + 3.4 * len(methods)
     with canvas(12.5, height, "Blisters in section, the finger in place") as (figure, place):
         for row, method in enumerate(methods):
-            for column, shape in enumerate(("convex", "concave")):
+            for column, shape in enumerate(HEIGHTS):
                 axes = place(f"{method} {shape}", 0.85 + 6.15 * column, height - 3.5 - 3.4 * row, 5.25, 2.55)
                 for profile, look in PROFILES.items():
                     done = results.blisters[method, shape, profile]
@@ -117,9 +99,8 @@ def blisters(results: Results) -> Any:
                 rest = done.scene.actuator.rest_height * MM
                 axes.axhline(rest, **DASHED)
                 axes.set(xlim=(-25, 25), title=f"{NAMES[method]}, {shape}", ylabel="height (mm)")
-                axes.set_ylim((36, 64) if shape == "convex" else (28, 43))
-                if row == len(methods) - 1:
-                    axes.set_xlabel("distance from the middle (mm)")
+                axes.set(ylim=HEIGHTS[shape], xlabel="distance from the middle (mm)")
+                axes.xaxis.label.set_visible(row == len(methods) - 1)
         first = figure.axes[0]
         first.plot([], [], **DASHED, label="bed at rest")
         first.plot([], [], color=INK, linewidth=1.2, label="fingertip")
@@ -174,11 +155,12 @@ def freezing(results: Results) -> Any:
                 x, z = done.history["fingertip"][instant, [0, 2]] * MM
                 axes.plot(x, z + 6.0, "v", color=color, markersize=9)
             axes.set(xlim=(-38, 38), ylim=(38, 65), ylabel="height (mm)", title=NAMES[method])
+            axes.set_xlabel("along the drag (mm)")
+            axes.xaxis.label.set_visible(panel == len(methods) - 1)
             if panel == 0:
                 axes.plot([], [], "s", color=INK, label="frozen cell")
                 axes.plot([], [], "v", color=INK, label="finger")
                 legend_above(axes, 8)
-        axes.set_xlabel("along the drag (mm)")
     return figure
 
 
