@@ -48,8 +48,8 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
                 axes.yaxis.label.set_visible(column == 0)
             heights.xaxis.label.set_visible(False)
         figure.text(0.85 / across, 1.0 - 0.78 / 7.4, "Cells at x, y (mm):")
-        place_right = {"loc": "upper left", "bbox_to_anchor": (2.77 / across, 1.0 - 0.5 / 7.4)}
-        figure.legend(*heights.get_legend_handles_labels(), ncols=6, **place_right)
+        beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (2.77 / across, 1.0 - 0.5 / 7.4)}
+        figure.legend(*heights.get_legend_handles_labels(), ncols=6, **beside)
     return figure
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +12,7 @@ from typing import Any
 from digiclay import __version__
 from digiclay.core.base.modes import MEANINGS, Mode
 from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, Arrow
-from digiclay.core.files.run_folder import write_whole
+from digiclay.core.files.run_folder import format_json, write_whole
 from digiclay.core.studies.speed_limits import Follows
 from digiclay.plots.figure import MM, save
 
@@ -56,8 +55,8 @@ def _list_rows(results: Results, methods: list[str]) -> Iterator[tuple[str, list
     for way in WAYS:
         follows = [results.simple.get((method, way)) for method in methods]
         name = f"drag at {PAPER_SPEED * MM:g} mm/s, {way}"
-        yield f"{name}: RFD (N)", [one and one.rfd for one in follows]
-        yield f"{name}: largest lag (mm)", _scale([one and one.lag for one in follows], MM)
+        yield f"{name}: RFD (N)", [one.rfd if one else None for one in follows]
+        yield f"{name}: largest lag (mm)", _scale([one.lag if one else None for one in follows], MM)
     for way in WAYS:
         speeds = [results.fastest.get((method, way)) for method in methods]
         yield f"largest speed, drag, {way} (mm/s)", _scale(speeds, MM)
@@ -195,9 +194,8 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
         captions[name] = caption.format(slow=results.slowness)
     found = claims(results)
     lines = list_lines(results, found, captions, took, __version__)
-    (folder / "paper.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    numbers = json.dumps(_numbers(results), indent=2, ensure_ascii=False, allow_nan=False)
-    (folder / "metrics.json").write_text(numbers + "\n", encoding="utf-8")
+    write_whole(folder / "paper.md", "".join(f"{line}\n" for line in lines).encode())
+    write_whole(folder / "metrics.json", format_json(_numbers(results)))
     return [f"{claim.verdict:14} {claim.printed}" for claim in found]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,7 +93,7 @@ def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: st
 def shade_contact(axes: Axes, history: History, label: str | None = None) -> None:
     """Shade the time in contact over the whole height of the axes."""
     touching, across = find_contact_rows(array(history, "total_force")), axes.get_xaxis_transform()
-    shade = {"color": SHADE, "linewidth": 0, "label": label}
+    shade: dict[str, Any] = {"color": SHADE, "linewidth": 0, "label": label}
     axes.fill_between(array(history, "time"), 0, 1, where=touching, transform=across, **shade)
 
 
