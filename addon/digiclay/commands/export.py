@@ -14,10 +14,10 @@ from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import Run, find_row, read_run
+from ..core.session.finished_run import find_row, read_run
 from ..core.session.run_scene import History
 from ..core.surface.features import Finding, make_table, summarize
-from ..core.surface.formed import Body, make_formed
+from ..core.surface.formed import Body, Formed, make_formed
 from ..core.surface.skins import SKINS
 from .arguments import RUN, add_command, millimeters, say, seconds, told_as_options, whole_number
 from .progress import table as aligned
@@ -54,27 +54,24 @@ def finding_of(arguments: argparse.Namespace) -> Finding:
 
 def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
     """Return what is to be made. `kind`: of the mesh."""
-    told: dict[str, Any] = {"kind": kind, "skin": arguments.skin, "resolution": arguments.resolution}
-    if getattr(arguments, "base_thickness", None) is not None:
-        told["base_thickness"] = arguments.base_thickness
+    names = ("skin", "resolution", "base_thickness")
+    given = {name: value for name in names if (value := getattr(arguments, name, None)) is not None}
     with told_as_options("Model"):
-        return Model(cap=scene.actuator.bore / 2.0, **told)
+        return Model(kind=kind, cap=scene.actuator.bore / 2.0, **given)
 
 
-def row_of(run: Run, time: float | None) -> int:
-    """Return the row of an instant, s; the last one where none is given. `time`, s."""
-    return -1 if time is None else find_row(run.history, time, "--time")
-
-
-def former_of(run: Run, text: str) -> int | float:
-    """Return the row of what was before, or the rest height of all pins, m."""
-    if text.strip() == "rest":
-        return float(run.scene.actuator.rest_height)
+def read_formed(arguments: argparse.Namespace, command: str) -> tuple[Scene, Formed]:
+    """Return the scene of a run, and its surface at --time compared with that at --former."""
+    run = read_run(arguments.run, "height", "position", "force", "mode")
+    require_surface(run.scene, command)
+    row = -1 if arguments.time is None else find_row(run.history, arguments.time, "--time")
+    if arguments.former.strip() == "rest":
+        return run.scene, make_formed(run.history, row, float(run.scene.actuator.rest_height))
     try:
-        time = seconds(text)
+        time = seconds(arguments.former)
     except argparse.ArgumentTypeError as error:
         raise OutputError(f"--former must be a time or 'rest': {error}.") from None
-    return find_row(run.history, time, "--former")
+    return run.scene, make_formed(run.history, row, find_row(run.history, time, "--former"))
 
 
 EXAMPLES = """\
@@ -138,11 +135,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Export."""
     if arguments.separate and arguments.kind != "features":
         raise OutputError("--separate needs --kind features.")
-    run = read_run(arguments.run, "height", "position", "force", "mode")
-    require_surface(run.scene, "export")
-    model, finding = model_of(arguments, run.scene, arguments.kind), finding_of(arguments)
-    formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
-    made = make_bodies(formed, model, finding)
+    scene, formed = read_formed(arguments, "export")
+    made = make_bodies(formed, model_of(arguments, scene, arguments.kind), finding_of(arguments))
     files: list[tuple[str, list[Body]]] = [(STEMS[arguments.kind], made)]
     if arguments.separate:
         files = [(body.name, [body]) for body in made]
@@ -181,10 +175,8 @@ def add_features(commands: Any) -> None:
 
 def list_features(arguments: argparse.Namespace) -> int:
     """List the features."""
-    run = read_run(arguments.run, "height", "position", "force", "mode")
-    require_surface(run.scene, "features")
-    formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
-    features = find_features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
+    scene, formed = read_formed(arguments, "features")
+    features = find_features(formed, model_of(arguments, scene, "surface"), finding_of(arguments))
     if arguments.json:
         say(arguments, json.dumps([feature.figures() for feature in features], indent=1))
     else:

@@ -18,11 +18,11 @@ from ..core.scene.assembly import assemble
 from ..core.scene.forming import GESTURES, make_forming_scene
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
-from ..core.session.run_scene import Result
+from ..core.session.run_scene import History, Result
 from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
 from .arguments import QUIET, add_command, add_options, add_scene, say, scene_of
 from .export import formats
-from .run import Extra, plan_meshes, simulate, write_run
+from .run import plan_meshes, simulate, write_run
 from .stop import Stop, allow_interrupt, defer_interrupt, require_surface
 
 EXAMPLES = f"""\
@@ -79,8 +79,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
         if arguments.finger != "scene":
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
-        result, lines = _evaluate(simulate(arguments, scene, path, stop), laid)
-        return write_run(arguments, claim, result, _plan_extras(result, arguments.export), stop, *lines)
+        result = simulate(arguments, scene, path, stop)
+        row = find_displayed(result.history)
+        result, lines = _evaluate(result, row, laid)
+        meshes = [
+            plan_meshes(scene, result.history, arguments.export),
+            plan_meshes(scene, result.history, arguments.export, row, "displayed"),
+        ]
+        return write_run(arguments, claim, result, meshes, stop, *lines)
 
 
 def _laid(scene: Scene) -> tuple[Scene, Fitted]:
@@ -97,19 +103,15 @@ def _laid(scene: Scene) -> tuple[Scene, Fitted]:
     return replace(scene, shape=shape, name=name, description=f"{name}, displayed and then formed."), laid
 
 
-def before_the_finger(result: Result) -> int:
+def find_displayed(history: History) -> int:
     """Return the last row before the fingertip touches."""
-    assert result.history is not None
-    touching = np.flatnonzero(result.history["total_force"] > 0.0)
-    return int(touching[0]) - 1 if touching.size else len(result.history["time"]) - 1
+    touching = np.flatnonzero(history["total_force"] > 0.0)
+    return max(int(touching[0]) - 1, 0) if touching.size else len(history["time"]) - 1
 
 
-def _evaluate(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
-    """Return the result with the data of its shape, and their lines of text."""
-    history, layout = result.history, result.scene.layout
-    assert history is not None
-    row = max(before_the_finger(result), 0)
-    height = history["height"]
+def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]]:
+    """Return the result with the data of its shape, displayed in a row, and their lines of text."""
+    height, layout = result.history["height"], result.scene.layout
     error = float(np.abs(height[row] - laid.heights).max())
     stands = next(i for i in range(row + 1) if np.abs(height[i] - laid.heights).max() <= error + 1e-9)
     change = height[-1] - height[row]
@@ -123,18 +125,8 @@ def _evaluate(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
     units = dict(zip(known, ("m", "m3", "m3"), strict=True))
     metrics = {**result.metrics, **known, **counts, "units": {**result.metrics["units"], **units}}
     lines = [
-        f"displayed to within {error * 1e6:.2g} µm in {history['time'][stands]:.1f} s",
+        f"displayed to within {error * 1e6:.2g} µm in {result.history['time'][stands]:.1f} s",
         f"formed: {raised * 1e6:.2g} cm³ raised by up to {max(change.max(), 0.0) * 1e3:.2g} mm, "
         f"{lowered * 1e6:.2g} cm³ lowered by up to {max(-change.min(), 0.0) * 1e3:.2g} mm",
     ]
     return replace(result, metrics=metrics), lines
-
-
-def _plan_extras(result: Result, kinds: list[str]) -> list[Extra]:
-    """Return the formed surface, and the displayed one."""
-    assert result.history is not None
-    row = max(before_the_finger(result), 0)
-    return [
-        plan_meshes(result.scene, result.history, kinds),
-        plan_meshes(result.scene, result.history, kinds, row, "displayed"),
-    ]

@@ -71,9 +71,8 @@ PICTURE = "pins.png"
 STILL = Still(width=1600, height=1000, engine="cycles")
 #: What drawing needs of a history.
 ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force")
-#: Options of one kind of picture only.
-OF_FILMS = ("rate", "speed", "start", "stop", "strip")
-OF_TURNTABLES = ("rate", "frames")
+#: Options of one kind of picture only; --rate is of both.
+OF_FILMS, OF_TURNTABLES = ("rate", "speed", "start", "stop", "strip"), ("rate", "frames")
 
 
 def add(commands: Any) -> None:

@@ -173,8 +173,6 @@ def _weight(scene: Scene, system: System) -> int:
 def _own_error(scene: Scene) -> float:
     """Estimate how far the integration of a scene is from the exact solution, m of height."""
     recorded = replace(scene, recorder=Recorder())
-    history = run(recorded).history
-    assert history is not None
-    errors = estimate_errors(recorded, history)
+    errors = estimate_errors(recorded, run(recorded).history)
     assert errors is not None
     return errors.height

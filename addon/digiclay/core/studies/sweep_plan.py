@@ -162,8 +162,7 @@ def format_table(
     table: list[Sequence[Any]] = [[*(f"{name} ({unit})" if unit else name for name, unit in units), "error"]]
     for values, record in zip(rows, records, strict=True):
         figures = record.get("figures", {})
-        written = [repr(figures[name]) if figures.get(name) is not None else "" for name in names]
-        table.append([*values, *written, record.get("error", "")])
+        table.append([*values, *map(figures.get, names), record.get("error", "")])
     return format_csv(table)
 
 
