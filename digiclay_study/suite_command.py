@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from digiclay import __version__
 from digiclay.commands.arguments import METHOD, add_options, settings_of, whole_number
@@ -15,50 +14,24 @@ from digiclay.commands.evaluation_pool import add_pool, run_series
 from digiclay.commands.progress import format_command
 from digiclay.commands.stop import refuse_without
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
-from digiclay.core.control.methods import METHODS, find_method
+from digiclay.core.control.methods import METHODS
 from digiclay.core.files.run_folder import find_name, write_whole
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.studies.axes import Point, Record
 from digiclay.core.studies.sweep_plan import hash_points, open_points
 from digiclay.plots.figure import save
-from digiclay.plugins.method_loader import OwnRow
 
 from .league import Table, find_league
 from .method_trials import GROUPS, QUICK, list_trajectories, place_trial, read_groups
 from .study_plots import draw_measures, draw_rfd
-from .suite_page import (
-    Provenance,
-    describe_machine,
-    format_league,
-    format_page,
-    format_results,
-    format_trajectories,
-    print_league,
-)
+from .suite_page import Plan, Provenance, describe_machine, format_files, print_league
 
 #: Scene of a suite where none is given: the paper's session.
 SCENE = "ridge_mound_valley"
 #: Columns of a point.
 KEYS = ("method", "trajectory", "seed")
 #: The pictures.
-RFD_PICTURE, MEASURES_PICTURE = "rfd.svg", "measures.svg"
-
-
-class Plan(NamedTuple):
-    """Plan of a suite."""
-
-    methods: tuple[str, ...]
-    groups: tuple[str, ...]
-    #: Of the noise.
-    seeds: tuple[int, ...]
-    #: A trial each; words are method, trajectory and seed.
-    points: tuple[Point, ...]
-    #: Standard deviation of the force sensors, N.
-    noise: float
-    #: Name of the scene.
-    title: str
-    #: Hash of all scenes with all parameters, and of the code of methods of one's own.
-    identity: str
+PICTURES = ("rfd.svg", "measures.svg")
 
 
 def add_suite(parser: argparse.ArgumentParser) -> None:
@@ -136,21 +109,13 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
             placed, measure = place_trial(scene, name)
             points.append(Point(len(points), (method, name, str(seed)), placed, measure=measure))
     strength = sensors.force_noise if sensors else 0.0
-    title, identity = find_name(path), identify(points, methods)
-    return Plan(tuple(methods), groups, seeds, tuple(points), strength, title, identity)
+    title = find_name(path)
+    return Plan(tuple(methods), groups, seeds, tuple(points), strength, title, hash_points(points))
 
 
 def _count_drags(arguments: argparse.Namespace) -> int:
     """Return the number of random drags."""
     return arguments.drags or (2 if arguments.quick else 20)
-
-
-def identify(points: Sequence[Point], methods: Sequence[str]) -> str:
-    """Return a number that identifies scenes, and the code of methods of one's own."""
-    rows = [find_method(name) for name in methods]
-    codes = [row.source.digest for row in rows if isinstance(row, OwnRow)]
-    scenes = hash_points(points)
-    return hashlib.sha256(" ".join([scenes, *codes]).encode()).hexdigest() if codes else scenes
 
 
 def _write(out: Path, plan: Plan, records: dict[int, Record], command: str) -> list[str]:
@@ -165,19 +130,11 @@ def _write(out: Path, plan: Plan, records: dict[int, Record], command: str) -> l
     if not table:
         raise DigiclayError(f"Every trial failed; the first one: {next(iter(errors.values()))}")
     league = find_league(table, plan.methods)
-    source = Provenance(
-        plan.title, __version__, plan.identity, plan.methods, plan.seeds, plan.noise,
-        describe_machine("scipy"), datetime.now(UTC).date().isoformat(), command,
-    )  # fmt: skip
-    save(draw_rfd(table, plan.methods), out / RFD_PICTURE)
-    save(draw_measures(league, plan.methods), out / MEASURES_PICTURE)
-    files = {
-        "results.csv": format_results(source, plan.points, records),
-        "trajectories.csv": format_trajectories(source, table, plan.methods),
-        "league.csv": format_league(source, league),
-        "index.html": format_page(source, league, table, failed, (RFD_PICTURE, MEASURES_PICTURE)),
-    }
-    for name, text in files.items():
+    source = Provenance(plan, describe_machine("scipy"), datetime.now(UTC).date().isoformat(), command)
+    figures = draw_rfd(table, plan.methods), draw_measures(league, plan.methods)
+    for figure, name in zip(figures, PICTURES, strict=True):
+        save(figure, out / name)
+    for name, text in format_files(source, records, table, league, failed, PICTURES).items():
         write_whole(out / name, text.encode())
     lines = print_league(league)
     if failed:

@@ -7,10 +7,9 @@ import os
 import platform
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay import __version__
@@ -49,26 +48,38 @@ WORSE = "RFD greater on"
 SHOWN = ("rfd", "lag_mean", "ridge_unevenness", "relief_rms", "max_total_force", "losses")
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """Origin of the results of a suite: `identity` is the hash of all scenes, `noise` in N."""
+class Plan(NamedTuple):
+    """Plan of a suite."""
 
-    scene: str
-    version: str
-    identity: str
     methods: tuple[str, ...]
+    groups: tuple[str, ...]
+    #: Of the noise.
     seeds: tuple[int, ...]
+    #: A trial each; words are method, trajectory and seed.
+    points: tuple[Point, ...]
+    #: Standard deviation of the force sensors, N.
     noise: float
+    #: Name of the scene.
+    title: str
+    #: Hash of all scenes with all parameters, and of the code of methods of one's own.
+    identity: str
+
+
+class Provenance(NamedTuple):
+    """Origin of the results of a suite."""
+
+    plan: Plan
     machine: str
     date: str
     command: str
 
     def cite(self) -> str:
         """Return the line by which a paper cites the results."""
-        ends = " to ".join(dict.fromkeys((str(self.seeds[0]), str(self.seeds[-1]))))
+        plan = self.plan
+        ends = " to ".join(dict.fromkeys((str(plan.seeds[0]), str(plan.seeds[-1]))))
         return (
-            f"digiclay {self.version}, benchmark of control methods {', '.join(self.methods)} "
-            f"({self.scene}, scenes {self.identity[:16]}, noise {self.noise * 1e3:g} mN, seeds {ends}), "
+            f"digiclay {__version__}, benchmark of control methods {', '.join(plan.methods)} "
+            f"({plan.title}, scenes {plan.identity[:16]}, noise {plan.noise * 1e3:g} mN, seeds {ends}), "
             f"{self.date}."
         )
 
@@ -77,32 +88,49 @@ class Provenance:
         return [
             ("cite", self.cite()),
             ("command", self.command),
-            ("scenes (SHA-256)", self.identity),
-            ("seeds", " ".join(map(str, self.seeds))),
-            ("force noise (N)", f"{self.noise:g}"),
+            ("scenes (SHA-256)", self.plan.identity),
+            ("seeds", " ".join(map(str, self.plan.seeds))),
+            ("force noise (N)", f"{self.plan.noise:g}"),
             ("machine", self.machine),
             ("date", self.date),
             ("intervals", KIND),
         ]
 
 
-def format_results(source: Provenance, points: Sequence[Point], records: Mapping[int, Record]) -> str:
+def format_files(
+    source: Provenance,
+    records: Mapping[int, Record],
+    table: Table,
+    league: Sequence[Row],
+    failed: Sequence[str],
+    pictures: Sequence[str],
+) -> dict[str, str]:
+    """Return the texts of all files by name. `records`: by the index of their point."""
+    return {
+        "results.csv": format_results(source, records),
+        "trajectories.csv": format_trajectories(source, table),
+        "league.csv": format_league(source, league),
+        "index.html": format_page(source, league, table, failed, pictures),
+    }
+
+
+def format_results(source: Provenance, records: Mapping[int, Record]) -> str:
     """Return all trials as CSV in SI units. `records`: by the index of their point."""
     units = [name if metric.unit == "1" else f"{name} ({metric.unit})" for name, metric in OUTCOMES.items()]
     rows = []
-    for point in points:
+    for point in source.plan.points:
         record = records[point.index]
         figures = record.get("figures", {})
         rows.append([*point.words, *map(figures.get, OUTCOMES), record.get("error", "")])
     return _format_csv(source, ["method", "trajectory", "seed", *units, "error"], rows)
 
 
-def format_trajectories(source: Provenance, table: Table, methods: Sequence[str]) -> str:
+def format_trajectories(source: Provenance, table: Table) -> str:
     """Return means and intervals of every trajectory as CSV in SI units."""
     head = ["trajectory", "method", "measure", "unit", "mean", "half width", "seeds"]
     rows = []
     for name in _list_trajectories(table):
-        for method in methods:
+        for method in source.plan.methods:
             for measure, metric in OUTCOMES.items():
                 found = _find_interval(table, method, name, measure)
                 if found is not None:
@@ -138,9 +166,10 @@ def format_page(
 ) -> str:
     """Return the page. `failed`: a line a failed trial; `pictures`: files beside it."""
     titles = {name: metric.title for name, metric in MEASURES.items()}
-    first = escape(source.methods[0])
+    methods = source.plan.methods
+    first = escape(methods[0])
     lines = [
-        f"<p>{len(table)} trials of {len(source.methods)} methods, {len(source.seeds)} seeds.</p>",
+        f"<p>{len(table)} trials of {len(methods)} methods, {len(source.plan.seeds)} seeds.</p>",
         "<h2>League</h2>",
         *make_table(
             ["method", *titles.values(), WORSE], [_list_cells(row, list(MEASURES)) for row in league]
@@ -154,17 +183,17 @@ def format_page(
     for name in SHOWN:
         body, factor = [], MEASURES[name].factor
         for trajectory in _list_trajectories(table):
-            found = [_find_interval(table, method, trajectory, name) for method in source.methods]
+            found = [_find_interval(table, method, trajectory, name) for method in methods]
             if any(found):
                 body.append([trajectory, *(_format(interval, factor) for interval in found)])
         lines.append(f"<h2>{escape(titles[name])} by trajectory</h2>")
-        lines += make_table(["trajectory", *source.methods], body)
+        lines += make_table(["trajectory", *methods], body)
     if failed:
         lines += ["<h2>Failed trials</h2>", *(f"<p>{escape(line)}</p>" for line in failed)]
     files = ("league.csv", "trajectories.csv", "results.csv")
     lines += ["<h2>Origin</h2>", *make_table(["", ""], source.facts())]
     lines.append(f"<p>{make_links([(name, name) for name in files])}</p>")
-    return wrap(f"Benchmark of control methods: {source.scene}", lines)
+    return wrap(f"Benchmark of control methods: {source.plan.title}", lines)
 
 
 def _list_cells(row: Row, names: Sequence[str]) -> list[str]:
