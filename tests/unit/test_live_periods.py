@@ -22,6 +22,7 @@ from digiclay.core.session import accuracy, recent_trace, snapshot
 from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
     Clock,
+    clamp_pose,
     interpolate_path,
     periods_due,
     simulate_path,
@@ -111,6 +112,18 @@ def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
     parts = np.array([0.0, 0.2, 0.21, 0.7, 1.0])
     alone = [interpolate_poses(np.array(pair), parts)[0] for pair in pairwise(poses)]
     assert np.array_equal(interpolate_poses(poses, parts), alone)
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ([0.0, 0.0, -50.0], [0.0, 0.0, 0.0]),
+        ([1e9, -1e9, 1e9], [100.0, -100.0, 100.0]),
+        ([0.01] * 3, [0.01] * 3),
+    ],
+)
+def test_a_finger_stays_where_a_finger_can_be(given, wanted):
+    assert clamp_pose(np.array([*given, *LEVEL]), 0.1)[:3].tolist() == wanted
 
 
 def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it_along() -> None:
