@@ -6,9 +6,9 @@ from __future__ import annotations
 BEGINNING, END = 300, 160
 
 
-def one_line(said: object) -> str:
+def one_line(text: object) -> str:
     """Return a text as one line of a sane length, without what would steer a terminal."""
-    line = " ".join(str(said).split())
+    line = " ".join(str(text).split())
     line = "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in line)
     if len(line) <= BEGINNING + END:
         return line

@@ -119,27 +119,27 @@ class Parameters:
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
         for name, field in vars(cls).items():
-            known = field.metadata.get("quantity") if isinstance(field, dataclasses.Field) else None
-            if known and known.unit not in EXTENTS:
+            declared = field.metadata.get("quantity") if isinstance(field, dataclasses.Field) else None
+            if declared and declared.unit not in EXTENTS:
                 rule = f"must have one of the units {', '.join(filter(None, EXTENTS))}, or none for a number"
-                raise ParameterError(cls.__name__, name, rule, repr(known.unit))
+                raise ParameterError(cls.__name__, name, rule, repr(declared.unit))
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            known: Quantity = field.metadata["quantity"]
-            value = _typed(self, field.name, known, getattr(self, field.name), field.default)
+            declared: Quantity = field.metadata["quantity"]
+            value = _typed(self, field.name, getattr(self, field.name), field.default)
             object.__setattr__(self, field.name, value)
             for item in value if isinstance(value, tuple) else (value,):
-                rule = known.broken_rule(item)
+                rule = declared.broken_rule(item)
                 if rule:
-                    raise ParameterError(type(self).__name__, field.name, rule, known.show(item))
+                    raise ParameterError(type(self).__name__, field.name, rule, declared.show(item))
         try:
             self.check()
         except (DigiclayError, MemoryError, KeyboardInterrupt):
             raise
         except BaseException as error:  # of a method of one's own
-            said = f"{type(error).__name__}: {error}"
-            raise ParameterError(type(self).__name__, "", "must pass its own check", said) from error
+            cause = f"{type(error).__name__}: {error}"
+            raise ParameterError(type(self).__name__, "", "must pass its own check", cause) from error
 
     def check(self) -> None:
         """Check the rules that join several fields; parts override this."""
@@ -156,7 +156,7 @@ def refuse_overrides(kind: type, base: type, names: tuple[str, ...], reason: str
             raise ParameterError(kind.__name__, name, f"must be that of {base.__name__}: {reason}", "another")
 
 
-def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: Any) -> Any:
+def _typed(owner: Parameters, name: str, value: Any, default: Any) -> Any:
     """Return `value` in the type of `default`; whole numbers pass for floats."""
     kind = type(default)
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
@@ -165,7 +165,7 @@ def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: A
     if kind is int and number and not isinstance(value, int) and math.isfinite(value) and value == int(value):
         return int(value)
     if kind is tuple and isinstance(value, (list, tuple)) and value:
-        return tuple(_typed(owner, name, known, item, default[0]) for item in value)
+        return tuple(_typed(owner, name, item, default[0]) for item in value)
     if isinstance(value, kind) and kind is not tuple and (number or kind not in (int, float)):
         return value
     wanted = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}

@@ -77,8 +77,8 @@ def sum_row(force: Floats, x: Floats, y: Floats, height: Floats) -> Floats:
     """Return total, x, y, height and strongest of `CellSums`, (5, b), of b rows of k cells, all (k, b)."""
     sums = np.empty((5, force.shape[1]))
     np.add.reduce(force, out=sums[0])
-    for values, found in zip((x, y, height), sums[1:4], strict=True):
-        np.einsum("kb,kb->b", values, force, out=found)
+    for values, out in zip((x, y, height), sums[1:4], strict=True):
+        np.einsum("kb,kb->b", values, force, out=out)
     np.maximum.reduce(force, out=sums[4], initial=0.0)
     return sums
 
@@ -315,12 +315,12 @@ def measure_touchdown(
     # From the last row before the first contact to the last one of that contact.
     first = slice(max(0, touches[0].start - 1), touches[0].stop)
     beyond, wanted = total_force[first] - set_point[first], set_point[first]
-    known = ~np.isnan(wanted)
-    typical = compute_mean(wanted[known], compute_weights(time[first])[known])
+    asked = ~np.isnan(wanted)
+    typical = compute_mean(wanted[asked], compute_weights(time[first])[asked])
     if typical is None:
         return None, None
     # Without contact the force is below its set point by all of it.
-    passed = measure_overshoot(np.concatenate([[-typical], beyond[known]]), 0.0)
+    passed = measure_overshoot(np.concatenate([[-typical], beyond[asked]]), 0.0)
     return passed, measure_settling_time(time[first], beyond / wanted, 0.0, BAND)
 
 

@@ -111,22 +111,22 @@ def _make_touch(scene: Scene) -> Touch | None:
 def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
     """Return the sensor chain of a scene."""
     sensors: Sensors = PerfectSensors()
-    known = scene.sensors
-    if known is None:
+    sensing = scene.sensors
+    if sensing is None:
         return sensors
     from ..model.sensors import Delayed, Noisy, Quantized
 
-    if known.noisy:
-        sensors = Noisy(sensors, known.force_noise, known.height_noise, known.seed)
-    if known.force_step or known.height_step:
-        sensors = Quantized(sensors, known.force_step, known.height_step)
-    if known.observer == "valve":
+    if sensing.noisy:
+        sensors = Noisy(sensors, sensing.force_noise, sensing.height_noise, sensing.seed)
+    if sensing.force_step or sensing.height_step:
+        sensors = Quantized(sensors, sensing.force_step, sensing.height_step)
+    if sensing.observer == "valve":
         from ..model.observer import make_valve_observer
 
         period = scene.simulation.control_period
-        sensors = make_valve_observer(sensors, cell, line, period, known.motion_floor)
-    if known.delay:
-        sensors = Delayed(sensors, known.delay, scene.actuator.rest_height)
+        sensors = make_valve_observer(sensors, cell, line, period, sensing.motion_floor)
+    if sensing.delay:
+        sensors = Delayed(sensors, sensing.delay, scene.actuator.rest_height)
     return sensors
 
 
@@ -136,8 +136,8 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
         return Uncontrolled()
     from ..control.device_info import DeviceInfo
 
-    known = scene.sensors
-    floors = (known.force_floor, known.height_floor) if known else (0.0, 0.0)
+    sensing = scene.sensors
+    floors = (sensing.force_floor, sensing.height_floor) if sensing else (0.0, 0.0)
     dead_time = scene.delay.dead_time if scene.delay else 0.0
     device = DeviceInfo(bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time)
     if scene.shape:

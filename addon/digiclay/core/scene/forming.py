@@ -45,13 +45,13 @@ def compute_display_time(display: ShapeDisplayControl) -> float:
     A move takes the way at the slower reservoir's speed, and the time its height control needs to come
     within the dead band; no longer than its patience.
     """
-    known, drive = display.parameters, display.drive
+    shape, drive = display.parameters, display.drive
     way = float(np.abs(display.heights - display.actuator.rest_height).max(initial=0.0))
-    if known.refresh != "one_time":
-        way /= known.surfaces
+    if shape.refresh != "one_time":
+        way /= shape.surfaces
     speed = min(float(drive.up[-1]), float(drive.down[-1]))
     settling = drive.settling_time * math.log(max(way / max(drive.dead_band, 1e-9), 1.0) + 1.0)
-    move = min(way / speed + settling + 0.05, known.patience)
+    move = min(way / speed + settling + 0.05, shape.patience)
     return math.ceil(10.0 * (MARGIN + len(display.moves) * move)) / 10.0
 
 

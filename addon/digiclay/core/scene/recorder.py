@@ -57,33 +57,33 @@ class Recording:
         self.every = recorder.every
         self._command, self._felt_rows = rows.command, (0, rows.force)
         self._keep = keep
-        self._held: ActiveSet | None = None
+        self._active: ActiveSet | None = None
         self._felt: list[Floats] = []
         self._given: list[tuple[Floats, Modes]] = []
 
     def observe(self, state: State) -> None:
         """Take in the state after a control period."""
-        held = state.active
-        if held is not self._held or len(self._given) >= CHUNK:
+        active = state.active
+        if active is not self._active or len(self._given) >= CHUNK:
             self.flush()
-        self._held = held
+        self._active = active
         if (state.period - 1) % self.every == 0:
-            self._given.append((held.block[self._command].copy(), held.mode.copy()))
+            self._given.append((active.block[self._command].copy(), active.mode.copy()))
         if state.period % self.every == 0:
-            self._felt.append(held.block.take(self._felt_rows, axis=0))
+            self._felt.append(active.block.take(self._felt_rows, axis=0))
 
     def flush(self) -> None:
         """Hand on the rows that wait; a set of cells that was given up is as its last period left it."""
-        held = self._held
-        if held is None:
+        active = self._active
+        if active is None:
             return
-        shape, given = held.cells.shape, self._given
+        shape, given = active.cells.shape, self._given
         felt = np.array(self._felt).reshape(len(self._felt), 2, *shape)
         command = np.array([one for one, _ in given]).reshape(len(given), *shape)
         mode = np.array([one for _, one in given], np.int8).reshape(len(given), *shape)
-        last = held.block.take(self._felt_rows, axis=0)
-        self._keep(Stretch(held.cells, felt, command, mode, last, held.mode.copy()))
-        self._held, self._felt, self._given = None, [], []
+        last = active.block.take(self._felt_rows, axis=0)
+        self._keep(Stretch(active.cells, felt, command, mode, last, active.mode.copy()))
+        self._active, self._felt, self._given = None, [], []
 
 
 class HistoryWriter:

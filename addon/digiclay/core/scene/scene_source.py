@@ -60,15 +60,15 @@ def load_recorded(path: Path) -> Scene:
 
 
 def make_scene(
-    path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = (), known: ReadParts | None = None
+    path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = (), cache: ReadParts | None = None
 ) -> Scene:
     """Make a scene of the `read_table` of its file, overridden by settings; SceneError as `load`.
 
-    A shape may lie beside the file. `known`: parts of scenes of the same file, which are not read again.
+    A shape may lie beside the file. `cache`: parts of scenes of the same file, which are not read again.
     """
     try:
         merged = merge_one_finger(_find_beside(table, path.parent))
-        return resolve(_override(merged, settings), path.stem, known)
+        return resolve(_override(merged, settings), path.stem, cache)
     except ParameterError as error:
         if settings:
             make_scene(path, table)  # a file that is wrong by itself is told of first
@@ -94,10 +94,10 @@ def read_table(path: Path) -> dict[str, Any]:
     except RecursionError:
         raise SceneError(f"{path}: lists or tables are nested too deeply.") from None
     except ValueError as error:
-        said, _, place = str(error).partition(" (at ")
+        rule, _, place = str(error).partition(" (at ")
         line = re.match(r"line (\d+)", place)
         number = line[1] if line else str(max(1, len(text.splitlines())))
-        raise SceneError(f"{path}, line {number}: {said}.") from None
+        raise SceneError(f"{path}, line {number}: {rule}.") from None
 
 
 def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:

@@ -33,13 +33,13 @@ FINGER_PARTS = tuple(section for section in FINGER_SECTIONS if section in SECTIO
 TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
 
 
-def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Scene:
+def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Scene:
     """Make a scene of the tables of a scene file; whatever they leave open gets its default.
 
-    `name`: where the table has none; `known`: parts of similar tables, which are not read again. Raises
+    `name`: where the table has none; `cache`: parts of similar tables, which are not read again. Raises
     ParameterError: its owner is the section.
     """
-    known = known or ReadParts()
+    cache = cache or ReadParts()
     refuse_unknown("", table, TOP_LEVEL)
     texts: dict[str, Any] = {
         key: _check_text(key, table.get(key, default))
@@ -55,12 +55,12 @@ def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Sce
     }
     method = (shared["control"] or {}).pop("method", "virtual_master")
     defaults: dict[str, Table] = {**PRESETS[texts["preset"]], "blister": find_method(method).blister or {}}
-    parts = _read_parts(shared, defaults, known, method)
+    parts = _read_parts(shared, defaults, cache, method)
     share = ARRANGEMENTS[parts["layout"].arrangement].share
     if share is not None:
         defaults["contact"] = {**defaults.get("contact", {}), "share": share}
     rest_height = parts["actuator"].rest_height
-    fingers = tuple(_read_finger(owner, own, defaults, rest_height, known) for owner, own in tables)
+    fingers = tuple(_read_finger(owner, own, defaults, rest_height, cache) for owner, own in tables)
     return Scene(**parts, **texts, fingers=fingers, method=method)
 
 
@@ -101,7 +101,7 @@ def merge_one_finger(table: Table) -> dict[str, Any]:
 def _read_parts(
     tables: Mapping[str, Table | None],
     defaults: Mapping[str, Table],
-    known: ReadParts,
+    cache: ReadParts,
     method: str = "",
     owner: str = "",
 ) -> dict[str, Any]:
@@ -112,18 +112,18 @@ def _read_parts(
             continue
         if section != "blister" or _forms_blister(method, own):
             kind, usual = import_parameters(section, method), defaults.get(section, {})
-            parts[section] = known.read(read_part, owner + section, kind, usual, own)
+            parts[section] = cache.read(read_part, owner + section, kind, usual, own)
     return parts
 
 
 def _read_finger(
-    owner: str, table: Table, defaults: Mapping[str, Table], rest_height: float, known: ReadParts
+    owner: str, table: Table, defaults: Mapping[str, Table], rest_height: float, cache: ReadParts
 ) -> Finger:
     """Make a finger of its sections; `owner` stands before their names in messages."""
     tables = {section: _read_section(section, table.get(section, {}), owner) for section in FINGER_PARTS}
-    parts = _read_parts(tables, defaults, known, owner=owner)
+    parts = _read_parts(tables, defaults, cache, owner=owner)
     own = table.get("trajectory", {})
-    path = known.read(_read_path, f"{owner}trajectory", own, rest_height)
+    path = cache.read(_read_path, f"{owner}trajectory", own, rest_height)
     return Finger(**parts, trajectory=path)
 
 
@@ -158,7 +158,7 @@ def _forms_blister(method: str, own: Table) -> bool:
 
 
 def _read_path(owner: str, table: Any, rest_height: float) -> Path:
-    """Read the section of the finger's path."""
+    """Read the section of the fingertip path."""
     if not isinstance(table, dict):
         raise ParameterError(owner, "", "must be a section, [trajectory]", show_value(table))
     refuse_unknown(owner, table, ("interpolation", "waypoints"))
@@ -232,9 +232,9 @@ def write_part(section: str, part: Parameters | Path | None, method: str = "") -
         yield f"method = {format_value(method)}"
     idle = part.list_idle()
     for field in dataclasses.fields(part):
-        known, value = field.metadata["quantity"], getattr(part, field.name)
-        if not (known.later or field.name in idle) or value != field.default:
-            note = f"{known.unit}: {known.doc}" if known.unit else known.doc
+        declared, value = field.metadata["quantity"], getattr(part, field.name)
+        if not (declared.later or field.name in idle) or value != field.default:
+            note = f"{declared.unit}: {declared.doc}" if declared.unit else declared.doc
             yield f"{field.name} = {format_value(value)}  # {note}"
 
 

@@ -143,13 +143,13 @@ def place_along(at: Floats, run: Floats, points: Floats) -> Floats:
 FLANK = 1.5
 #: Lines are parted where they are lower than this share of the lower one.
 SADDLE = 0.5
-#: Branches go on into each other when the cosine between their ways is above this: 66 degrees.
+#: Branches continue in each other when the cosine between their ways is above this: 66 degrees.
 STRAIGHT = 0.4
 #: Two lines run together for this many widths at most, and turn into the common way by so much at most in the
 #: mean, rad: those of an X by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of
 #: two circles, may turn by 75.
 TOGETHER, TURN, TURN_OF_LOOPS = 4.0, np.radians(60.0), np.radians(75.0)
-#: Branches that turn by more than this sine go on into each other by an arc.
+#: Branches that turn by more than this sine continue in each other by an arc.
 BENT = 0.35
 #: A line runs straight through a junction, from so many half widths before it to as many after it.
 THROUGH = 1.5
@@ -286,7 +286,7 @@ def _join_through(network: Network) -> None:
 
 
 def _joints(network: Network) -> dict[End, tuple[End, Floats]]:
-    """Return which end of a branch goes on into which, and the points in between."""
+    """Return which end of a branch continues in which, and the points in between."""
     joints: dict[End, tuple[End, Floats]] = {}
     nothing = np.empty((0, 2))
     for number in list(network.branches):

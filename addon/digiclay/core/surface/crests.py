@@ -415,12 +415,12 @@ def _meet(pieces: list[Chain], lines: list[Floats | None], field: Field) -> None
     """Let lines that end at a junction end on another line there, in place."""
     for number, piece in enumerate(pieces):
         for end, way in ((0, -1), (-1, 1)):
-            mine = lines[number]
-            if mine is None or piece.closed or not piece.joined[end]:
+            own_line = lines[number]
+            if own_line is None or piece.closed or not piece.joined[end]:
                 continue
             met = [k for k, other in enumerate(pieces) if k != number and other.nodes & piece.nodes]
             others = [line for k in met if (line := lines[k]) is not None]
-            lines[number] = field.extend(mine[::way], field.half_width(mine, False), others)[::way]
+            lines[number] = field.extend(own_line[::way], field.half_width(own_line, False), others)[::way]
 
 
 def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:

@@ -236,14 +236,14 @@ def _of_kind(grid: SurfaceGrid, finding: Finding, kind: str, sign: float) -> Ite
     at_pins = sign * grid.formed.raised
     pins = _by_label(np.where(inside[grid.pins], label[grid.pins], -1))
     for name, block in _by_label(of_face).items():
-        mine = pins.get(name, np.empty(0, np.int64))
-        if len(mine) < finding.smallest:
+        own_pins = pins.get(name, np.empty(0, np.int64))
+        if len(own_pins) < finding.smallest:
             continue
         region = cut(grid.position, grid.former, off, faces[block], finding.threshold)
         least = DEEP * finding.threshold
-        whole = find_ridges(grid.formed, mine, at_pins, least)
+        whole = find_ridges(grid.formed, own_pins, at_pins, least)
         every = [part for ridge in whole for part in find_parts(ridge, least)]
-        for part, own, piece, apart in _shared_out(grid, every, mine, region, finding.smallest):
+        for part, own, piece, apart in _shared_out(grid, every, own_pins, region, finding.smallest):
             lines = tuple(crest.points for crest in part.crests)
             high = at_pins[own]
             flat = np.mean(high[high >= 0.5 * high.max()] >= FLAT * high.max()) > 0.5

@@ -114,7 +114,7 @@ def _thinned(beside: Indices, top: Floats, holes: list[int]) -> Indices:
         if not simple[code]:
             continue
         high = ends[code] and height[pin] >= END * max(height[other] for other in around if left[other])
-        if high and (ends[code] == 1 or _goes_on(neighbors, left, around, code)):
+        if high and (ends[code] == 1 or _continues(neighbors, left, around, code)):
             continue
         left[pin] = False
         for other in around:
@@ -124,7 +124,7 @@ def _thinned(beside: Indices, top: Floats, holes: list[int]) -> Indices:
     return np.flatnonzero(left[:count])
 
 
-def _goes_on(neighbors: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
+def _continues(neighbors: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
     """Return whether a line two pins wide continues from a pin with two neighbors: all beyond lies ahead."""
     steps = _STEPS[len(around)]
     two = [bit for bit in range(len(around)) if code >> bit & 1]
