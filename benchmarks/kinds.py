@@ -5,22 +5,21 @@ from __future__ import annotations
 import argparse
 import io
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from digiclay.commands.arguments import Help, add_command, add_scene
+from digiclay.commands.arguments import Help, Options, add_command, add_options, add_scene, whole_number
 from digiclay.commands.parser import Parser
 from digiclay.commands.stop import refuse_unwritable, refuse_without, refuse_without_blender
 from digiclay.core.base.errors import OutputError
 
 from .report import Report, Steps
 
-Options = Callable[[argparse.ArgumentParser], object]
-
+#: The paper's session.
+PAPER = "ridge_mound_valley"
 #: Recorded strokes of the made things.
 STROKES = Path(__file__).parent / "strokes"
 #: Packages that benchmarks need, and the extra that has them.
@@ -42,7 +41,10 @@ class Benchmark:
     help: str
     examples: tuple[str, ...] = ("", "--quick --out results")
     """Arguments."""
-    options: Options = lambda parser: None
+    options: Options = field(default_factory=dict)
+    """Beside SCENE, --quick, --quiet and --out."""
+    scene: str | None = None
+    """Default of --scene; empty: SCENE must be named; None: it takes no scene."""
     needs: str = ""
     """Package without which it cannot run, and whose version is given."""
     quick: bool = True
@@ -50,57 +52,41 @@ class Benchmark:
     """Whether it has these options."""
 
 
-def _add_session(parser: argparse.ArgumentParser) -> None:
-    add_scene(parser, default="ridge_mound_valley")
-    parser.add_argument(
-        "--repeats", metavar="N", type=_read_repeats, default=3,
-        help="number of runs, of which the median counts; default: 3",
-    )  # fmt: skip
-    parser.add_argument("--calls", action="store_true", help="count numpy's calls")
-
-
-def _read_repeats(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 1000:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to 1000 (got {text!r})")
-    return int(text)
-
-
-def _flag(name: str, help: str) -> Options:
-    return lambda parser: parser.add_argument(name, action="store_true", help=help)
-
-
-def _add_made(parser: argparse.ArgumentParser) -> None:
-    names = ", ".join(sorted(path.stem for path in STROKES.glob("*.toml")))
-    parser.add_argument("things", nargs="*", metavar="THING", help=names)
-    parser.add_argument("--bed", metavar="BED", help="a size of beds; default: that of the strokes' file")
-    parser.add_argument("--pictures", metavar="FOLDER", type=Path, help="also draw them, formed and intended")
-
-
-def _add_commits(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("old", help="commit, branch or tag")
-    parser.add_argument("new", nargs="?", default="HEAD", help="another one, by default HEAD")
-    parser.add_argument("--turns", type=int, default=5, metavar="N", help="runs of each commit, default 5")
+def _read_folder(text: str) -> Path:
+    """Read the name of a folder to write into; what would fail after the work is refused before it."""
+    try:
+        refuse_unwritable(Path(text))
+    except OutputError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+    return Path(text)
 
 
 BENCHMARKS = {
     "session": Benchmark(
         "session_parts.measure", "time of one session and of its parts, on one core",
-        ("", "--scene tap --repeats 9", "--calls"), _add_session, quick=False, out=False,
+        ("", "--scene tap --repeats 9", "--calls"),
+        {
+            "--repeats N": (
+                whole_number(1, 1000), "number of runs, of which the median counts; default: 3", 3
+            ),
+            "--calls": "count numpy's calls",
+        },
+        PAPER, quick=False, out=False,
     ),
     "stiff": Benchmark(
         "stiff.measure", "errors of the steppers in stiff and extreme cases", ("", "--full --out results"),
-        _flag("--full", "also the adaptive stepper, which takes longer than all others"),
+        {"--full": "also the adaptive stepper, which takes longer than all others"},
     ),
     "precision": Benchmark(
         "precision.measure",
         "error against run time, beside SciPy's solvers",
         ("--quick", "--out results", "--whole-bed --out results"),
-        _flag("--whole-bed", "also peers that integrate all cells, on the paper's bed (11 minutes more)"),
+        {"--whole-bed": "also peers that integrate all cells, on the paper's bed (11 minutes more)"},
         needs="scipy",
     ),
     "terms": Benchmark(
         "session_parts.measure_terms", "cost and effect of each part of the model",
-        ("tap", "ridge_mound_valley --out results"), add_scene,
+        ("tap", "ridge_mound_valley --out results"), scene="",
     ),
     "scale": Benchmark("bed_size.measure", "a control period from 625 pins to a million"),
     "export": Benchmark("bed_size.measure_export", "writing a bed as a mesh, from 625 pins to a million"),
@@ -114,11 +100,17 @@ BENCHMARKS = {
     ),
     "stack": Benchmark(
         "runs_together.measure", "sessions a second, one at a time and many in one call",
-        options=partial(add_scene, default="ridge_mound_valley"),
+        scene=PAPER,
     ),
     "made": Benchmark(
         "made.measure", "things formed by recorded strokes, beside the intended relief (needs bpy)",
-        ("", "letter_a --bed paper", "leaf face --pictures made"), _add_made, needs="bpy",
+        ("", "letter_a --bed paper", "leaf face --pictures made"),
+        {
+            "things THING": {"nargs": "*", "help": ", ".join(sorted(p.stem for p in STROKES.glob("*.toml")))},
+            "--bed BED": "a size of beds; default: that of the strokes' file",
+            "--pictures FOLDER": (Path, "also draw them, formed and intended"),
+        },
+        needs="bpy",
     ),
     "cluster": Benchmark(
         "processes.measure_cluster", "overhead of a Dask cluster, one worker and two", needs="distributed"
@@ -132,11 +124,16 @@ BENCHMARKS = {
     "ablation": Benchmark(
         "method_figures.measure_ablation", "Method III with one part left out at a time",
         ("", "--part skirt"),
-        lambda parser: parser.add_argument("--part", metavar="P", help="a row of the table, such as skirt"),
+        {"--part P": "a row of the table, such as skirt"},
     ),
     "commits": Benchmark(
         "processes.measure_commits", "time of a control period at two commits",
-        ("v0.1.0", "v0.1.0 main --turns 9"), _add_commits,
+        ("v0.1.0", "v0.1.0 main --turns 9"),
+        {
+            "old": {"help": "commit, branch or tag"},
+            "new": {"nargs": "?", "default": "HEAD", "help": "another one, by default HEAD"},
+            "--turns N": (int, "runs of each commit, default 5", 5),
+        },
     ),
 }  # fmt: skip
 
@@ -156,25 +153,15 @@ def parser() -> argparse.ArgumentParser:
             f"  python -m benchmarks {name} {words}".rstrip() for words in benchmark.examples
         )
         command = add_command(kinds, name, benchmark.help, f"examples:\n{examples}\n")
-        benchmark.options(command)
-        if benchmark.quick:
-            command.add_argument("--quick", action="store_true", help="fewer and shorter runs")
-        command.add_argument("--quiet", action="store_true", help="no progress")
-        if benchmark.out:
-            command.add_argument(
-                "--out", metavar="DIR", type=_read_folder, help="also write the results into this folder"
-            )
+        if benchmark.scene is not None:
+            add_scene(command, benchmark.scene)
+        add_options(command, benchmark.options)
+        add_options(command, {"--quick": "fewer and shorter runs"} if benchmark.quick else {})
+        add_options(command, {"--quiet": "no progress"})
+        out = (_read_folder, "also write the results into this folder")
+        add_options(command, {"--out DIR": out} if benchmark.out else {})
         command.set_defaults(carry_out=partial(run, name), quick=False, out=None)
     return top
-
-
-def _read_folder(text: str) -> Path:
-    """Read the name of a folder to write into; what would fail after the work is refused before it."""
-    try:
-        refuse_unwritable(Path(text))
-    except OutputError as error:
-        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
-    return Path(text)
 
 
 def run(name: str, arguments: argparse.Namespace) -> int:
