@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any, TextIO, TypeVar
 import numpy as np
 from digiclay.commands.progress import Line, draw_share, table
 from digiclay.core.base.errors import OutputError
-from digiclay.plots.figure import INK, LINES, empty, save
+from digiclay.plots.figure import LINES, empty, save
 
 from digiclay_study.suite_page import describe_machine
 
@@ -29,9 +30,8 @@ STYLE: dict[str, Any] = {
     "axes.prop_cycle": f"cycler(linestyle=['-', '--', ':']) * "
     f"cycler(color={[*LINES]}, marker={[*'os^DvX']})",
 }  # fmt: skip
-#: Size of a panel of `Curves`, and of its legend a line, inches; columns of panels, and of the legend.
-PANEL, LEGEND, COLUMNS = (4.4, 3.6), 0.1, 3
-__all__ = ["BLUE", "INK", "RED", "Curves", "Report", "Row", "Steps", "tabulate"]
+#: Size of a panel of `Curves`, and height of the legend below, inches; most columns of both.
+PANEL, LEGEND, COLUMNS = (4.4, 3.6), 1.2, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +47,21 @@ class Curves:
     """Of the y axis; a linear one begins at 0."""
 
     @property
+    def grid(self) -> tuple[int, int]:
+        """Rows and columns of panels."""
+        columns = min(COLUMNS, len(self.panels))
+        return math.ceil(len(self.panels) / columns), columns
+
+    @property
     def size(self) -> tuple[float, float]:
         """Of the figure, inches."""
-        columns = min(COLUMNS, len(self.panels))
-        return PANEL[0] * columns, PANEL[1] * -(-len(self.panels) // columns) + 1.2
+        rows, columns = self.grid
+        return PANEL[0] * columns, PANEL[1] * rows + LEGEND
 
     def __call__(self, figure: Any) -> None:
         """Draw the panels."""
-        columns = min(COLUMNS, len(self.panels))
-        axes = figure.subplots(-(-len(self.panels) // columns), columns, squeeze=False).ravel()
+        rows, columns = self.grid
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel in axes[len(self.panels) :]:
             panel.set_axis_off()
         labels = dict.fromkeys(label for lines in self.panels.values() for label in lines)
@@ -69,13 +75,7 @@ class Curves:
 
 
 class Steps(Line):
-    """Progress of a sequence of steps; updated after each with its name.
-
-    Parameters
-    ----------
-    total : int
-        Number of steps.
-    """
+    """Progress of a sequence of `total` steps; updated after each with its name."""
 
     def __init__(self, stream: TextIO, label: str, total: int = 1) -> None:
         super().__init__(stream)

@@ -31,6 +31,7 @@ from digiclay.live import beds as live_beds
 from digiclay.live import tick
 from digiclay.operators.add_bed import add, select_only
 from digiclay.panels import display
+from digiclay.plots.figure import INK
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running, sculpting
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
@@ -38,7 +39,7 @@ from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
 from digiclay.strokes.stroke import draw
 
-from .report import BLUE, INK, RED, Report, Row, Steps, tabulate
+from .report import BLUE, RED, Report, Row, Steps, tabulate
 
 #: What a tick does. The rest of it is in none of these; garbage is collected within any of them.
 PARTS = ("read", "simulate", "monitor", "pack", "finger", "store", "show", "evaluate", "garbage")
