@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import statistics
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from digiclay.commands.arguments import scene_of
 from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.scene.schema import Scene
@@ -31,11 +31,10 @@ STUDIES: dict[str, tuple[str, str, float, float]] = {
     "control": ("control", "force_gain", 0.5, 1.2),
     "device": ("valve", "stroke", 0.9, 1.2),
 }
-#: Processor time of a run, s, alone and in one call: simulated only; recorded and judged, as in a sweep; with
-#: the integration's errors estimated too.
-TIMES = ("alone", "stacked", "judged_alone", "judged_stacked", "errors_alone", "errors_stacked")
-#: What the text says of each pair of them, and the picture.
-PAIRS = {"": "simulated", "judged": "recorded and judged", "errors": "errors estimated too"}
+#: Columns of the tables: runs a second.
+COLUMNS = {
+    "": "what", "runs": "runs d", "alone": "alone .3g", "in one call": "together .3g", "times": "times .1f",
+}  # fmt: skip
 
 
 def study(scene: Scene, name: str, count: int) -> list[Scene]:
@@ -54,25 +53,30 @@ def _time(work: Callable[[], Any]) -> float:
     return time.process_time() - started
 
 
-def _compare(scene: Scene, name: str, count: int, repeats: int) -> dict[str, Any]:
-    """Run a study; the medians of the repeats count.
+def _compare(scene: Scene, name: str, count: int, repeats: int) -> list[Row]:
+    """Run a study; return the runs a second of each kind of work, medians of the repeats.
 
     One run alone and all in one call take turns, so that what else the machine does befalls both alike.
     """
     scenes = study(scene, name, count)
     plain = study(replace(scene, recorder=None), name, count)
     middle, bare = scenes[count // 2], plain[count // 2]
-    works: list[tuple[Callable[[], Any], int]] = [
-        (lambda: run(bare), 1),
-        (lambda: list(run_together(plain)), count),
-        (lambda: evaluate(middle), 1),
-        (lambda: list(measure_together(scenes)), count),
-        (lambda: evaluate(middle, errors=True), 1),
-        (lambda: list(measure_together(scenes, errors=True)), count),
+    works: dict[str, tuple[Callable[[], object], Callable[[], object]]] = {
+        "simulated": (lambda: run(bare), lambda: list(run_together(plain))),
+        "recorded and judged": (lambda: evaluate(middle), lambda: list(measure_together(scenes))),
+        "errors estimated too": (
+            lambda: evaluate(middle, errors=True), lambda: list(measure_together(scenes, errors=True))
+        ),
+    }  # fmt: skip
+    rates: dict[str, list[tuple[float, float]]] = {what: [] for what in works}
+    for _ in range(repeats):
+        for what, (alone, together) in works.items():
+            rates[what].append((1.0 / _time(alone), count / _time(together)))
+    medians = {what: np.median(pairs, 0).tolist() for what, pairs in rates.items()}
+    return [
+        {"study": name, "runs": count, "what": what, "alone": one, "together": many, "times": many / one}
+        for what, (one, many) in medians.items()
     ]
-    spent = [[_time(work) / runs for work, runs in works] for _ in range(repeats)]
-    medians = map(statistics.median, zip(*spent, strict=True))
-    return {"study": name, "runs": count, **dict(zip(TIMES, medians, strict=True))}
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
@@ -82,41 +86,22 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     scene = replace(scene, simulation=replace(scene.simulation, duration=duration))
     counts, repeats = (COUNTS[:3], 1) if arguments.quick else (COUNTS, 5)
     jobs = [(name, count) for name in STUDIES for count in counts]
-    sizes = [_compare(scene, *job, repeats) for job in steps.through(jobs, lambda job: f"{job[1]} runs")]
-    panels = {
-        f"{section}.{key} varies": _list_points([size for size in sizes if size["study"] == name])
-        for name, (section, key, _, _) in STUDIES.items()
-    }
-    curves = Curves(panels, "runs in one call", "runs a second, to one at a time")
-    return Report(list(_list_lines(scene, sizes)), sizes, curves)
-
-
-def _list_points(sizes: Sequence[Row]) -> dict[str, list[tuple[float, float]]]:
-    """Return the runs in one call, and their rate over that of one run alone, by pair of times, and goal."""
-    lines = {
-        label: [(size["runs"], size[alone] / size[stacked]) for size in sizes]
-        for label, alone, stacked in zip(PAIRS.values(), TIMES[::2], TIMES[1::2], strict=True)
-    }
-    return lines | {"goal": [(size["runs"], GOAL) for size in sizes]}
-
-
-def _list_lines(scene: Scene, sizes: Sequence[Row]) -> Iterator[str]:
-    """Give the lines of the report."""
-    yield f"\nThe first {scene.simulation.duration:g} s of {scene.name}: {scene.periods} control periods,"
-    yield f"{scene.cells} cells; CPU time of one core, runs a second; medians, taken in turns."
-    yield "judged: recorded and judged, as digiclay sweep does;"
-    yield "errors: the integration's errors estimated as well."
-    columns = {"runs": "runs d"}
-    for pair, alone, stacked in zip(PAIRS, TIMES[::2], TIMES[1::2], strict=True):
-        label = f"{pair}: " if pair else ""
-        columns |= {f"{label}alone": f"{alone} .3g", f"{label}in one call": f"{stacked} .3g"}
-        columns |= {f"{label}times": f"{alone}/{stacked} .1f"}
+    rows = [
+        row
+        for job in steps.through(jobs, lambda job: f"{job[1]} runs")
+        for row in _compare(scene, *job, repeats)
+    ]
+    lines = [
+        f"\nThe first {duration:g} s of {scene.name}: {scene.periods} control periods,",
+        f"{scene.cells} cells; CPU time of one core, runs a second; medians, taken in turns.",
+        "recorded and judged: as digiclay sweep does.",
+    ]
+    panels = {}
     for name, (section, key, _, _) in STUDIES.items():
-        yield f"\n{section}.{key} varies"
-        yield from tabulate([_rates(size) for size in sizes if size["study"] == name], columns, left=0)
-
-
-def _rates(size: Row) -> dict[str, float]:
-    """Return the runs a second of each kind, and the ratio of each pair."""
-    rates = {"runs": size["runs"], **{name: 1.0 / size[name] for name in TIMES}}
-    return rates | {f"{a}/{b}": size[a] / size[b] for a, b in zip(TIMES[::2], TIMES[1::2], strict=True)}
+        of_study = [row for row in rows if row["study"] == name]
+        lines += [f"\n{section}.{key} varies", *tabulate(of_study, COLUMNS)]
+        panels[f"{section}.{key} varies"] = {"goal": [(float(count), GOAL) for count in counts]} | {
+            what: [(row["runs"], row["times"]) for row in of_study if row["what"] == what]
+            for what in dict.fromkeys(row["what"] for row in rows)
+        }
+    return Report(lines, rows, Curves(panels, "runs in one call", "runs a second, to one at a time"))

@@ -219,8 +219,11 @@ def test_a_benchmark_prints_and_writes_a_table_and_a_picture(tmp_path, monkeypat
     with pytest.raises(OutputError, match="Cannot write into"):
         Report(iter(["a line"]), []).write(tmp_path / "stack.md", "what", text)
     lines = (tmp_path / "stack.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0] == ("study,runs,alone,stacked,judged_alone,judged_stacked,errors_alone,errors_stacked")
-    assert [line.split(",")[:2] for line in lines[1:]] == [[name, "2"] for name in STUDIES]
+    assert lines[0] == "study,runs,what,alone,together,times"
+    kinds = ("simulated", "recorded and judged", "errors estimated too")
+    assert [line.split(",")[:3] for line in lines[1:]] == [
+        [name, "2", kind] for name in STUDIES for kind in kinds
+    ]
 
 
 def press(**control: float) -> Scene:
