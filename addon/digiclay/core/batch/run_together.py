@@ -34,9 +34,8 @@ from .packing import Batch, begin, extend_path, find_diverged, make_batch, make_
 class Play:
     """Sessions under way, and all it takes to go on."""
 
-    systems: Mapping[int, System]
-    """By the numbers of their runs."""
     ways: Mapping[int, Trajectory]
+    """By the numbers of their runs."""
     runs: tuple[int, ...]
     """Whose the last axis is."""
     batch: Batch
@@ -54,7 +53,7 @@ def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Pl
     """Return sessions before their first control period. `scenes`: by the numbers of their runs."""
     batch = make_batch([systems[run] for run in scenes])
     ways = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
-    return Play(systems, ways, tuple(scenes), batch, begin(batch))
+    return Play(ways, tuple(scenes), batch, begin(batch))
 
 
 def locate_fingers(play: Play) -> Play:
@@ -65,9 +64,9 @@ def locate_fingers(play: Play) -> Play:
 
 def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
     """Return some of the sessions. `runs`: those that go on."""
-    state = select_runs(play.state, [play.runs.index(run) for run in runs])
-    batch = make_batch([play.systems[run] for run in runs])
-    return replace(play, runs=runs, batch=batch, state=state, path=None)
+    places = [play.runs.index(run) for run in runs]
+    batch = make_batch([play.batch.systems[place] for place in places])
+    return replace(play, runs=runs, batch=batch, state=select_runs(play.state, places), path=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +145,7 @@ class Histories:
         """
         run = now.play.runs[index]
         rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
-        return evaluate(self._scenes[run], now.play.systems[run], rows, now.ended(index))
+        return evaluate(self._scenes[run], now.play.batch.systems[index], rows, now.ended(index))
 
     def _write(self, recording: Recording, run: int, period: int) -> dict[str, NDArray[Any]]:
         """Write the history of a run up to a period; return its rows."""
@@ -203,7 +202,7 @@ class Sums:
         total, x, y, height, strongest = np.ascontiguousarray(rows.T)
         first, last = self._first[:, column], play.state.row(0)[:, index]
         sums = CellSums(total, x, y, height, strongest, following, first, last)
-        grid, time = play.systems[run].grid, scene.simulation.control_period
+        grid, time = play.batch.grid, scene.simulation.control_period
         same = tuple(finger.trajectory for finger in scene.fingers), time, count, period
         if same not in self._ways:
             moments = np.minimum(np.arange(count) * self._every, period) * time

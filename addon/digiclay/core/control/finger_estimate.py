@@ -237,7 +237,8 @@ def invert_six(matrix: Floats) -> Floats:
     rows: list[tuple[float, ...]] = list(map(tuple, matrix.tolist()))
     swaps = []
     for step in range(6):
-        pivot = max(range(step, 6), key=[abs(row[0]) for row in rows].__getitem__)
+        sizes = [abs(row[0]) for row in rows[step:]]
+        pivot = step + sizes.index(max(sizes))
         if pivot != step:
             rows[step], rows[pivot] = rows[pivot], rows[step]
             swaps.append((step, pivot))

@@ -57,11 +57,16 @@ class FlowServo:
 
     def find_limits(self, force: Floats) -> Floats:
         """Return the lowest (negative) and highest speeds of pins under forces (m,), N; (2, m), m/s."""
-        limits: Floats = np.multiply.outer((-self.fall / self.pull, -self.rise / self.lift), force)
+        limits: Floats = self._yield * force
         limits += self._free
         highest = limits[1]
         np.maximum(highest, 0.0, out=highest)
         return limits
+
+    @cached_property
+    def _yield(self) -> Floats:
+        """How much these speeds change with a force, (2, 1), m/s/N."""
+        return np.array([[-self.fall / self.pull], [-self.rise / self.lift]])
 
     @cached_property
     def _free(self) -> Floats:

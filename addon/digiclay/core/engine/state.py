@@ -19,6 +19,7 @@ from ..base.arrays import Cells, Floats
 from ..base.modes import Mode
 from ..model.control_interface import Commands, Measurement
 from ..model.interfaces import Movement
+from ..model.layout import Discs
 
 
 @dataclass(frozen=True)
@@ -94,8 +95,8 @@ class ActiveSet:
     """(m,) or (m, b): Their control modes, `modes.Mode`."""
     quadratic_basis: Floats
     """(6, m) or (6, m, b): Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product."""
-    reach: Any
-    control: Any
+    reach: Discs | None
+    control: Discs | None
     """Discs of which every cell is in, the finger's and the controller's: center x, y, radius, m; arrays (b,)
     of b runs."""
     peak: Any

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
+from .interfaces import Flow
 from .valve import Fluid, Orifice
 
 
@@ -26,7 +27,7 @@ class Conduit(Parameters):
 
 
 @dataclass(frozen=True)
-class OrificeAndConduit:
+class OrificeAndConduit(Flow):
     """Valve and conduit in series: the drops add, the flow is one.
 
     Each branch of the valve gives a line or a quadratic in Q, solved in closed form; the
@@ -57,7 +58,3 @@ class OrificeAndConduit:
         turbulent = 2.0 * a / (ra + np.sqrt(ra * ra + 4.0 * np.abs(drop)) + np.finfo(float).tiny)
         laminar: Floats = self.laminar_conductance(opening)
         return np.minimum(laminar, turbulent)
-
-    def flow(self, opening: Floats, drop: Floats) -> Floats:
-        """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`."""
-        return self.conductance(opening, drop) * drop

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Floats
+from .layout import Disc
 
 NONE: Floats = np.empty(0)
 
@@ -55,7 +56,7 @@ class Controller(Protocol):
     def begin(self) -> Any:
         """Return the memory before a session."""
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
         """Take in the cells the fingertip may touch; return memory and the disc x, y, radius to control."""
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity, refuse_overrides
+from .interfaces import Flow
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,8 @@ class Valve(Parameters):
 
 
 @dataclass(frozen=True)
-class Orifice:
-    """Flow law of a valve in a fluid.
+class Orifice(Flow):
+    """Flow law of a valve in a fluid (equations 3 to 7).
 
     Laminar branch ``Q = g ΔP`` with ``g = laminar |K|^power``; turbulent branch
     ``Q = a sqrt(ΔP)`` with ``a = turbulent |K|``. The smaller of the two holds: they
@@ -101,10 +102,6 @@ class Orifice:
         root = np.sqrt(np.abs(drop)) + np.finfo(float).tiny
         laminar: Floats = self.laminar_conductance(opening)
         return np.minimum(laminar, self.turbulent * np.abs(opening) / root)
-
-    def flow(self, opening: Floats, drop: Floats) -> Floats:
-        """Return the flow Q with the sign of `drop`, m³/s (equations 3 to 7); arguments as `conductance`."""
-        return self.conductance(opening, drop) * drop
 
 
 def make_orifice(valve: Valve, fluid: Fluid) -> Orifice:

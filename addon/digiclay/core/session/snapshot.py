@@ -90,6 +90,8 @@ def _check_number(template: Any, kept: Any) -> None:
 #: First bytes of a snapshot; the number changes with their arrangement. In the first version the entry of the
 #: fingertip stood by itself.
 START, FIRST = b"digiclay state 2\n", b"digiclay state 1\n"
+#: Types of the arrays, by their names in `State` and `ActiveSet`.
+ARRAYS = {"rows": "<f8", "modes": "i1", "aged": "<f8", "cells": "<i8", "block": "<f8", "mode": "i1"}
 #: How far rounding may take a height, m, or an opening beyond its ends.
 SLACK = 1e-6
 #: No number of a state is as large: a session ends when the square of one is no longer finite.
@@ -132,17 +134,8 @@ def dump(system: System, state: State) -> bytes:
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
     }
     text = json.dumps(header).encode()
-    body = [
-        np.ascontiguousarray(array, kind)
-        for array, kind in (
-            (state.rows, "<f8"),
-            (state.modes, "i1"),
-            (state.aged, "<f8"),
-            (active.cells, "<i8"),
-            (active.block, "<f8"),
-            (active.mode, "i1"),
-        )
-    ]
+    values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
+    body = [np.ascontiguousarray(array, kind) for array, kind in zip(values, ARRAYS.values(), strict=True)]
     # One copy: the arrays are joined as they stand.
     parts = (array.data for array in (*body, *arrays))
     return b"".join([START, len(text).to_bytes(4, "little"), text, *parts])
@@ -151,38 +144,30 @@ def dump(system: System, state: State) -> bytes:
 def load(system: System, data: bytes) -> State:
     """Return the state that bytes hold, bit for bit; StateError when they are damaged or of another bed."""
     kept = _read(data)
-    header, rows = kept.header, system.rows
+    header, arrays, rows = kept.header, kept.arrays, system.rows
     here = [rows.physics, rows.queue, rows.control, rows.sensors]
     _check_same("number of cells", header["cells"], system.grid.count)
     _check_same("rows of a cell", header["rows"], here)
     _check_same("control period", header["control_period"], system.period)
     _check_same("number of fingers", len(header["gathered"]["fingers"]), 1)
     _check_limits(system, kept)
-    template = system.controller.begin()
     gathered = header["gathered"]
-    cells = kept.arrays["cells"].astype(np.intp)
+    cells = arrays["cells"].astype(np.intp)
     active = ActiveSet(
         rows,
         cells,
         gathered["near"],
-        kept.arrays["block"],
-        kept.arrays["mode"],
+        arrays["block"],
+        arrays["mode"],
         system.grid.compute_basis(cells),
         _read_disc(require_one(gathered["fingers"])["reach"]),
         _read_disc(gathered["control"]),
         gathered["peak"],
         gathered["until"],
     )
-    memory = rebuild(template, header["memory"], kept.memory)
-    return State(
-        header["period"],
-        kept.arrays["rows"],
-        kept.arrays["modes"],
-        kept.arrays["aged"],
-        header["peak"],
-        active,
-        memory,
-    )
+    memory = rebuild(system.controller.begin(), header["memory"], kept.memory)
+    bed = arrays["rows"], arrays["modes"], arrays["aged"]
+    return State(header["period"], *bed, header["peak"], active, memory)
 
 
 def transfer_heights(system: System, data: bytes) -> State:
@@ -195,8 +180,7 @@ def transfer_heights(system: System, data: bytes) -> State:
     height = np.clip(height, 0.0, actuator.stroke)
     state.rows[0] = state.rows[system.rows.target] = height
     state.modes[:] = np.where(height == actuator.rest_height, np.int8(Mode.REST), np.int8(Mode.HOLD))
-    peak = float(height.max())
-    return State(0, state.rows, state.modes, state.aged, peak, state.active, state.memory)
+    return state._replace(peak=float(height.max()))
 
 
 def _check_limits(system: System, kept: Snapshot) -> None:
@@ -222,10 +206,8 @@ def _read(data: bytes) -> Snapshot:
         if data.startswith(FIRST):
             gathered = header["gathered"] = {**gathered, "fingers": [{"reach": gathered["reach"]}]}
         count, taken = Rows(*map(read_count, header["rows"])).count, read_count(gathered["cells"])
-        shapes: list[tuple[str, tuple[int, ...]]] = [
-            ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),
-            ("<i8", (taken,)), ("<f8", (count, taken)), ("i1", (taken,)),
-        ]  # fmt: skip
+        sizes = (count, cells), (cells,), (cells,), (taken,), (count, taken), (taken,)
+        shapes: list[tuple[str, tuple[int, ...]]] = list(zip(ARRAYS.values(), sizes, strict=True))
         shapes += [(str(kind), tuple(map(read_count, shape))) for kind, shape in header["arrays"]]
         arrays, end = _read_arrays(data, first + length, shapes)
         if end != len(data):
@@ -234,8 +216,7 @@ def _read(data: bytes) -> Snapshot:
         numbers += [read_count(value) for value in (header["period"], gathered["until"], gathered["near"])]
         discs = [gathered["control"], *(finger["reach"] for finger in gathered["fingers"])]
         numbers += [number for disc in discs for number in _read_disc(disc) or ()]
-        names = ("rows", "modes", "aged", "cells", "block", "mode")
-        kept = Snapshot(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
+        kept = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
         # A memory of nothing is None; one that is not there at all is damage.
         sound = "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
