@@ -241,14 +241,11 @@ def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
     assert {*listed} >= MADE
 
 
-def _pictures() -> dict[str, str]:
-    """Return the command of each picture of the docs, from the table in CONTRIBUTING.md."""
-    table = ROW.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
-    return {name: made for names, made in table for name in re.findall(r"`([^`]+)`", names)}
-
-
 def test_every_picture_is_shown_and_has_a_row_of_the_table() -> None:
     targets = [(page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))]
     shown = {(page.parent / target).resolve() for page, target in targets}
-    assert sorted(_pictures()) == sorted(path.name for path in shown)
+    # The table in CONTRIBUTING.md has the command of each.
+    table = ROW.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
+    made = [name for names, _ in table for name in re.findall(r"`([^`]+)`", names)]
+    assert sorted(made) == sorted(path.name for path in shown)
     assert sorted(set((ROOT / "docs" / "pictures").iterdir()) - shown) == []

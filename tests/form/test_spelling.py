@@ -30,18 +30,14 @@ ALLOWED = {
 NAMED_AFTER_OTHERS = {"commands": "each module is the command of its name", "plots": "what a plot shows"}
 
 
-def british_words(text: str) -> list[str]:
-    """Return the British words of a text."""
-    return [match.group() for match in BRITISH.finditer(READ.sub("", text))]
-
-
 def test_no_word_is_spelled_the_british_way() -> None:
     files = [
         path
         for path in tracked("*.py", "*.md", "*.toml", "*.txt")
         if ROOT / "tests" / "samples" not in path.parents and path.name not in UNREAD
     ]
-    found = {str(path.relative_to(ROOT)): british_words(path.read_text(encoding="utf-8")) for path in files}
+    texts = {str(path.relative_to(ROOT)): READ.sub("", path.read_text(encoding="utf-8")) for path in files}
+    found = {name: [match.group() for match in BRITISH.finditer(text)] for name, text in texts.items()}
     assert {name: words for name, words in found.items() if words} == {}
 
 

@@ -184,14 +184,6 @@ def dragged(**found: Dragged) -> dict[tuple[str, str, str], Dragged]:
     return dict(zip(known, found.values(), strict=True))
 
 
-def two_methods() -> dict[str, Session]:
-    """Return sessions of which only the scenes count."""
-    return {
-        method: Session(resolve({"control": {"method": method}}), {}, {}, {}, [], 0.0, {})
-        for method in scenes.METHODS
-    }
-
-
 def limits(third: float, lift: float | None = 20e-3) -> Results:
     """Return results of both methods with the speed of the second in a valley, and at a lift, m/s."""
     found, (one, two) = results(), scenes.METHODS
@@ -239,7 +231,9 @@ def test_a_claim_has_the_verdict_of_its_evidence(claim: Any, found: Any, verdict
 
 def escaped(point: Swing) -> Results:
     """Return results of a sweep of Method II's gain with two points."""
-    return Results(cell_swings=[swing(15.0, 0.001, None), point], printed=two_methods())
+    known = {method: resolve({"control": {"method": method}}) for method in scenes.METHODS}
+    printed = {method: Session(scene, {}, {}, {}, [], 0.0, {}) for method, scene in known.items()}
+    return Results(cell_swings=[swing(15.0, 0.001, None), point], printed=printed)
 
 
 @pytest.mark.parametrize(

@@ -98,12 +98,6 @@ DISTANCE = np.array([0.0, 3.0, 3.0, 3.0, 3.0, 4.24, 4.24, 4.24, 4.24]) * 1e-3
 UNDER = 40e-3 + DISTANCE**2 / 16e-3
 
 
-def reach(low: float, high: float) -> Reach:
-    """Return the range of cells of one part from one height to another, m, on a bed at 40 mm."""
-    ends = np.array([np.full(9, low), np.full(9, high)])
-    return Reach(40e-3, True, np.ones(9), np.full(9, np.inf), ends)
-
-
 @pytest.mark.parametrize(
     ("wanted", "guess", "low", "high", "force", "top"),
     [
@@ -116,7 +110,11 @@ def reach(low: float, high: float) -> Reach:
     ],
 )
 def test_the_forces_at_the_top_add_up_to_what_is_wanted(wanted, guess, low, high, force, top):
-    height, total = find_top(wanted, guess, reach(low, high), UNDER, np.zeros(9), PULP)
+    ends = np.array([np.full(9, low), np.full(9, high)])
+    reach = Reach(
+        40e-3, True, np.ones(9), np.full(9, np.inf), ends
+    )  # of cells of one part, on a bed at 40 mm
+    height, total = find_top(wanted, guess, reach, UNDER, np.zeros(9), PULP)
     assert top is None or height == top
     assert force is None or PULP.predict_force(height - UNDER, np.zeros(9)).sum() == force
     assert force is None or total == pytest.approx(wanted)

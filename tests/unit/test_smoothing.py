@@ -11,7 +11,6 @@ from digiclay.core.control.drive import DriveParameters
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.smoothing import find_fault, order_periods
 from digiclay.core.control.virtual_master import Master, Phase
-from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.model.control_interface import Controller, Measurement
 from digiclay.core.model.physics import find_speeds
@@ -19,11 +18,9 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
-from numpy.typing import NDArray
 
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
 
-Floats = NDArray[np.float64]
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 BAND = DriveParameters().dead_band
 RADIUS = 10e-3
@@ -50,19 +47,6 @@ def order(system: System, x: float, y: float, radius: float) -> Controller:
     return control
 
 
-def measure(system: System, cells: NDArray[np.intp]) -> Measurement:
-    """Return the measurement of some cells at rest."""
-    height, none = np.full(cells.size, 40e-3), np.zeros(cells.size)
-    basis, own = system.grid.compute_basis(cells), np.empty((0, cells.size))
-    return Measurement(basis, height, none, height, np.zeros(cells.size, np.int8), own, cells)
-
-
-def smooth(system: System, state: State, orders: Floats) -> list[Floats]:
-    """Return the heights after each period of orders, (t, n), m; `state` is used up."""
-    states = simulate_path(system, state, stay_away(len(orders)), orders)
-    return [state.row(0) for state in states]
-
-
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_each_stroke_makes_a_spike_and_a_ridge_less_rough_and_keeps_the_volume(arrangement: str) -> None:
     system = bed(arrangement)
@@ -85,7 +69,8 @@ def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period: flo
     relief = make_spike_and_ridge(system.grid)
     state = heighten(system, relief)
     first, spike = state.row(0), int(relief.argmax())
-    heights = np.array(smooth(system, state, make_orders(150, 0.0, 0.0, 0.0, RADIUS, 100)))
+    orders = make_orders(150, 0.0, 0.0, 0.0, RADIUS, 100)
+    heights = np.array([one.row(0) for one in simulate_path(system, state, stay_away(len(orders)), orders)])
     assert np.diff(heights[:, spike]).max() <= swing
     # No pin leaves the range of the others; all stand still before the wait is over.
     assert heights.min() >= first.min() - BAND
@@ -131,7 +116,9 @@ def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
 )
 def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(place, radius, held):
     system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
-    touched = measure(system, np.empty(0, np.intp))
+    cells, none = np.empty(0, np.intp), np.empty(0)
+    basis, own = system.grid.compute_basis(cells), np.empty((0, 0))
+    touched = Measurement(basis, none, none, none, np.empty(0, np.int8), own, cells)
     smoothed = order(bed(method="absent"), *place, radius)
     discs = [system.controller.locate(memory, touched)[1], smoothed.locate(None, touched)[1]]
     x, y, whole = order(system, *place, radius).locate(memory, touched)[1]

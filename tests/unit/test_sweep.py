@@ -9,7 +9,6 @@ import os
 import re
 import signal
 import subprocess
-import threading
 import time
 from concurrent.futures import BrokenExecutor, Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -207,16 +206,11 @@ AXES = [
 SHORT = [Setting("simulation.duration", "0.1")]
 
 
-def make_points_of(axes: list[str]) -> list[Point]:
-    """Return the points of a sweep of a sample."""
-    return make_points(find("slow_press"), SHORT, [read_axis(axis) for axis in axes])
-
-
 def test_a_point_is_the_scene_with_its_values_in_the_same_batch_whatever_is_known_of_others() -> None:
     keys = [axis.partition("=")[0] for axis in AXES]
     rows = itertools.product(*(axis.partition("=")[2].split(",") for axis in AXES))
-    known = Findings()
-    for point, words in zip(make_points_of(AXES), rows, strict=True):
+    known, points = Findings(), make_points(find("slow_press"), SHORT, [read_axis(axis) for axis in AXES])
+    for point, words in zip(points, rows, strict=True):
         varied = [Setting(key, word) for key, word in zip(keys, words, strict=True)]
         scene = load(find("slow_press"), [*SHORT, *varied])
         assert point.scene == scene
@@ -276,27 +270,6 @@ def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_wor
         }  # fmt: skip
         with pytest.raises(OutputError, match=r"gone What is done is kept"):
             finished(threads, task, some(5)[4:])
-
-
-def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
-    begun: list[Point] = []
-    asked = threading.Semaphore(0)
-
-    def task(bundle: list[Point]) -> list[Record | None]:
-        begun.extend(bundle)
-        # Asked once more after it was told to stop, it has given up what was not begun.
-        assert asked.acquire(timeout=TIMEOUT)
-        assert asked.acquire(timeout=TIMEOUT)
-        return [{"figures": {}}]
-
-    def stopped() -> bool:
-        if begun:
-            asked.release()
-        return bool(begun)
-
-    with ThreadPoolExecutor(1) as one:
-        done = finished(one, task, some(9), stopped=stopped)
-    assert (len(begun), len(done)) == (1, 1)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from digiclay.core.engine.simulation import begin, step
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.model.touch import MOST, trace_finger
+from digiclay.core.model.touch import trace_finger
 
 from tests.assemble import make_system, path, record
 
@@ -31,12 +31,6 @@ def test_undersides_of_several_periods_at_a_time_are_those_of_each_to_the_last_b
     # Other places in mid way have their own undersides.
     other = bed.compute_basis(np.arange(50))
     assert np.array_equal(whole.at(40).under(other), alone[40].at(40).under(other))
-
-
-def test_a_finger_over_a_large_bed_is_computed_for_few_periods_at_a_time() -> None:
-    many = np.zeros((6, MOST // 6))  # three instants a period: twice as many cells would be all of `MOST`
-    under = trace_finger(Fingertip(), dragged(8)).under(0, many)
-    assert under.base.size <= 2 * 2 * MOST  # R and the tangent of two periods
 
 
 def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is() -> None:

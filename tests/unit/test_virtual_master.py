@@ -105,14 +105,6 @@ def test_forces_set_the_phase(before, floor, presses, phase, losses):
 # Model
 
 
-def settled(memory: Master, force: float, count: int = 600) -> Master:
-    """Return the master after some periods of a steady force."""
-    method = control()
-    for _ in range(count):
-        memory, _ = method.locate(memory, touched((0, 0, force)))
-    return memory
-
-
 @pytest.mark.parametrize(
     ("before", "force", "count", "height"),
     [
@@ -126,9 +118,11 @@ def settled(memory: Master, force: float, count: int = 600) -> Master:
     ],
 )
 def test_a_steady_force_takes_the_master_to_a_height(before, force, count, height):
-    after = settled(before, force, count).height
-    assert after == height
-    assert (after == before.height) == (force == 0.4)
+    method, memory = control(), before
+    for _ in range(count):
+        memory, _ = method.locate(memory, touched((0, 0, force)))
+    assert memory.height == height
+    assert (memory.height == before.height) == (force == 0.4)
 
 
 # Direction and loss
