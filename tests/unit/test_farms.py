@@ -124,7 +124,7 @@ def test_a_film_is_planned_with_the_frames_its_run_will_have(every: int) -> None
     submit("openjd", f'scenes = ["tap"]\nerrors = false\n[settings]\n{setting}\n[film]\nrate = 100\n')
     (job,) = (series := read_jobs(Path("two.toml"))).jobs
     frames = series.outputs.film.count(run(job.scene).history["time"])
-    assert [task.frames.count for task in plan_series(series, 5) if task.frames] == [frames]
+    assert [task.frames.stop for task in plan_series(series, 5) if task.frames] == [frames]
 
 
 STUB = """

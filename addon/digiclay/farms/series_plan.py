@@ -25,19 +25,6 @@ FRAME_OPTION = "--frames"
 
 
 @dataclass(frozen=True)
-class Frames:
-    """Frames of a film, in parts of so many."""
-
-    count: int
-    chunk: int
-
-    def list_ranges(self) -> list[str]:
-        """Return the parts as the option takes them, ``0-49``."""
-        starts = range(0, self.count, self.chunk)
-        return [f"{first}-{min(first + self.chunk, self.count) - 1}" for first in starts]
-
-
-@dataclass(frozen=True)
 class Task:
     """A command of digiclay in the folder of a series."""
 
@@ -54,8 +41,8 @@ class Task:
     needs: tuple[str, ...] = ()
     #: Whether it draws.
     blender: bool = False
-    #: A task for each range of them; None: one task.
-    frames: Frames | None = None
+    #: First frames of the parts of a film, a task each, up to the number of its frames; none: one task.
+    frames: range = range(0)
 
     def list_arguments(self, series: str) -> list[str]:
         """Return the arguments of digiclay for a series in a folder."""
@@ -91,7 +78,7 @@ def _plan_job(job: Job, outputs: Outputs, chunk: int) -> list[Task]:
             raise OutputError(f"{job.name}: {error}") from None
         only, frames = (*own, "--only", kind), f"{job.name}: frames of {kind}"
         tasks += [
-            Task(frames, "frames", "job", folder, only, (first,), True, Frames(count, chunk)),
+            Task(frames, "frames", "job", folder, only, (first,), True, range(0, count, chunk)),
             Task(f"{job.name}: {kind}", "films", "job", folder, only, (frames,), True),
         ]
     return tasks
@@ -101,13 +88,12 @@ def split_frames(tasks: Sequence[Task]) -> list[Task]:
     """Return tasks of which each draws one range of frames at most, for farms without ranges of their own."""
     parts: dict[str, list[Task]] = {}
     for task in tasks:
-        whole = replace(
-            task, needs=tuple(part.name for need in task.needs for part in parts[need]), frames=None
-        )
-        parts[task.name] = [
-            replace(whole, name=f"{task.name} {text}", options=(*task.options, FRAME_OPTION, text))
-            for text in task.frames.list_ranges()
-        ] if task.frames else [whole]  # fmt: skip
+        needs = tuple(part.name for need in task.needs for part in parts[need])
+        parts[task.name] = [] if task.frames else [replace(task, needs=needs)]
+        for first in task.frames:
+            text = f"{first}-{min(first + task.frames.step, task.frames.stop) - 1}"
+            name, options = f"{task.name} {text}", (*task.options, FRAME_OPTION, text)
+            parts[task.name].append(replace(task, name=name, options=options, needs=needs, frames=range(0)))
     return [part for group in parts.values() for part in group]
 
 
@@ -187,11 +173,11 @@ def _make_step(task: Task, steps: dict[str, str], program: str, leading: Sequenc
     if task.needs:
         step["dependencies"] = [{"dependsOn": steps[need]} for need in task.needs]
     if task.frames:
-        span = f"0-{task.frames.count - 1}:{task.frames.chunk}"
+        span = f"0-{task.frames.stop - 1}:{task.frames.step}"
         step["parameterSpace"] = {
             "taskParameterDefinitions": [{"name": "Frame", "type": "INT", "range": span}]
         }
-        arguments += [FRAME_OPTION, f"{{{{Task.Param.Frame}}}}+{task.frames.chunk}"]
+        arguments += [FRAME_OPTION, f"{{{{Task.Param.Frame}}}}+{task.frames.step}"]
     stop = {"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": GRACE}
     run = {"command": f"{{{{Param.{program}}}}}", "args": arguments, "cancelation": stop}
     return {**step, "script": {"actions": {"onRun": run}}}

@@ -248,7 +248,7 @@ def claim_folder(
     check_folder(out, overwrite=overwrite, content=content)
     target = out.resolve()
     with ExitStack() as until_the_end:
-        until_the_end.enter_context(_remove_if_empty(target))
+        until_the_end.enter_context(remove_if_empty(target))
         try:
             until_the_end.enter_context(lock_name(out, patience))
         except OSError as error:
@@ -259,7 +259,7 @@ def claim_folder(
 
 
 @contextmanager
-def _remove_if_empty(target: Path) -> Iterator[None]:
+def remove_if_empty(target: Path) -> Iterator[None]:
     """Take away in the end those folders above a path that were not there, unless there is something in."""
     made = [folder for folder in target.parents if not folder.exists()]
     try:
@@ -279,7 +279,7 @@ def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
                 if folder.exists() and os.access(folder.resolve().parent, os.W_OK):
                     with lock_name(folder, patience):
                         pass
-                until_the_end.enter_context(_remove_if_empty(folder.resolve() / "file"))
+                until_the_end.enter_context(remove_if_empty(folder.resolve() / "file"))
             for file in files:
                 until_the_end.enter_context(lock_name(file))
                 remove_abandoned(file.parent, file.name)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,6 +22,7 @@ from ..files.run_folder import (
     lock_name,
     read_json,
     remove_abandoned,
+    remove_if_empty,
     resolve_inside,
     write_whole,
 )
@@ -77,22 +78,14 @@ def _make_folder(path: Path, kind: Kind, while_it_is_made: ExitStack, until_the_
     """Make the folder, if there is none, and lock it."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"{path} is a file: choose another folder with --out.")
-    above = [folder for folder in (path, *path.resolve().parents) if not folder.exists()]
     if not path.exists() or os.access(path.resolve().parent, os.W_OK):
         # A run of this name cannot end in between, nor one begin.
         while_it_is_made.enter_context(lock_name(path))
-    for folder in reversed(above):  # the innermost goes first
-        until_the_end.callback(_remove_empty, folder)
+    until_the_end.enter_context(remove_if_empty(path.resolve() / kind.mark))
     path.mkdir(parents=True, exist_ok=True)
     if not (path / kind.mark).is_file() and not _is_bare(path, kind):
         raise OutputError(f"{path} holds other things than a {kind.name}: choose another folder with --out.")
     until_the_end.enter_context(hold_lock(path / LOCK, describe_claim(path, "being worked in")))
-
-
-def _remove_empty(folder: Path) -> None:
-    """Take away a folder that nothing was written into."""
-    with suppress(OSError):
-        folder.rmdir()
 
 
 def _is_bare(path: Path, kind: Kind) -> bool:
