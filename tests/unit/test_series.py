@@ -1,8 +1,10 @@
-"""The folder of a sweep or a batch when the disk is full, or holds what was left half-made."""
+"""Folders of series: safe names of jobs, inside the folder; a full disk, and what was left half-made."""
 
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,15 +12,172 @@ from typing import Any
 
 import pytest
 from digiclay.cli import main
+from digiclay.commands.batch_folder import open_batch
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.file_lock import find_host
-from digiclay.core.files.run_folder import read_json
+from digiclay.core.files.run_folder import (
+    LONGEST,
+    find_name,
+    fold_name,
+    make_safe_name,
+    make_unique_names,
+    read_json,
+)
+from digiclay.core.session.finished_run import is_whole
+from digiclay.core.studies.job_table import read_jobs
 from digiclay.core.studies.series import Kind, open_series
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from tests.other_process import dead
 from tests.scene_files import SCENE, folder_with, left
 
-resource = pytest.importorskip("resource", reason="Windows cannot limit how much is written")
+#: As a JOBS file's first lines.
+QUICK = 'errors = false\nexport = ["stl"]\n'
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder within an empty one; in both is the same scene."""
+    work = tmp_path / "work"
+    work.mkdir()
+    (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
+    (work / "jobs.toml").write_text('scenes = ["my.toml"]', encoding="utf-8")
+    return folder_with(SCENE, work, monkeypatch)
+
+
+@given(st.text())
+@example("..")
+@example(" . ")
+@example("-x")
+@example("con.toml")
+@example("LPT²")
+@example("ü" * 200)
+@example("\ud800")
+def test_any_text_makes_a_name_that_every_file_system_takes(text: str) -> None:
+    name = make_safe_name(text)
+    assert 0 < len(name.encode()) <= LONGEST + 1  # a device's name gets one letter more
+    assert not set(name) & set('/\\:*?"<>|\0 ')
+    assert name[0] not in ".-"
+    assert name[-1] != "."
+    assert name.partition(".")[0].lower() not in ("con", "nul", "lpt²")
+    assert make_safe_name(name) == name
+
+
+@given(
+    st.lists(st.sampled_from(["a", "A", "a-2", "a-2-2", "ä", "a\u0308", "a b", "a_b", ".", "a.", "x" * 300]))
+)
+@example(["x" * 300 + end for end in ("a", "b", "b")])
+def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts: list[str]) -> None:
+    names = make_unique_names(texts)
+    assert len({fold_name(name) for name in names}) == len(texts)
+    assert max([0, *map(len, names)]) <= LONGEST
+    safe = [make_safe_name(text) for text in texts]
+    for place, name in enumerate(names):
+        first = [fold_name(one) for one in safe].index(fold_name(safe[place]))
+        assert (name == safe[place]) == (first == place)
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("../scene.toml", "above"),
+        ("scene.toml", "here"),
+        ("./scene.toml", "here"),
+        ("sub/../scene.toml", "here"),
+        ("a b.toml", "a b"),
+        ("/scene.toml", "scene"),
+        ("...toml", "scene"),
+    ],
+)
+def test_a_scene_has_the_name_of_its_file_or_of_its_real_folder(path, name, tmp_path, monkeypatch):
+    folder = tmp_path / "above" / "here"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    assert find_name(Path(path)) == name
+
+
+def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsys):
+    for name in ("scene.toml", "MY.toml"):
+        Path(name).write_text(SCENE, encoding="utf-8")
+    absolute = str(here.parent / "scene.toml")
+    jobs = jobs_file(f'scenes = ["../scene.toml", "scene.toml", "MY.toml", "my.toml", {absolute!r}]\n{QUICK}')
+    assert main(["batch", str(jobs), "--out", "o", "--quiet"]) == 2
+    assert "scenes must not name one thing twice" in capsys.readouterr().err
+    before = set(here.parent.rglob("*"))
+    jobs = jobs_file(f'scenes = ["..", "scene.toml", "MY.toml", "my.toml"]\n{QUICK}')
+    assert main(["batch", str(jobs), "--out", "o", "--jobs", "2"]) == 0
+    assert "4 of 4 jobs done" in capsys.readouterr().out
+    names = sorted(path.name for path in Path("o/runs").iterdir())
+    assert names == sorted([make_safe_name(here.parent.name), "work", "MY", "my-2"])
+    for name in names:
+        assert (Path("o/runs", name, "surface.stl")).stat().st_size > 84
+    new = {path.relative_to(here) for path in here.parent.rglob("*") if path not in before}
+    assert {path.parts[0] for path in new} == {"o"}
+
+
+def jobs_file(said: str) -> Path:
+    """Write the JOBS file."""
+    path = Path("jobs.toml")
+    path.write_text(said.replace("'", '"'), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("folder", ["jobs", "runs", "logs", "runs/my"])
+def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(folder: str, here: Path, refused: Any) -> None:
+    (here / "away").mkdir()
+    assert main(["batch", str(jobs_file('scenes = ["my.toml"]')), "--out", "o", "--prepare", "--quiet"]) == 0
+    link = here / "o" / folder
+    shutil.rmtree(link, ignore_errors=True)
+    link.symlink_to(here / "away")
+    refused(["batch", "jobs.toml", "--out", "o", "--quiet"], f"{Path('o', folder)} leads out of o, to ")
+    assert list((here / "away").iterdir()) == []
+
+
+def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(here, refused):
+    sweep = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
+    (here / "away").mkdir()
+    (here / "o").symlink_to(here / "away")
+    assert main(sweep) == 0
+    assert len(list((here / "away" / "points").iterdir())) == 2
+    shutil.rmtree(here / "away" / "points")
+    (here / "else").mkdir()
+    (here / "away" / "points").symlink_to(here / "else")
+    refused(sweep, "points leads out of o")
+    assert list((here / "else").iterdir()) == []
+
+
+def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done() -> None:
+    made = read_jobs(jobs_file(f'scenes = ["my.toml"]\n{QUICK}'))
+    (job,) = made.jobs
+    assert main(["batch", "jobs.toml", "--out", "o", "--prepare", "--quiet"]) == 0
+    assert main(["job", "o/jobs/my", "--quiet"]) == 0
+    with open_batch(Path("o"), made) as folder:
+        for harm in ("surface.stl", "history.npz", "metrics.json", "thumbnail.png", "timing.json"):
+            assert folder.is_done(job)
+            path = Path("o/runs/my", harm)
+            content = path.read_bytes()
+            for left in (content[: len(content) // 2], None):
+                path.write_bytes(left) if left else path.unlink()
+                whole_without_sizes = harm not in ("history.npz", "metrics.json")
+                assert not folder.is_done(job), harm
+                assert is_whole(folder.find_run(job), job.scene) == whole_without_sizes
+            path.write_bytes(content)
+        shutil.rmtree("o/jobs/my")
+        Path("o/jobs/my").write_text("a file", encoding="utf-8")
+        with pytest.raises(OutputError, match="cannot be made"):
+            folder.describe(job)
+
+
+@pytest.mark.parametrize("word", [".", "../work", "scene.toml"])
+def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word: str) -> None:
+    shutil.copy("my.toml", "scene.toml")
+    assert main(["run", word, "--quiet", "--no-errors"]) == 0
+    assert Path("work/metrics.json").is_file()
+    assert not os.path.lexists("metrics.json")
+
+
+# A disk that is full, and what was left half-made
 
 SWEEP = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
 BATCH = ["batch", "jobs.toml", "--prepare", "--out", "o", "--quiet"]
@@ -26,16 +185,10 @@ COMMANDS = {"sweep": SWEEP, "batch": BATCH}
 KIND = Kind("series", "series.json", ("parts",))
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder with one scene, my.toml, and a JOBS file beside it."""
-    (tmp_path / "jobs.toml").write_text('scenes = ["my.toml"]', encoding="utf-8")
-    return folder_with(SCENE, tmp_path, monkeypatch)
-
-
 @contextmanager
 def room_for(size: int) -> Iterator[None]:
     """Let files be written up to so many bytes only: the system refuses more, as it does on a full disk."""
+    resource = pytest.importorskip("resource", reason="Windows cannot limit how much is written")
     former = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, former[1]))
     try:
