@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Awaitable, Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from digiclay.core.base.errors import DigiclayError
 
@@ -21,13 +20,6 @@ class HeldError(DigiclayError):
 
     def __init__(self) -> None:
         super().__init__(f"Another client moves the fingertip: wait until it is silent for {LEASE:g} s.")
-
-
-class Door(NamedTuple):
-    """Open door: its port, and a function that closes it."""
-
-    port: int
-    close: Callable[[], Awaitable[None]]
 
 
 class DoorLink:

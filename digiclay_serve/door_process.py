@@ -11,14 +11,13 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Awaitable
-from contextlib import suppress
+from contextlib import AsyncExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 from digiclay.core.base.errors import DigiclayError, OutputError
 
-from .door_link import Door, DoorLink
+from .door_link import DoorLink
 from .doors import open_slot
 from .osc_door import open_osc
 from .protocol import Bed
@@ -80,23 +79,19 @@ async def _serve(settings: dict[str, Any]) -> None:
     host = settings["host"]
     ended = asyncio.Event()
     asyncio.get_running_loop().add_reader(0, _take_wake, link, ended)
-    opened = {
-        key: await _open(door(link, host, settings[key]), host, settings[key]) for key, door in DOORS.items()
-    }
-    _tell({key: door.port for key, door in opened.items()})
-    await ended.wait()
-    _tell({"counts": dict(link.counts)})  # before clients that take their time to close
-    with suppress(asyncio.TimeoutError):
-        await asyncio.wait_for(asyncio.gather(*(door.close() for door in opened.values())), 3.0)
-
-
-async def _open(opening: Awaitable[Door], host: str, port: int) -> Door:
-    """Return an opened door. Raises OutputError when the address cannot be used."""
-    try:
-        return await opening
-    except (OSError, OverflowError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise OutputError(f"Port {port} of {host} cannot be opened: {reason}.") from None
+    async with AsyncExitStack() as doors:
+        ports = {}
+        for key, door in DOORS.items():
+            try:
+                ports[key] = await doors.enter_async_context(door(link, host, settings[key]))
+            except (OSError, OverflowError) as error:
+                reason = getattr(error, "strerror", None) or error
+                raise OutputError(f"Port {settings[key]} of {host} cannot be opened: {reason}.") from None
+        _tell(ports)
+        await ended.wait()
+        _tell({"counts": dict(link.counts)})  # before clients that take their time to close
+        with suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(doors.aclose(), 3.0)
 
 
 def _take_wake(link: DoorLink, ended: asyncio.Event) -> None:

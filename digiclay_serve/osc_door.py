@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +14,7 @@ from digiclay.core.base.errors import DigiclayError, ParameterError
 from pythonosc import osc_bundle, osc_message
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from .door_link import Door, DoorLink
+from .door_link import DoorLink
 from .protocol import Frame, Pose, Reset, check_number, check_pose, is_token
 
 #: What can be subscribed to: the pose and the total force, or every pin's height and force besides.
@@ -171,14 +173,14 @@ class _OscDoor(asyncio.DatagramProtocol):
                     self._link.counts["frames sent"] += 1
 
 
-async def open_osc(link: DoorLink, host: str, port: int) -> Door:
-    """Open the door at a port, 0: chosen by the system; OSError when the address cannot be used."""
+@asynccontextmanager
+async def open_osc(link: DoorLink, host: str, port: int) -> AsyncIterator[int]:
+    """Open the door at a port, 0: chosen by the system, and give the port; OSError if it cannot be used."""
     loop = asyncio.get_running_loop()
     transport, door = await loop.create_datagram_endpoint(lambda: _OscDoor(link), local_addr=(host, port))
     sending = asyncio.ensure_future(door.send_frames())
-
-    async def close() -> None:
+    try:
+        yield transport.get_extra_info("sockname")[1]
+    finally:
         sending.cancel()
         transport.close()
-
-    return Door(transport.get_extra_info("sockname")[1], close)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import http
 import math
-from contextlib import suppress
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlsplit
@@ -15,7 +16,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from .door_link import Door, DoorLink, HeldError
+from .door_link import DoorLink, HeldError
 from .protocol import LARGEST_REQUEST, format_frame, format_message, is_token, read_binary, read_json
 
 #: Most clients, and most connections that have not said yet who they are: beyond it the oldest is cut.
@@ -66,21 +67,17 @@ def read_wishes(path: str) -> Wishes:
     return Wishes(given.get("format") == "binary", rate, given.get("token", ""))
 
 
-async def open_websocket(link: DoorLink, host: str, port: int) -> Door:
-    """Open the door at a port, 0: chosen by the system; OSError when the address cannot be used."""
+@asynccontextmanager
+async def open_websocket(link: DoorLink, host: str, port: int) -> AsyncIterator[int]:
+    """Open the door at a port, 0: chosen by the system, and give the port; OSError if it cannot be used."""
     door = _WebSocketDoor(link)
-    server = await serve(
+    async with serve(
         door.handle, host, port, process_request=door.admit, create_connection=door.connect,
         compression=None,
         max_size=LARGEST_REQUEST, max_queue=16, write_limit=UNSENT, open_timeout=OPENING,
         ping_interval=PING, ping_timeout=PING, close_timeout=2.0, server_header=None, backlog=1024,
-    )  # fmt: skip
-
-    async def close() -> None:
-        server.close()
-        await server.wait_closed()
-
-    return Door(server.sockets[0].getsockname()[1], close)
+    ) as server:  # fmt: skip
+        yield server.sockets[0].getsockname()[1]
 
 
 class _Connection(ServerConnection):

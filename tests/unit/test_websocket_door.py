@@ -38,16 +38,12 @@ def make_link() -> DoorLink:
 
 async def connect(link: DoorLink, sent: bytes = b"") -> bytes:
     """Send bytes, answer nothing; return what comes until the door closes and another client has pressed."""
-    door = await open_websocket(link, "127.0.0.1", 0)
-    reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
-    writer.write(sent)
-    try:
-        async with asyncio.timeout(TIMEOUT):
-            said = await reader.read()
-            await press_elsewhere(link)
-    finally:
+    async with asyncio.timeout(TIMEOUT), open_websocket(link, "127.0.0.1", 0) as port:
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(sent)
+        said = await reader.read()
+        await press_elsewhere(link)
         writer.close()
-        await door.close()
     return said
 
 
