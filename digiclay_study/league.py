@@ -78,6 +78,12 @@ def find_interval(values: Sequence[float | None]) -> Interval | None:
     return Interval(fmean(finite), width * stdev(finite), len(finite))
 
 
+def list_values(table: Table, method: str, trajectory: str, measure: str) -> list[float]:
+    """Return a measure of a method on a trajectory, a value a seed that has one."""
+    trials = (figures for (own, name, _), figures in table.items() if (own, name) == (method, trajectory))
+    return [value for figures in trials if (value := figures.get(measure)) is not None]
+
+
 def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
     """Return a row a method, the smallest mean RFD first; all are compared with the first method."""
     seeds = sorted({seed for _, _, seed in table})

@@ -14,7 +14,7 @@ from digiclay.plots.sweep import read_unit
 from numpy.typing import NDArray
 
 from .indices import CONFIDENCE, Indices
-from .league import MEASURES, find_interval
+from .league import MEASURES, find_interval, list_values
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,11 +183,7 @@ def _mark_method(axes: Any, table: Table, method: str, number: int, names: Seque
     shift = 0.18 * (number % 3 - 1)
     label: str | None = method
     for line, name in enumerate(names):
-        values = [
-            1e3 * float(found["rfd"] or 0.0)
-            for (own, trajectory, _), found in table.items()
-            if (own, trajectory) == (method, name) and found.get("rfd")
-        ]
+        values = [1e3 * rfd for rfd in list_values(table, method, name, "rfd") if rfd]
         if mean := find_interval(values):
             row = -line - shift
             axes.plot(np.array(values), np.full(len(values), row), ls="", markersize=3, alpha=0.6, **style)

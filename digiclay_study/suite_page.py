@@ -18,7 +18,7 @@ from digiclay.commands.progress import table as aligned
 from digiclay.core.studies.axes import Point, Record
 from digiclay.core.studies.sweep_plan import format_csv
 
-from .league import KIND, MEASURES, Interval, Row, Table, find_interval
+from .league import KIND, MEASURES, Interval, Row, Table, find_interval, list_values
 from .method_trials import LIMITS, LOW, OUTCOMES
 
 
@@ -132,7 +132,7 @@ def format_trajectories(source: Provenance, table: Table) -> str:
     for name in _list_trajectories(table):
         for method in source.plan.methods:
             for measure, metric in OUTCOMES.items():
-                found = _find_interval(table, method, name, measure)
+                found = find_interval(list_values(table, method, name, measure))
                 if found is not None:
                     rows.append([name, method, measure, metric.unit, found.mean, found.half, found.number])
     return _format_csv(source, head, rows)
@@ -183,7 +183,7 @@ def format_page(
     for name in SHOWN:
         body, factor = [], MEASURES[name].factor
         for trajectory in _list_trajectories(table):
-            found = [_find_interval(table, method, trajectory, name) for method in methods]
+            found = [find_interval(list_values(table, method, trajectory, name)) for method in methods]
             if any(found):
                 body.append([trajectory, *(_format(interval, factor) for interval in found)])
         lines.append(f"<h2>{escape(titles[name])} by trajectory</h2>")
@@ -216,12 +216,6 @@ def _format(found: Interval | None, factor: float) -> str:
 
 def _list_trajectories(table: Table) -> list[str]:
     return list(dict.fromkeys(name for _, name, _ in table))
-
-
-def _find_interval(table: Table, method: str, trajectory: str, measure: str) -> Interval | None:
-    """Return a measure of a method on a trajectory over the seeds."""
-    trials = (found for (own, name, _), found in table.items() if (own, name) == (method, trajectory))
-    return find_interval([found.get(measure) for found in trials])
 
 
 def _format_csv(source: Provenance, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

@@ -22,7 +22,7 @@ NAMES = ("thumbnail.jpg", "thumbnail.png")
 WIDTH = 320
 
 
-def of_picture(still: Path, folder: Path) -> Path:
+def of_picture(still: Path, folder: Path) -> None:
     """Make one of a picture that Blender has drawn. `folder`: of the thumbnail."""
     from ..compat import bpy, scratch
 
@@ -36,14 +36,11 @@ def of_picture(still: Path, folder: Path) -> Path:
             image.save(filepath=str(out), quality=85)
         except RuntimeError as error:
             raise OutputError(f"{out} cannot be written: {' '.join(str(error).split())}") from None
-    return out
 
 
-def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Path) -> Path:
+def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Path) -> None:
     """Make one of heights (n,), seen from above."""
-    out = folder / NAMES[1]
-    write_whole(out, encode_png(height_map(height.reshape(rows, columns))))
-    return out
+    write_whole(folder / NAMES[1], encode_png(height_map(height.reshape(rows, columns))))
 
 
 def height_map(height: NDArray[np.float64], wide: int = WIDTH) -> NDArray[np.uint8]:

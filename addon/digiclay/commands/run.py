@@ -10,6 +10,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -154,9 +155,13 @@ def _plan_extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
     scene, history = result.scene, result.history
     if not history:
         return []
-    wanted = [plan_meshes(scene, history, arguments.export)] if arguments.export else []
-    wanted += [plan_plots(scene, history)] if arguments.plots else []
-    return wanted + ([plan_picture(scene, history)] if arguments.render else [])
+    extras = [plan_meshes(scene, history, arguments.export)] if arguments.export else []
+    if arguments.plots:
+        extras.append(Extra(PLOTS, partial(plotted, scene, history), lambda run: ["plot", str(run)]))
+    if arguments.render:
+        draw = partial(draw_still, scene, history, STILL)
+        extras.append(Extra([PICTURE], lambda out: draw(out / PICTURE), lambda run: ["render", str(run)]))
+    return extras
 
 
 @dataclass(frozen=True)
@@ -186,20 +191,6 @@ def plan_meshes(
         return ["export", str(run), "--format", ",".join(kinds), *instant, *place]
 
     return Extra([f"{within}/{name}" if within else name for name in file_names(kinds)], make, later)
-
-
-def plan_plots(scene: Scene, history: History) -> Extra:
-    """Return the plots of a session."""
-    return Extra(PLOTS, lambda folder: plotted(scene, history, folder), lambda run: ["plot", str(run)])
-
-
-def plan_picture(scene: Scene, history: History) -> Extra:
-    """Return the picture of the last touch."""
-    return Extra(
-        [PICTURE],
-        lambda folder: draw_still(scene, history, STILL, folder / PICTURE),
-        lambda run: ["render", str(run)],
-    )
 
 
 def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop) -> Result:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError
+from ..core.files.run_folder import format_json
 from ..core.studies.job_table import MOVING, Job, JobSeries, Outputs
 from ..plugins.method_loader import find_word
 
@@ -145,15 +146,10 @@ def write_openjd(made: Submission) -> Written:
         "steps": [_make_step(task, steps, program, leading) for task in made.tasks],
     }  # fmt: skip
     name = "openjd.json"
-    return {name: _format(template)}, [
+    return {name: format_json(template).decode()}, [
         f"check: {made.show('openjd', 'check', made.find(name))}",
         f"run on this machine: {made.show('openjd', 'run', made.find(name), '-p', f'{program}={path}')}",
     ]
-
-
-def _format(table: dict[str, Any]) -> str:
-    """Return a table as JSON."""
-    return json.dumps(table, indent=1, ensure_ascii=False) + "\n"
 
 
 def _name_steps(tasks: Sequence[Task]) -> dict[str, str]:
@@ -215,7 +211,7 @@ def write_flamenco(made: Submission) -> Written:
     }
     script, job = f"flamenco/{SCRIPT.name}", "flamenco/job.json"
     post = ("curl", "--header", "Content-Type: application/json", "--data-binary", f"@{made.find(job)}")
-    return {script: SCRIPT.read_text(encoding="utf-8"), job: _format(table)}, [
+    return {script: SCRIPT.read_text(encoding="utf-8"), job: format_json(table).decode()}, [
         f"once: put {made.find(script)} into the folder 'scripts' beside flamenco-manager, and restart it",
         f"submit: {made.show(*post, 'http://MANAGER:8080/api/v3/jobs')}",
     ]
