@@ -201,18 +201,20 @@ def is_skin_shown(bed: Any) -> bool:
 
 def housing_of(bed: Any) -> Any | None:
     """Return the object that has the shape of a bed's housing, in the bed's space; None without."""
-    modifier = find_modifier(bed)
-    case = modifier.node_group.nodes.get(CASE) if modifier else None
-    if case is not None:
-        return case.inputs["Object"].default_value
-    return next((child for child in bed.children if child.get(ROLE) == HOUSING), None)
+    case = _read_node(bed, CASE, "Object")
+    return case or next((child for child in bed.children if child.get(ROLE) == HOUSING), None)
 
 
 def sources_of(bed: Any) -> Any | None:
     """Return the collection of all a bed is drawn with; None in older files, or without its nodes."""
+    return _read_node(bed, SOURCES, "Collection")
+
+
+def _read_node(bed: Any, name: str, place: str) -> Any | None:
+    """Return what an input of one of a bed's geometry nodes is set to; None without."""
     modifier = find_modifier(bed)
-    drawn = modifier.node_group.nodes.get(SOURCES) if modifier else None
-    return None if drawn is None else drawn.inputs["Collection"].default_value
+    drawn = modifier.node_group.nodes.get(name) if modifier else None
+    return None if drawn is None else drawn.inputs[place].default_value
 
 
 def underside(bed: Any) -> float:

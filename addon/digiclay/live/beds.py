@@ -99,16 +99,14 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
     for name, data in ((STATE, running.snapshot), (POSE, running.pose.tobytes())):
         # Blender takes bytes that are assigned over others for a text: it stops at the first 0,
         # and corrupts its memory where the lengths differ.
-        if name in bed:
-            del bed[name]
+        bed.pop(name, None)
         bed[name] = data
 
 
 def clear(bed: Any) -> None:
     """Remove all session data: the bed is at rest."""
     for name in (STATE, POSE, TICK):
-        if name in bed:
-            del bed[name]
+        bed.pop(name, None)
 
 
 def read_snapshot(bed: Any) -> bytes | None:

@@ -10,6 +10,7 @@ import ipaddress
 import math
 import socket
 import struct
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -140,7 +141,8 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     if following is None:
         return None, ""
     if now - following.asked >= RENEW:
-        _send(following.door, pack_subscription(following.token, RATE))
+        with suppress(OSError):  # the port is closed now, or the network is busy: it is repeated soon
+            following.door.send(pack_subscription(following.token, RATE))
         following = replace(following, asked=now)
     (pose, closed), words = _receive(following.door), ""
     heard = now if following.heard is None else following.heard
@@ -155,14 +157,6 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
         following = replace(following, heard=heard)
     SERVERS.by_bed[uid] = following
     return following.pose, words
-
-
-def _send(door: socket.socket, data: bytes) -> None:
-    """Send a datagram; one that cannot be sent is repeated soon."""
-    try:
-        door.send(data)
-    except OSError:  # the port is closed now, or the network is busy
-        return
 
 
 def _receive(door: socket.socket) -> tuple[Floats | None, bool]:

@@ -147,8 +147,8 @@ def register() -> None:
     """Add the keys; handlers follow with the first session. Without a window there are no keymaps."""
     configuration = bpy.context.window_manager.keyconfigs.addon
     for (name, space), operator, key, modifiers in KEYS if configuration else ():
-        keymap = configuration.keymaps.new(name=name, space_type=space)
-        item = keymap.keymap_items.new(operator, key, "PRESS", head=True, **modifiers)
+        items = configuration.keymaps.new(name=name, space_type=space).keymap_items
+        item = items.new(operator, key, "PRESS", head=True, **modifiers)
         if operator == "digiclay.session_reset":
             item.properties.running_only = True
 

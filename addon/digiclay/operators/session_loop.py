@@ -69,7 +69,8 @@ class LoopMixin(Polled):
         if not running.list_sessions():
             handlers.end_all(handlers.STOPPED)
             return {"FINISHED"}
-        if now - self.since > EVERY and _autosaves(context) and not _other_operators(context):
+        autosaves = context.preferences.filepaths.use_auto_save_temporary_files
+        if now - self.since > EVERY and autosaves and not _other_operators(context):
             _resume_later(self.token, context.window)
             return {"FINISHED", "PASS_THROUGH"}
         return {"PASS_THROUGH"}
@@ -138,11 +139,6 @@ def _is_undo_key(context: Any, event: Any) -> bool:
         and all(bool(getattr(item, key)) == getattr(event, key) for key in ("ctrl", "shift", "alt", "oskey"))
         for item in (keymap.keymap_items if keymap else ())
     )
-
-
-def _autosaves(context: Any) -> bool:
-    """Return whether Blender saves by itself."""
-    return bool(context.preferences.filepaths.use_auto_save_temporary_files)
 
 
 def _other_operators(context: Any) -> frozenset[int]:

@@ -140,9 +140,10 @@ def check_class(label: str, kind: Any) -> None:
         refuse("the class must be decorated with @dataclass(frozen=True)")
     for field in dataclasses.fields(kind):
         _check_field(field, refuse)
-    if not callable(getattr(kind, "build", None)):
+    build, command = (getattr(kind, name, None) for name in ("build", "command"))
+    if not callable(build):
         refuse("the class must have a function build(self, device), or derive from OwnMethod")
-    if _owner(kind, "build") is OwnMethod and _owner(kind, "command") is OwnMethod:
+    if build is OwnMethod.build and command is OwnMethod.command:
         refuse("the class must have a function command(self, memory, cells, device)")
     _check_settings(kind, refuse)
     try:
@@ -156,11 +157,6 @@ def check_class(label: str, kind: Any) -> None:
         raise
     except BaseException as error:
         refuse(f"the class {describe_failure(error, '')}")
-
-
-def _owner(kind: type, name: str) -> type | None:
-    """Return the class that defines a function of a class."""
-    return next((one for one in kind.__mro__ if name in vars(one)), None)
 
 
 def _check_field(field: dataclasses.Field[Any], refuse: Refuse) -> None:
