@@ -16,12 +16,13 @@ from digiclay.device import detail, view
 from digiclay.device.detail import choose_far, measure_pitch
 from digiclay.device.instant import Instant
 from digiclay.device.node_tree import FAR
-from digiclay.device.skin_lattice import KINDS, choose_parts, interpolate, make_lattice
+from digiclay.device.skin_lattice import KINDS, choose_parts, make_lattice
 from digiclay.roles import ROLE, fingertip_of, is_bed
 from digiclay.settings import properties
 from mathutils import Matrix, Vector
 
 from tests.blender.at_hand import done, instances, new_bed, read_picture
+from tests.live_skin import interpolate
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -148,12 +148,17 @@ def test_a_display_that_draws_nothing_is_refused(bed: Any) -> None:
         view.color_by(bed, "force")
 
 
+def level_of(force: np.ndarray, top: float = heat.TOP) -> np.ndarray:
+    """Return the level of each force: 0 without force, 1 to 12 for the colors."""
+    return np.clip(np.ceil(force / top * len(heat.COLORS)), 0, len(heat.COLORS)).astype(int)
+
+
 def test_every_pin_wears_the_color_of_its_level_of_force(bed: Any, formed: Instant) -> None:
     view.color_by(bed, "force")
-    assert drawn_pins(bed)[1] == [f"force_{level:02d}" for level in heat.level(formed.force)]
-    assert len(set(heat.level(formed.force))) == 13
+    assert drawn_pins(bed)[1] == [f"force_{level:02d}" for level in level_of(formed.force)]
+    assert len(set(level_of(formed.force))) == 13
     view.write_setting(bed, TOP_FORCE, 2.0)
-    assert drawn_pins(bed)[1] == [f"force_{level:02d}" for level in heat.level(formed.force, 2.0)]
+    assert drawn_pins(bed)[1] == [f"force_{level:02d}" for level in level_of(formed.force, 2.0)]
     view.color_by(bed, "mode")
     assert drawn_pins(bed)[1] == [Mode(int(code)).name.lower() for code in formed.mode]
 

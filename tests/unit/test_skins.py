@@ -21,13 +21,14 @@ from digiclay.core.surface.formed import (
 from digiclay.core.surface.pins_solid import BRIDGE, make_parts, make_pins_solid
 from digiclay.core.surface.skins import SKINS, SurfaceGrid, fit_skin
 from digiclay.device.instant import Instant
-from digiclay.device.skin_lattice import KINDS, MOST_POINTS, choose_parts, interpolate, make_lattice
+from digiclay.device.skin_lattice import KINDS, MOST_POINTS, choose_parts, make_lattice
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator, RegularGridInterpolator
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
 
+from tests.live_skin import interpolate
 from tests.prisms import prism_volume
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")

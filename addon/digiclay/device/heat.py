@@ -1,13 +1,10 @@
 """Force colors of pins: a dozen levels, distinct for any color vision.
 
 Levels rather than a gradient, because a pin wears one of a few materials: that shows in Solid
-view, in Workbench and in Cycles alike. Numpy only, no Blender.
+view, in Workbench and in Cycles alike. No Blender.
 """
 
 from __future__ import annotations
-
-import numpy as np
-from numpy.typing import NDArray
 
 #: Force from which on a pin has the last color, N; a gently pressing finger gives a cell a third of it.
 TOP = 0.2
@@ -28,8 +25,3 @@ COLORS = (
     (0.783, 0.879, 0.125),
     (0.993, 0.906, 0.144),
 )
-
-
-def level(force: NDArray[np.float64], top: float = TOP) -> NDArray[np.int64]:
-    """Return the level of each force: 0 without force, 1 to 12 for `COLORS`."""
-    return np.asarray(np.clip(np.ceil(force / top * len(COLORS)), 0, len(COLORS)), np.int64)

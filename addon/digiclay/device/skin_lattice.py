@@ -108,17 +108,6 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
     return SkinLattice(along, across, place, sunk, _join(surface, edge.size))
 
 
-def interpolate(lattice: SkinLattice, height: Floats, kind: str) -> Floats:
-    """Return the heights of a skin, as the geometry nodes of a bed work them out, m."""
-    for step in (lattice.along, lattice.across):
-        before, after = height - height[step.previous], height[step.following] - height
-        product, total = np.maximum(before * after, 0.0), before + after
-        slope = np.divide(2.0 * product, total, out=np.zeros_like(total), where=total != 0.0)
-        value, weights = np.column_stack([height, slope]), step.weights[kind]
-        height = (value[step.low] * weights.low + value[step.high] * weights.high).sum(axis=1)
-    return height
-
-
 def _divide(first: float, last: float, step: float, parts: int) -> Floats:
     """Return even points from half a step before the first pin to half a step after the last one."""
     margin = parts // 2
