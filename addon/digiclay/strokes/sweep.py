@@ -161,9 +161,8 @@ def _lie_under_path(stroke: Stroke, grid: Grid, cells: NDArray[np.intp], radius:
         if not len(start):
             start, way = path, np.zeros_like(path)
         square = np.maximum((way * way).sum(axis=1), np.finfo(float).tiny)
-        for index, cell in enumerate(cells):
-            off = np.array([grid.x[cell], grid.y[cell]]) - start
-            part = np.clip((off * way).sum(axis=1) / square, 0.0, 1.0)
-            beside = off - part[:, None] * way
-            near[index] |= bool(((beside * beside).sum(axis=1) <= radius * radius).any())
+        off = np.column_stack([grid.x[cells], grid.y[cells]])[:, None] - start
+        part = np.clip((off * way).sum(axis=2) / square, 0.0, 1.0)
+        beside = off - part[..., None] * way
+        near |= ((beside * beside).sum(axis=2) <= radius * radius).any(axis=1)
     return near
