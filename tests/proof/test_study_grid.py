@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.studies.evaluation import evaluate_bundle
 from numpy.typing import NDArray
 
-from tests.scene_files import SMALL_BLISTER
+from tests.scene_files import SMALL_BLISTER, rows
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
@@ -69,20 +68,14 @@ def run_command(command: str, scene: Path, out: Path, *options: str) -> None:
     assert main([*words, "--out", str(out), *options]) == 0
 
 
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """Return the lines of a table."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def read_values(path: Path) -> Floats:
     """Return both metrics of a table, shape (rows, 2)."""
-    return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in read_rows(path)])
+    return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
 
 
 def test_the_indices_are_those_of_the_double_loop(scene: Path, grid: Floats, tmp_path: Path) -> None:
     run_command("study", scene, tmp_path / "out", "--samples", "64")
-    found = read_rows(tmp_path / "out" / "indices.csv")
+    found = rows(tmp_path / "out" / "indices.csv")
     assert len(found) == 8
     for row in found:
         values = grid[..., NAMES.index(row["output"])]

@@ -14,8 +14,9 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
-from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result, run
+
+from tests.assemble import followed
 
 REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
 #: In, 5 mm deep; still until 2 s; gone within 20 ms of that.
@@ -24,12 +25,9 @@ PRESS = ((0.0, 0, 0, 41), (1.0, 0, 0, 35), (2.0, 0, 0, 35), (2.2, 0, 0, 70), (4.
 
 
 def scene(method: str, way: tuple[tuple[float, ...], ...] = PRESS, side: int = 13, **known: Any) -> Scene:
-    """Return a scene on a square bed; the way's times in s, its positions in mm."""
-    sensors = known.pop("sensors", None)
-    layout = {"rows": side, "columns": side, "arrangement": known.pop("arrangement", "aligned")}
-    waypoints = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in way]
-    table = {"layout": layout, "control": {"method": method, **known}, "trajectory": {"waypoints": waypoints}}
-    return resolve(table | ({"sensors": sensors} if sensors else {}))
+    """Return a scene on a square bed, with parameters of the method; the way in s and mm."""
+    bed = {"arrangement": known.pop("arrangement", "aligned")}
+    return followed(method, way, side, layout=bed, control={"method": method, **known})
 
 
 @cache

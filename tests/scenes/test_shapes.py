@@ -17,6 +17,8 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.run_scene import Result, run
 
+from tests.assemble import followed
+
 REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
 #: Within this time a shape of 10 mm has come up; then the finger comes down.
 SHOWN = 2.0
@@ -27,14 +29,8 @@ SHAPE = {"file": "dome", "rise": 10e-3}
 
 def scene(method: str | None, **sections: Any) -> Any:
     """Return a scene on a bed of 15 x 15 cells that displays a dome, and a finger presses it."""
-    waypoints = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in WAY]
-    table = {
-        "layout": {"rows": 15, "columns": 15},
-        "control": {"method": method} if method else "absent",
-        "shape": SHAPE,
-        "trajectory": {"waypoints": waypoints},
-    }
-    return resolve({**table, **sections})
+    control = {"method": method} if method else "absent"
+    return followed("", WAY, **{"control": control, "shape": SHAPE, **sections})
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import json
 import os
@@ -31,6 +30,7 @@ from digiclay.core.studies.series import finish
 from tests.other_process import PROGRAM, start
 from tests.other_process import finish as finish_process
 from tests.scene_files import interrupt_after, scene_text
+from tests.scene_files import rows as read_table
 from tests.timeouts import TIMEOUT, wait_until
 
 GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=2,5", "--metric", "rfd"]
@@ -43,8 +43,7 @@ pytestmark = pytest.mark.usefixtures("here")
 
 def rows(folder: str) -> list[dict[str, str]]:
     """Return the lines of a sweep's table."""
-    with (Path(folder) / "sweep.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return read_table(Path(folder) / "sweep.csv")
 
 
 def kept(folder: str) -> dict[str, Any]:
