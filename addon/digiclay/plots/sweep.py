@@ -141,12 +141,11 @@ def comparison(
     height = 4.2 + 2 * (high + 0.85)
     with canvas(12.5, height, name) as (figure, place):
         force = place("force", 0.85, height - 3.6, 11.3, 2.5)
-        for method, (time, total, _) in forces.items():
+        dashed: dict[str, Any] = {"linewidth": 1.0, "linestyle": DASHES}
+        for method, (time, total, wanted) in forces.items():
             force.plot(time, total, color=colors[method], linewidth=1.4, label=method)
-        for method, (time, _, wanted) in forces.items():
-            if not np.all(np.isnan(wanted)):
-                force.plot(time, wanted, color=colors[method], linewidth=1.0, linestyle=DASHES)
-        force.plot([], [], color=INK, linewidth=1.0, linestyle=DASHES, label="set points")
+            force.plot(time, wanted, color=colors[method], zorder=2.5, **dashed)
+        force.plot([], [], color=INK, label="set points", **dashed)
         force.set(xlabel="time (s)", ylabel="total force (N)", ylim=(0.0, None), title="Total force")
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
         legend_above(force)

@@ -112,13 +112,11 @@ def apply(bed: Any, moments: BakedFrames, first: int, finger: Fingertip, *, keyf
     free(bed)
     count = len(moments.height)
     modifier = bed.modifiers.new(MODIFIER, "NODES")
-    held = _make_source(moments)
-    modifier.node_group = playback_nodes(held, count)
+    source = _make_source(moments)
+    modifier.node_group = playback_nodes(source, count)
     sources = view.sources_of(bed)
-    if sources is not None:
-        sources.objects.link(
-            held
-        )  # as `view.hold_parts` has it: appended, the bed leaves it out of the scene
+    if sources is not None:  # as `view.hold_parts` has it: appended, the bed leaves it out of the scene
+        sources.objects.link(source)
     bed.modifiers.move(len(bed.modifiers) - 1, 0)
     modifier = bed.modifiers[0]
     own_curves(bed)
@@ -153,10 +151,10 @@ def free(bed: Any) -> bool:
     tree = modifier.node_group
     bed.modifiers.remove(modifier)
     if not tree.users:
-        held = _source(tree)
+        source = _source(tree)
         bpy.data.node_groups.remove(tree)
-        if held is not None and held.users == len(held.users_collection):
-            bpy.data.meshes.remove(held.data)  # takes the object along
+        if source is not None and source.users == len(source.users_collection):
+            bpy.data.meshes.remove(source.data)  # takes the object along
     return True
 
 

@@ -159,26 +159,26 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Running:
     """Draw a stroke, and continue the session until the fingertip has finished it and the pins rest."""
     (_, x, y), last = stroke.moves[0], stroke.moves[-1][0]
     running = replace(running, clock=running.clock.stopped())
-    running, known = queue_stroke(
+    running, queued = queue_stroke(
         running, x, y, stroke.amount, SYMMETRIES[stroke.symmetry.upper()], stroke.kind, stroke.strength
     )
     drawn, place, time = 1, (x, y), 0.0
     if stroke.path != "free":
         lay = lay_line if stroke.path == "line" else lay_ring
         points = lay(place, stroke.moves[-1][1:])
-        running = change_stroke(running, known, partial(lay_path, points=points))
+        running = change_stroke(running, queued, partial(lay_path, points=points))
         drawn = len(stroke.moves)
-    while find_stroke(running, known) is not None:
+    while find_stroke(running, queued) is not None:
         time += 1.0 / RATE
         while drawn < len(stroke.moves) and stroke.moves[drawn][0] <= time:
             moved, x, y = stroke.moves[drawn]
             drawn += 1
-            # Released, the stroke goes on to the pointer.
+            # Released, the stroke ends at the pointer.
             string = stroke.stabilizer if drawn < len(stroke.moves) else 0.0
             place = pull(place, (x, y), string)
-            running = change_stroke(running, known, partial(_draw, time=moved, place=place, stroke=stroke))
+            running = change_stroke(running, queued, partial(_draw, time=moved, place=place, stroke=stroke))
         held = drawn < len(stroke.moves)
-        running = _tick(change_stroke(running, known, partial(replace, held=held, known=time)))
+        running = _tick(change_stroke(running, queued, partial(replace, held=held, known=time)))
         if time > last + PATIENCE:
             raise StateError(f"The fingertip has not finished stroke {number} after {PATIENCE:g} s.")
     for _ in range(round(REST * RATE)):

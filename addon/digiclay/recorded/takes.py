@@ -38,37 +38,37 @@ class Entry(NamedTuple):
 
 def list_takes(bed: Any) -> list[Entry]:
     """Return the takes of a bed, oldest first."""
-    held = bed.get(PROPERTY)
-    numbers = sorted(held.keys(), key=int) if held else []
-    return [Entry(number, held[number]["name"], held[number]["seconds"]) for number in numbers]
+    takes = bed.get(PROPERTY) or {}
+    numbers = sorted(takes.keys(), key=int)
+    return [Entry(number, takes[number]["name"], takes[number]["seconds"]) for number in numbers]
 
 
 def find(bed: Any, number: str = "") -> Entry:
     """Return the row of one take of a bed, by default the last; raise DigiclayError where there is none."""
-    known = list_takes(bed)
-    if not known and not number:
+    entries = list_takes(bed)
+    if not entries and not number:
         raise DigiclayError(f"{bed.name} has no take: record one in a session first.")
-    found = [entry for entry in known if number in ("", entry.number)]
-    if not found:
-        numbers = ", ".join(entry.number for entry in known) or "none"
+    matching = [entry for entry in entries if number in ("", entry.number)]
+    if not matching:
+        numbers = ", ".join(entry.number for entry in entries) or "none"
         raise DigiclayError(f"{bed.name} has no take {number!r}: its takes are {numbers}.")
-    return found[-1]
+    return matching[-1]
 
 
 def read_recording(session: Running) -> Take | None:
     """Return what a session has recorded, or None when that is nothing yet."""
-    keep = session.recording
-    return None if keep is None else make_take(session.scene, keep, session.snapshot)
+    recording = session.recording
+    return None if recording is None else make_take(session.scene, recording, session.snapshot)
 
 
 def add(bed: Any, take: Take, name: str = "") -> Entry:
     """Add a take to a bed; without a name it gets its number. `bed` bpy.types.Object."""
     if PROPERTY not in bed:
         bed[PROPERTY] = {}
-    held = bed[PROPERTY]
-    number = str(max(map(int, held.keys()), default=0) + 1)
-    held[number] = {"name": name or f"Take {number}", "seconds": take.duration, "data": to_bytes(take)}
-    return Entry(number, held[number]["name"], take.duration)
+    takes = bed[PROPERTY]
+    number = str(max(map(int, takes.keys()), default=0) + 1)
+    takes[number] = {"name": name or f"Take {number}", "seconds": take.duration, "data": to_bytes(take)}
+    return Entry(number, takes[number]["name"], take.duration)
 
 
 def keep_recording(bed: Any, session: Running) -> str:
