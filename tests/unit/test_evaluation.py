@@ -11,6 +11,8 @@ import pytest
 from digiclay.cli import main
 from digiclay.core.batch.packing import begin, extend_path, make_batch
 from digiclay.core.engine.simulation import simulate_period
+from digiclay.core.model.fingertip import Fingertip, compute_reach
+from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
@@ -129,13 +131,25 @@ def test_points_of_one_structure_run_together_and_others_alone(varied, setting, 
     assert said is None or parts.describe() == [said]
 
 
-def test_a_bundle_comes_to_the_figures_of_its_points_and_can_be_stopped() -> None:
+def test_the_reach_of_many_fingers_is_that_of_each() -> None:
+    poses = np.zeros((3, 2, 7))
+    poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
+    windows = trace_finger(Fingertip(), poses).windows
+    alone = [compute_reach(window, 0.04) for window in windows]
+    together = np.array(compute_reach(np.array(windows).T, np.full(3, 0.04))).T
+    np.testing.assert_allclose(together[:2], alone[:2], rtol=1e-12)
+    assert alone[2] is None  # the last one is far above the bed
+    assert together[2, 2] < 0.0
+
+
+@pytest.mark.parametrize("errors", [False, True])
+def test_a_bundle_comes_to_the_figures_of_its_points_and_can_be_stopped(errors):
     bundle = some("control.force_gain=1,5")
     assert evaluate_bundle(bundle, lambda: True) == [None, None]
-    for record, point in zip(evaluate_bundle(bundle), bundle, strict=True):
+    for record, point in zip(evaluate_bundle(bundle, errors=errors), bundle, strict=True):
         own, other = (
             {name: value for name, value in one["figures"].items() if name not in TIMES and value is not None}
-            for one in (record, evaluate(point.scene))
+            for one in (record, evaluate(point.scene, errors=errors))
         )
         assert own == pytest.approx(other, rel=1e-9, abs=1e-15)
 
