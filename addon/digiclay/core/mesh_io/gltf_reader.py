@@ -132,17 +132,15 @@ class _File:
         corners = np.arange(len(vertices))
         if "indices" in primitive:
             corners = self._numbers(primitive["indices"], "SCALAR")[:, 0].astype(np.int64)
-        mode, count = primitive.get("mode", TRIANGLES), self.triangles(primitive)
+        mode = primitive.get("mode", TRIANGLES)
         if mode == TRIANGLES:
             if corners.size % 3:
                 raise ValueError(f"{corners.size} corners are no triangles")
             return vertices, corners.reshape(-1, 3)
-        first = np.arange(count)
-        if mode == FAN:
-            return vertices, corners[np.column_stack([np.zeros(count, np.int64), first + 1, first + 2])]
-        # Every other triangle of a strip runs the other way round.
-        odd = first % 2
-        return vertices, corners[np.column_stack([first, first + 1 + odd, first + 2 - odd])]
+        number = np.arange(self.triangles(primitive))
+        # Every other triangle of a strip runs the other way round; those of a fan have the first corner.
+        first, odd = (0 * number, 0) if mode == FAN else (number, number % 2)
+        return vertices, corners[np.column_stack([first, number + 1 + odd, number + 2 - odd])]
 
     def _numbers(self, accessor: Any, kind: str) -> NDArray[Any]:
         """Return the items of an accessor, (count, numbers an item)."""

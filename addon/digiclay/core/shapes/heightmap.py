@@ -241,8 +241,7 @@ def _places(places: Floats, pixels: int, block: int, count: int) -> Floats:
 
 def _bilinear(values: Floats, rows: Floats, columns: Floats) -> Floats:
     """Return values between the numbers of a table, shape (n,)."""
-    row = np.minimum(rows.astype(np.intp), values.shape[0] - 1)
-    column = np.minimum(columns.astype(np.intp), values.shape[1] - 1)
+    row, column = rows.astype(np.intp), columns.astype(np.intp)
     below, right = np.minimum(row + 1, values.shape[0] - 1), np.minimum(column + 1, values.shape[1] - 1)
     up, over = rows - row, columns - column
     first = values[row, column] * (1.0 - over) + values[row, right] * over

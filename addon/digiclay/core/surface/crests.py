@@ -67,14 +67,12 @@ class Field:
             above = np.column_stack([self.bed.at(self.off, position[part]), self.bed.at(self.off, here)])
             above -= level[part, None]
             fallen = above < 0.0  # not where the bed has ended: NaN
-            first = np.argmax(fallen, axis=1)
+            first = np.argmax(fallen | np.isnan(above), axis=1)
             row = np.arange(len(first))
             over, under = above[row, np.maximum(first - 1, 0)], above[row, first]
             with np.errstate(invalid="ignore", divide="ignore"):
                 reached = np.where(first > 0, step * (first - 1 + over / (over - under)), 0.0)
-            ended = np.isnan(above)
-            out = ended.any(axis=1) & (ended.argmax(axis=1) < first)
-            distance[part] = np.where(fallen.any(axis=1) & ~out, reached, np.inf)
+            distance[part] = np.where(fallen[row, first], reached, np.inf)
         return distance
 
     def half_widths(self, position: Floats) -> Floats:

@@ -123,16 +123,13 @@ def _squares(formed: Formed) -> tuple[Floats, Indices]:
     a, b, c, d = take_corners(top)
     ac = np.minimum(a, c) > np.maximum(b, d)
     bd = np.minimum(b, d) > np.maximum(a, c)
-    apart = np.zeros((rows + 1, columns + 1), bool)
-    apart[1:-1, 1:-1] = ac | bd
     # The lower one stands towards -y, and towards +x where a and c are joined, towards -x where b and d are.
-    lean = np.zeros(apart.shape)
-    lean[1:-1, 1:-1] = np.where(ac, 1.0, np.where(bd, -1.0, 0.0))
+    lean = np.pad(ac.astype(np.float64) - bd, 1)
+    apart, joined_ac, joined_bd = lean != 0.0, lean > 0.0, lean < 0.0
     away = BRIDGE * np.stack([lean * step_x, -np.abs(lean) * step_y], axis=-1)
     lower = np.arange(apart.size).reshape(apart.shape)
     upper = np.where(apart, apart.size + np.cumsum(apart.ravel()).reshape(apart.shape) - 1, lower)
     corners = np.concatenate([(corner + away).reshape(-1, 2), (corner - away)[apart]])
-    joined_ac, joined_bd = lean > 0.0, lean < 0.0
     # Two corners a part has where four meet, by its place among them, in the order of its loop.
     corners_at = (
         (upper, np.where(joined_ac, lower, upper)),
