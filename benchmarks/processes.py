@@ -244,7 +244,7 @@ def _serve(seconds: float) -> tuple[dict[str, Any], int]:
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
         command = [sys.executable, "-m", "digiclay", "serve", SCENE, "--rate", str(RATE), "--port", "0"]
-        command += ["--osc-port", "0", "--token", token, "--report", str(report), "--seconds", str(seconds)]
+        command += ["--osc-port", "0", f"--token={token}", "--report", str(report), "--seconds", str(seconds)]
         command += ["--out", str(Path(folder) / "recorded")]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
