@@ -51,9 +51,9 @@ def _parsed(argv: Sequence[str] | None) -> Any:
         return parser().parse_args(argv)
 
 
-def _wrong(said: object) -> int:
+def _wrong(error: object) -> int:
     """Print an error in one line, and return the exit code."""
-    print(one_line(said), file=sys.stderr)
+    print(one_line(error), file=sys.stderr)
     return WRONG
 
 
@@ -75,7 +75,7 @@ def run_as_program(command: Callable[[], int]) -> NoReturn:
     try:
         code = command()
         sys.stdout.flush()
-    except BrokenPipeError:  # whoever read our output has seen enough
+    except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
     sys.exit(code)

@@ -156,7 +156,7 @@ class Folder:
 
 @contextmanager
 def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
-    """Make a batch's folder, or go on with one; nobody else may work in it meanwhile."""
+    """Make a batch's folder, or continue one; no other process may work in it meanwhile."""
     description = {
         "batch": batch.name, "digiclay": __version__, "jobs": {job.name: job.error for job in batch.jobs},
     }  # fmt: skip

@@ -1,6 +1,6 @@
 """Evaluation of bundles on a Dask cluster: connection, comparison of versions, executor.
 
-Dask is imported only here and in tasks, and only when somebody names a scheduler.
+Dask is imported only here and in tasks, and only when a scheduler is named.
 """
 
 from __future__ import annotations
@@ -58,12 +58,12 @@ def call_on_worker(packed: bytes, wanted: Versions) -> Any:
         from distributed import get_worker
 
         raise UnfitWorkerError(f"Worker {get_worker().address} has {here}")
-    task, arguments, known = pickle.loads(packed)
-    return task(*arguments, **known)
+    task, arguments, named = pickle.loads(packed)
+    return task(*arguments, **named)
 
 
 def evaluate_on_worker(bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
-    """Evaluate a bundle in a task of a Dask worker, until nobody wants its records any more."""
+    """Evaluate a bundle in a task of a Dask worker, until its records are not wanted any more."""
     from distributed import Reschedule
 
     records = evaluate_bundle(bundle, _watch_task(), errors=errors)
@@ -73,7 +73,7 @@ def evaluate_on_worker(bundle: Sequence[Point], *, errors: bool) -> list[Record 
 
 
 def _watch_task() -> Callable[[], bool]:
-    """Return whether nobody wants the task of this thread any more, as a function.
+    """Return a function that tells whether the task of this thread is cancelled.
 
     Dask does not interrupt a task. Its worker marks it as soon as the session releases it, has died, or
     the scheduler is gone: no event is shared, and a look costs no message.
@@ -91,11 +91,11 @@ def _watch_task() -> Callable[[], bool]:
     return is_cancelled
 
 
-#: Seconds to reach the scheduler, and between two looks whether somebody asked to stop.
+#: Seconds to reach the scheduler, and between two checks for a requested stop.
 PATIENCE, PAUSE = 10.0, 0.1
 #: Seconds within which a result must arrive that a worker has.
 FETCH = 30.0
-#: Seconds between two looks at how many workers there are, and without any before that is told.
+#: Seconds between two counts of the workers, and without any before a message says so.
 LOOK, ALONE = 1.0, 10.0
 #: Packages whose loggers are silenced.
 NOISY = ("distributed", "tornado", "asyncio")
@@ -108,14 +108,14 @@ class Cluster(Executor):
 
     def __init__(self, client: Any, address: str) -> None:
         self._client, self._address, self._versions = client, address, describe_versions()
-        self._remote: set[Any] = set()  # Dask releases a task whose future nobody holds
+        self._remote: set[Any] = set()  # Dask releases a task without a reference to its future
         self._suspects: deque[tuple[Future[Any], bytes]] = deque()
         self._workers, self._looked, self._manned = 0, 0.0, time.monotonic()
 
-    def submit(self, task: Callable[..., Any], /, *arguments: Any, **known: Any) -> Future[Any]:
+    def submit(self, task: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """Have a worker call a function, and return its result by value."""
         future: Future[Any] = Future()
-        self._send(future, pickle.dumps((task, arguments, known), pickle.HIGHEST_PROTOCOL))
+        self._send(future, pickle.dumps((task, arguments, named), pickle.HIGHEST_PROTOCOL))
         return future
 
     def _send(self, future: Future[Any], packed: bytes, *, alone: bool = False) -> None:
@@ -129,7 +129,7 @@ class Cluster(Executor):
             future.set_exception(self._lost())
 
     def _hand_back(self, future: Future[Any], packed: bytes, alone: bool, remote: Any) -> None:
-        """Take the outcome of a task over, unless nobody waits for it; Dask calls this from one thread.
+        """Hand the outcome of a task over, unless it is cancelled; Dask calls this from one thread.
 
         Dask blames the death of a worker on all tasks that it had, also on those that it had not begun. So
         each gets a second chance, one after the other: who kills once more is to blame.
@@ -196,13 +196,13 @@ class Cluster(Executor):
 
     def wait_for_workers(self, stop: Callable[[], bool], draw: Callable[[str], None]) -> None:
         """Wait for a first worker, visibly."""
-        said = self.describe()
+        note = self.describe()
         if not self._workers:
             _tell(f"{self._address} has no workers yet: start some with 'dask worker {self._address}'.")
         while not self._workers and not stop():
-            draw(said)
+            draw(note)
             time.sleep(PAUSE)
-            said = self.describe()
+            note = self.describe()
 
     def refuse_other_versions(self) -> None:
         """Refuse a cluster of which a part runs another digiclay, numpy or Python."""
@@ -224,7 +224,7 @@ class Cluster(Executor):
 
 
 def _refuse_others(found: Mapping[str, Any], here: Versions) -> None:
-    """Refuse versions other than those here; whoever has no digiclay at all has an error in their place."""
+    """Refuse versions other than those here; one without digiclay has an error in their place."""
     others = {name: versions for name, versions in found.items() if versions != here}
     if not others:
         return
@@ -309,7 +309,7 @@ async def _try_address(address: str) -> None:
     from distributed import Security
     from distributed.comm import connect
 
-    # Whoever accepts the connection need not be a scheduler, and may keep silent.
+    # Another program than a scheduler may accept the connection, and keep silent.
     security = Security().get_connection_args("client")
     comm = await asyncio.wait_for(connect(address, PATIENCE, **security), PATIENCE)
     await comm.close()

@@ -23,7 +23,7 @@ from ..core.studies.evaluation import Pool, evaluate_bundle
 from ..core.studies.series import Outcome, Piece, Results
 from .worker import Process, Processes
 
-#: Seconds between two looks at whether somebody asked to stop.
+#: Seconds between two checks for a requested stop.
 PAUSE = 0.1
 
 
@@ -151,7 +151,7 @@ def serve() -> None:
         try:
             pickle.dump(records, replies)
             replies.flush()
-        except OSError:  # nobody is there any more
+        except OSError:  # the reader has ended
             os._exit(1)
 
 

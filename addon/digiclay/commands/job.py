@@ -104,7 +104,7 @@ def _follow(arguments: argparse.Namespace) -> int:
 
 
 def has_input_ended() -> bool:
-    """Return whether standard input, on which nobody writes, has ended."""
+    """Return whether standard input, into which nothing is written, has ended."""
     if sys.platform == "win32":  # where select is for sockets alone
         import _winapi
         import msvcrt

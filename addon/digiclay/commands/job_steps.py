@@ -115,7 +115,7 @@ def note_film(run: Path, kind: str, seconds: float, *, encoded: bool) -> None:
 
 #: What the lines begin with that are meant for the series.
 PROGRESS, ERROR = "@ ", "! "
-#: Bytes at a log's end that are looked at for its last line.
+#: Bytes read at the end of a log.
 TAIL = 4096
 
 
@@ -131,8 +131,8 @@ def read_tail(log: Path) -> list[str]:
 
 def find_error(lines: list[str]) -> str:
     """Return the error that ended a job, in one line; empty where the lines have none."""
-    told = [line.removeprefix(ERROR) for line in lines if line.startswith(ERROR)]
-    return one_line(told[-1]) if told else ""
+    errors = [line.removeprefix(ERROR) for line in lines if line.startswith(ERROR)]
+    return one_line(errors[-1]) if errors else ""
 
 
 def read_fraction(lines: list[str]) -> float:

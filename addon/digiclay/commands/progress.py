@@ -39,19 +39,19 @@ class Line:
         """Return whether to redraw; the rate is limited, since drawing takes time."""
         return time.monotonic() - self._drawn >= PAUSE
 
-    def draw(self, said: str) -> None:
+    def draw(self, text: str) -> None:
         """Draw a text in place of what stood there, as much of it as the terminal is wide."""
         self._drawn = time.monotonic()
         if self._quiet or not self._stream.isatty():
             return
-        width = shutil.get_terminal_size().columns - 1  # a longer one goes on below, and would stay there
-        self._stream.write(f"\r{said[:width]}\033[K")
+        width = shutil.get_terminal_size().columns - 1  # a longer one is wrapped, and would stay there
+        self._stream.write(f"\r{text[:width]}\033[K")
         self._stream.flush()
         self._shown = True
 
-    def tell(self, said: str) -> None:
+    def tell(self, text: str) -> None:
         """Write a line that stays, above the one that is redrawn."""
-        self._stream.write(f"\r\033[K{said}\n" if self._shown else f"{said}\n")
+        self._stream.write(f"\r\033[K{text}\n" if self._shown else f"{text}\n")
         self._stream.flush()
         self._shown = False
 
@@ -78,8 +78,8 @@ class Bar(Line):
         """Draw the bar, if it is time to."""
         if self.is_due():
             times = f"{done * self._period:.1f} of {total * self._period:.1f} s simulated"
-            said = f"{100 * done // total:3d} %{self.format_left(done / total)}  {times}"
-            self.draw(f"{self._label} {draw_share(done / total)} {said}")
+            state = f"{100 * done // total:3d} %{self.format_left(done / total)}  {times}"
+            self.draw(f"{self._label} {draw_share(done / total)} {state}")
 
 
 class Counted(Line):
@@ -98,8 +98,8 @@ class Counted(Line):
         """Draw the bar, if it is time to; `done` may be in the middle of one."""
         if self.is_due():
             here = (done - self._before) / max(total - self._before, 1)
-            said = f"{int(done)} of {total} {self._unit}{self.format_left(here)}{note}"
-            self.draw(f"{self._label} {draw_share(done / total)} {said}")
+            state = f"{int(done)} of {total} {self._unit}{self.format_left(here)}{note}"
+            self.draw(f"{self._label} {draw_share(done / total)} {state}")
 
 
 def draw_share(share: float) -> str:

@@ -37,7 +37,7 @@ class Stop:
         return self.requested
 
     def __enter__(self) -> Stop:
-        # Python takes signals in its main thread only; elsewhere nobody can ask.
+        # Python takes signals in its main thread only; elsewhere there are none.
         with suppress(ValueError):
             for number in ASKING:
                 # A closed terminal does not end what nohup has begun.

@@ -1,7 +1,7 @@
 """Worker processes of a series on this machine: start and stop.
 
 Each runs this program once more, and stops when its standard input ends: so it does when it is asked to,
-and when whoever started it has died.
+and when the process that started it has died.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..core.studies.series import describe_error
 
 #: Seconds that processes get to stop by themselves.
 GRACE = 20.0
-#: Seconds between two looks at whether one has ended.
+#: Seconds between two checks for ended processes.
 PAUSE = 0.05
 #: The package, as an extension in Blender or installed with pip.
 PACKAGE = __name__.removesuffix(".commands.worker")

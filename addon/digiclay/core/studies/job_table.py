@@ -1,7 +1,7 @@
 """Jobs of a JOBS file: scenes × methods × settings, each self-contained.
 
 A job's folder holds ``scene.toml``, every parameter of its session, and ``job.toml``, what is
-made of the run. Whoever has that folder and this package can do the job, on any machine.
+made of the run. With that folder and this package the job can be done on any machine.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
-        files = [_find_scene(path, said) for said in words]
+        files = [_find_scene(path, word) for word in words]
         for file in files:
             load(file)  # what is wrong without any change is told of first
         _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
@@ -153,9 +153,9 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
     return JobSeries(find_name(path), jobs, made)
 
 
-def find_jobs_file(said: str) -> Path:
+def find_jobs_file(word: str) -> Path:
     """Return a JOBS file: a sample's name, or a file. Raises SceneError when there is none."""
-    return find_file(said, list_files(BATCHES, ".toml"), "sample batch")
+    return find_file(word, list_files(BATCHES, ".toml"), "sample batch")
 
 
 def read_outputs(path: Path) -> Outputs:
@@ -169,7 +169,7 @@ def read_outputs(path: Path) -> Outputs:
 def _read_scenes(table: Mapping[str, Any]) -> list[str]:
     """Return the scenes of the file."""
     words = table.get("scenes")
-    if not isinstance(words, list) or not words or not all(isinstance(said, str) and said for said in words):
+    if not isinstance(words, list) or not words or not all(isinstance(word, str) and word for word in words):
         value = "none" if words is None else show_value(words)
         raise ParameterError("scenes", "", 'must be a list of scenes such as ["tap", "my.toml"]', value)
     return words
@@ -216,10 +216,10 @@ def _flatten(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]
     return pairs
 
 
-def _find_scene(jobs: Path, said: str) -> Path:
+def _find_scene(jobs: Path, word: str) -> Path:
     """Return the file of a scene: beside the JOBS file, or as anywhere else."""
-    beside = jobs.parent / said
-    return find(str(beside)) if os.path.exists(beside) else find(said)
+    beside = jobs.parent / word
+    return find(str(beside)) if os.path.exists(beside) else find(word)
 
 
 def _name_job(file: Path, method: str, label: str) -> str:

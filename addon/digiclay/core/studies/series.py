@@ -1,6 +1,6 @@
 """Series: pieces of work in one folder, such as a sweep's points or the jobs of a JOBS file.
 
-Its folder is made once, gone on with after a stop, and worked in by one process at a time. Each of its
+Its folder is made once, continued after a stop, and worked in by one process at a time. Each of its
 pieces is kept as soon as it is done.
 """
 
@@ -27,7 +27,7 @@ from ..files.run_folder import (
     write_whole,
 )
 
-#: The lock of whoever works in the folder.
+#: The lock of the process that works in the folder.
 LOCK = ".lock"
 
 Piece = TypeVar("Piece")
@@ -52,7 +52,7 @@ def open_series(
     description: Mapping[str, Any],
     refuse_another: Callable[[Any], None] | None = None,
 ) -> Iterator[None]:
-    """Make a series' folder, or go on with one; nobody else may work in it until the block ends.
+    """Make a series' folder, or continue one; no other process may work in it until the block ends.
 
     A description that cannot be read counts as none where nothing has been done: the disk was full.
     """

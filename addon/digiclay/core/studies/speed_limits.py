@@ -53,8 +53,8 @@ class Follows:
 
     def meets(self, criterion: Criterion) -> bool:
         """Return whether this counts as followed."""
-        held = self.losses == 0 and self.loss_share == 0.0
-        return held and self.lag < criterion.lag and self.rfd < criterion.deviation
+        kept = self.losses == 0 and self.loss_share == 0.0
+        return kept and self.lag < criterion.lag and self.rfd < criterion.deviation
 
 
 @dataclass(frozen=True)
