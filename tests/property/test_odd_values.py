@@ -10,7 +10,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.assemble import path
@@ -109,6 +109,8 @@ def test_bytes_that_are_changed_are_noticed_or_make_another_state(at: int, some:
 
 
 @given(st.integers(0, len(KEPT)), st.binary(max_size=40))
+@example(len(KEPT), b"\0")
+@example(len(KEPT) - 8, b"")
 def test_bytes_that_are_cut_or_added_are_noticed(at: int, some: bytes) -> None:
     assert all(refusals(KEPT[:at] + some + KEPT[at:])) == bool(some)
     assert all(refusals(KEPT[:at])) == (at < len(KEPT))
