@@ -254,6 +254,9 @@ def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alo
     assert len(found) == 3
     assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, alone)
     assert recent_trace.measure_total_force(SYSTEM, state) > 0.0
+    # A step that cannot be halved has no monitor.
+    table = {"simulation": {"control_period": "1 s", "physics_step": "1 ms"}, "control": "absent"}
+    assert accuracy.start(resolve(table)) is None
 
 
 # An input reaches the commanded pins in the next tick
