@@ -6,14 +6,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.toml_table import resolve
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
 SIZES = {"rows": 15, "columns": 15}
 SCENE = resolve({"layout": SIZES})
 TICK = 1 / 30

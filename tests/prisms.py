@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.surface.formed import find_base_level, make_skin
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
 
 
 def prism_volume(place: Floats, height: Floats, rows: int, columns: int, base: float | None = None) -> float:

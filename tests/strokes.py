@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
@@ -10,12 +11,10 @@ from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.stroke import Brush, draw
-from numpy.typing import NDArray
 
 from tests import hand
 from tests.hand import heights, let_go
 
-Floats = NDArray[np.float64]
 Places = list[tuple[float, float]]
 #: Within how long a stroke is drawn, s: the finger is late, and goes as fast as it may.
 DURATION = 0.5

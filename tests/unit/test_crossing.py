@@ -14,14 +14,12 @@ from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.strokes.stroke import Brush
 from digiclay.strokes.sweep import LIMIT, measure_excess_heights
-from numpy.typing import NDArray
 
 from tests.hand import TICK, heights
 from tests.strokes import Places, begin_bed, form, measure_spikes, relief
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
-Floats = NDArray[np.float64]
 #: Pins in a row and column of a bed, half the length of a stroke, height of a ridge, depth of a groove, mm.
 SIZES = {"paper": (25, 24.0, 10.0, 4.0), "design": (34, 16.0, 6.0, 3.0)}
 #: A pin may be off all those around it by so much, mm; measured: 0.57 mm at most.

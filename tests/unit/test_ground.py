@@ -6,6 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.ground import GROUNDS
@@ -14,11 +15,9 @@ from digiclay.core.control.virtual_master import Master, VirtualMaster
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import format_scene, resolve
-from numpy.typing import NDArray
 
 from tests.assemble import make_system, master
 
-Floats = NDArray[np.float64]
 BED = make_grid(Layout(15, 15))
 EAST = (1.0, 0.0)
 #: A ridge along y that the blister is above, of 4 mm.

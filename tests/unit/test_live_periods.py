@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
@@ -33,12 +34,10 @@ from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import draw
-from numpy.typing import NDArray
 
 from tests import hand
 from tests.assemble import path
 
-Floats = NDArray[np.float64]
 PERIOD = 5e-3
 SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
 SYSTEM = assemble(SCENE)

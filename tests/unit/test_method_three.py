@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.core.base.arrays import Floats
 from digiclay.core.control.finger_estimate import Estimate, FingerFilter, Spread, invert_six
 from digiclay.core.control.flow_servo import FlowServo, make_flow_servo
 from digiclay.core.control.servo import Tracking, lock_overloaded
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.physics import Cell
 from digiclay.core.model.valve import Valve
-from numpy.typing import NDArray
 
 from tests.assemble import make_basis, make_system
-
-Floats = NDArray[np.float64]
 
 PERIOD, BAND = 5e-3, 1e-6
 #: Elongation of the default fingertip, 10 by 8 mm.
