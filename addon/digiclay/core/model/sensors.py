@@ -29,8 +29,9 @@ SURE = 5.0
 FINEST = 1e-12
 #: Odd constants of the 64-bit mixer SplitMix64 (Steele, Lea and Flood 2014).
 WEYL, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
-#: Control periods whose noise is drawn at once: one set of cells serves for so many, less one.
-AHEAD = 33
+#: Control periods whose noise is drawn at once: one set of cells serves for so many, less one; and most
+#: numbers that they may be.
+AHEAD, MOST = 33, 200_000
 
 
 @dataclass(frozen=True)
@@ -129,24 +130,25 @@ class NoiseAhead:
     """
 
     def __init__(self, seed: Any, *deviations: Any) -> None:
-        self._seed, self._deviations, self._first = seed, deviations, 0
+        self._seed, self._deviations, self._first, self._end = seed, deviations, 0, 0
         self._cells: NDArray[np.intp] = np.empty(0, np.intp)
         self._drawn: list[Floats | None] = []
 
     def draw(self, period: int, cells: NDArray[np.intp]) -> list[Floats | None]:
         """Return the noise of forces, N, and heights, m, in a period, (m[, b]) each; None: there is none."""
-        late, count = period - self._first, len(cells)
+        count = len(cells)
         known = bool(self._drawn) and cells.tobytes() == self._cells[:count].tobytes()
-        if not (known and 0 <= late < AHEAD):
+        if not (known and self._first <= period < self._end):
             # The leading part of the cells is read before all of them.
-            self._first, self._cells, late = period, self._cells if known else cells.copy(), 0
-            radius, angle = draw_polar(self._seed, period + np.arange(AHEAD), self._cells)
+            self._cells = self._cells if known else cells.copy()
+            self._first, self._end = period, period + max(1, min(AHEAD, MOST // max(1, self._cells.size)))
+            radius, angle = draw_polar(self._seed, np.arange(self._first, self._end), self._cells)
             turns: tuple[np.ufunc, ...] = np.cos, np.sin
             self._drawn = [
                 by * (radius * turn(angle)) if np.any(by) else None
                 for by, turn in zip(self._deviations, turns, strict=True)
             ]
-        return [noise if noise is None else noise[late, :count] for noise in self._drawn]
+        return [noise if noise is None else noise[period - self._first, :count] for noise in self._drawn]
 
 
 @dataclass(frozen=True)
