@@ -6,7 +6,7 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,10 @@ from ..base.errors import DivergenceError
 from ..control.servo import BatchControl
 from ..engine.active_set import OwnSelection, PaddedSelection
 from ..engine.simulation import CHUNK, find_divergence
-from ..engine.state import State, make_initial_state
+from ..engine.state import ActiveSet, State, make_initial_state
 from ..engine.system import System
 from ..model.control_interface import Commands, Controller, Measurement
-from ..model.interfaces import Movement, Stepper
+from ..model.interfaces import Movement
 from ..model.layout import Grid, make_grid
 from ..model.null_parts import Uncontrolled
 from ..model.touch import FingerPath, join_paths, trace_finger
@@ -127,27 +127,15 @@ PIECE = 2048
 GROUP = 8
 
 
-@dataclass(frozen=True, eq=False)
-class BatchStepper:
-    """The runs' own stepper, for the cells of many runs; see `interfaces.Stepper`."""
-
-    stepper: Stepper
-    alike: bool
-    """The cells of all runs are alike, so they are moved as those of one large bed."""
-    valve: int
-    """From this row on there is what moves a pin without a fingertip: its opening and its commands."""
-
-    def prepare(self, plan: Any, rows: Floats, near: int) -> BatchMovement:
-        """Prepare to move one set of cells of all runs; see `interfaces.Stepper`."""
-        return BatchMovement(self, plan, rows, near)
-
-
 class BatchMovement:
     """Moves one set of cells of b runs, period by period; see `interfaces.Stepper.prepare`."""
 
-    def __init__(self, batch: BatchStepper, plan: Any, rows: Floats, near: int) -> None:
-        self._stepper, self._plan, self._alike = stepper, plan, alike = batch.stepper, plan, batch.alike
-        self._rows, self._near, self._valves = rows, near, rows[batch.valve :, near:]
+    def __init__(self, batch: Batch, rows: Floats, near: int) -> None:
+        self._stepper, self._plan = stepper, plan = batch.stepper, batch.plan
+        # Where the cells of all runs are alike, they are moved as those of one large bed.
+        self._alike = alike = plan is batch.systems[0].plan
+        # What moves a pin without a fingertip: its opening and its commands.
+        self._rows, self._near, self._valves = rows, near, rows[batch.cell.lag_rows.start :, near:]
         own = self._beds(rows)
         count = near * rows.shape[2] if alike else near
         parts = _pieces(count, 1 if alike else rows.shape[2])
@@ -198,6 +186,10 @@ class Batch(System):
 
     systems: tuple[System, ...]
     """Those of the runs."""
+
+    def prepare(self, active: ActiveSet) -> BatchMovement:
+        """Prepare to move one set of cells of all runs."""
+        return BatchMovement(self, active.driven, active.near)
 
 
 def begin(batch: Batch) -> State:
@@ -339,9 +331,6 @@ def make_batch(systems: Sequence[System]) -> Batch:
     """Return the batch of systems of one structure."""
     first, cell = systems[0], merge_parts([system.cell for system in systems])
     period, fastest = np.array([(system.period, system.fastest) for system in systems], np.float64).T
-    plan = merge_parts([system.plan for system in systems])
-    # Of its stepper a control period uses `prepare` alone.
-    stepper = cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start))
     common = first.grid, first.rows, cell, period, fastest
     own = tuple(system.selection for system in systems)
     return Batch(
@@ -349,8 +338,8 @@ def make_batch(systems: Sequence[System]) -> Batch:
         cell=cell,
         sensors=merge_parts([system.sensors for system in systems]),
         controller=join_controllers([system.controller for system in systems], by_set=first.by_set),
-        stepper=stepper,
-        plan=plan,
+        stepper=first.stepper,
+        plan=merge_parts([system.plan for system in systems]),
         period=period,
         fastest=fastest,
         selection=OwnSelection(*common, own) if first.by_set else PaddedSelection(*common),

@@ -22,7 +22,7 @@ from ..model.control_interface import Commands, Measurement, SetPoint
 from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
-from .servo import Tracking, lock_overloaded
+from .servo import Tracking, lock_overloaded, mark_formed
 from .travel import ABEAM, Heading, measure_lead, measure_square, update_heading
 
 VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
@@ -242,11 +242,8 @@ class CellStatesControl:
         """Divide the cells on a virtual spring: pressed, holding a formed height, or at rest."""
         spring = mode <= Mode.HOLD
         spring |= mode == Mode.SPRING
-        formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
-        kind = np.where(
-            force > 0.0, np.int8(Mode.SPRING), np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
-        )
-        return np.where(spring, kind, mode)
+        formed = mark_formed(target, self.actuator.rest_height, self.parameters.dead_band)
+        return np.where(spring, np.where(force > 0.0, np.int8(Mode.SPRING), formed), mode)
 
     def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags) -> Floats:
         """Return valve commands: force control under the fingertip, springs and profile elsewhere."""

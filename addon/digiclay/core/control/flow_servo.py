@@ -57,21 +57,18 @@ class FlowServo:
 
     def find_limits(self, force: Floats) -> Floats:
         """Return the lowest (negative) and highest speeds of pins under forces (m,), N; (2, m), m/s."""
-        limits: Floats = self._yield * force
-        limits += self._free
+        free, change = self._speeds
+        limits: Floats = change * force
+        limits += free
         highest = limits[1]
         np.maximum(highest, 0.0, out=highest)
         return limits
 
     @cached_property
-    def _yield(self) -> Floats:
-        """How much these speeds change with a force, (2, 1), m/s/N."""
-        return np.array([[-self.fall / self.pull], [-self.rise / self.lift]])
-
-    @cached_property
-    def _free(self) -> Floats:
-        """Speeds of pins without load, (2, 1), m/s."""
-        return np.array([[-self.fall], [self.rise]])
+    def _speeds(self) -> tuple[Floats, Floats]:
+        """Speeds of pins without load, m/s, and how these change with a force, m/s/N, (2, 1) each."""
+        free = np.array([[-self.fall], [self.rise]])
+        return free, free / [[self.pull], [-self.lift]]
 
     def coast(self, height: Floats, speeds: Floats) -> Floats:
         """Return the heights, (m,), m, at which earlier commands of speeds (q, m), m/s, will leave pins."""

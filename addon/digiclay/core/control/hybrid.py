@@ -35,7 +35,7 @@ from .methods import ControlParameters
 from .pulp_estimate import PulpEstimate, Reach, find_top, lead_heights
 from .servo import declare_again, mark_formed
 from .travel import Heading, update_heading
-from .virtual_master import HEAVIEST, LossRule, Master, Phase, VirtualMaster, VirtualMasterControl
+from .virtual_master import HEAVIEST, Master, Phase, VirtualMaster, VirtualMasterControl
 from .virtual_master import build as build_master
 
 
@@ -167,11 +167,6 @@ class HybridControl:
         return (-1.0,) * max(1, round(self.servo.ahead / self.device.period))
 
     @cached_property
-    def _loss(self) -> LossRule:
-        """When a fingertip is given up."""
-        return LossRule(self.device.period, self.parameters.loss_time)
-
-    @cached_property
     def _surface(self) -> LedBlister:
         """Blister and the pins led ahead of it."""
         release = max(self.parameters.release_force, self.felt)
@@ -206,7 +201,7 @@ class HybridControl:
         idle, period = memory.phase is Phase.IDLE, memory.period + 1
         estimate = memory.estimate if idle else self.finger.predict(memory.estimate)
         memory = memory._replace(period=period, estimate=estimate)
-        memory = self._observe(memory, touched) if touched.force.size else self._loss.wait(memory)
+        memory = self._observe(memory, touched) if touched.force.size else self.substitute.loss.wait(memory)
         return memory, self._surface.find_disc(memory)
 
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
@@ -238,7 +233,7 @@ class HybridControl:
         # Forces under the predicted fingertip are felt where they are more than their noise together.
         if not felt.size and not float(np.add.reduce(force.take(here))) > self.felt * math.sqrt(here.size):
             own[at.residual] = 0.0
-            waiting: Follower = self._loss.wait(memory)
+            waiting: Follower = self.substitute.loss.wait(memory)
             return waiting
         if memory.period % EVERY and self._holds(memory, float(np.add.reduce(force))):
             return memory if not memory.alone else memory._replace(alone=0)

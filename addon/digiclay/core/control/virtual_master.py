@@ -242,7 +242,7 @@ class VirtualMasterControl(BatchControl):
         """VM Locate: centroid of the forces near the master; at first touch, of all (equation 13); N, N m."""
         gains = self.parameters
         if total < gains.felt_force:
-            waiting: Master = self._loss.wait(master)
+            waiting: Master = self.loss.wait(master)
             return waiting
         if master.phase is not Phase.IDLE:
             if near >= gains.felt_force:
@@ -268,7 +268,7 @@ class VirtualMasterControl(BatchControl):
             edge = min(max(height, 0.0), self.actuator.stroke)
             master = master._replace(height=height, reference=height, edge=edge, felt=height)
         # What it rose in search of the fingertip is taken back, or every lift-off would leave a lump.
-        if self._loss.is_given_up(master.alone):
+        if self.loss.is_given_up(master.alone):
             return master._replace(height=master.felt)
         force += noise
         if force >= gains.force_setpoint:
@@ -306,7 +306,7 @@ class VirtualMasterControl(BatchControl):
         return master.edge, master.height, kind, beyond
 
     @cached_property
-    def _loss(self) -> LossRule:
+    def loss(self) -> LossRule:
         """When a fingertip is given up."""
         return LossRule(self.period, self.parameters.loss_time)
 

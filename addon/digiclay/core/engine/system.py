@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..model.control_interface import Controller
-from ..model.interfaces import Segment, Sensors, Stepper
+from ..model.interfaces import Movement, Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
 from ..model.touch import FingerPeriod
@@ -46,13 +46,16 @@ class System:
         """Move active cells through a control period under their queued commands, in place."""
         movement = active.movements.get(self.plan)
         if movement is None:
-            movement = self.stepper.prepare(self.plan, active.driven, active.near)
-            active.movements[self.plan] = movement
+            movement = active.movements[self.plan] = self.prepare(active)
         if finger and active.near:
             under = finger.under(active.touched.quadratic_basis)
         else:
             under = np.empty((self.instants.size, 0, *active.cells.shape[1:]))
         active.touched.force[:] = movement(under)
+
+    def prepare(self, active: ActiveSet) -> Movement:
+        """Prepare to move active cells as often as their set serves."""
+        return self.stepper.prepare(self.plan, active.driven, active.near)
 
 
 def make_segments(
