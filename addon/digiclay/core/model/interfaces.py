@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from ..base.arrays import Floats
 from .control_interface import Measurement
 from .delay import Queue
-
-if TYPE_CHECKING:
-    from .physics import Cell
 
 #: Moves a block of cells on by one control period, in place. It takes the underside of the fingertip over the
 #: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. Of
@@ -120,8 +117,8 @@ class Stepper(Protocol):
     def bridges(self) -> bool:
         """Whether a step may hold the instant at which a lagging valve goes over to the next command."""
 
-    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> Any:
-        """Compute once what all periods share, for a cell and the physics steps of a period."""
+    def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
+        """Compute once what all periods share, for a `physics.Cell` and the physics steps of a period."""
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
         """Prepare to move cells on, of which the finger may touch the first k, as often as their set serves.
