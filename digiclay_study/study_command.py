@@ -135,7 +135,7 @@ def _write(
     subject.write_table(out / "points.csv", [subject.unchanged, *points], records, LOSS)
     write_whole(out / "indices.csv", format_index_table(findings).encode())
     save(draw_indices(subject.keys, indices, f"Sobol indices, {subject.scene.name}"), out / PICTURE)
-    write_whole(out / "study.md", format_page(findings).encode())
+    write_whole(out / "study.md", ("\n".join(list_page(findings)) + "\n").encode())
     return [*_summarize(findings), *notes]
 
 
@@ -199,12 +199,8 @@ def format_index_table(findings: Findings) -> str:
     return format_csv(rows)
 
 
-def format_page(findings: Findings) -> str:
-    """Return the page of a study in Markdown."""
-    return "\n".join(_write_page(findings)) + "\n"
-
-
-def _write_page(findings: Findings) -> Iterator[str]:
+def list_page(findings: Findings) -> Iterator[str]:
+    """Give the lines of the page of a study in Markdown."""
     arguments, subject = findings.arguments, findings.subject
     yield f"# Sensitivity of {subject.scene.name}, digiclay {__version__}\n"
     yield f"    {_format_call(arguments, subject)}\n"
