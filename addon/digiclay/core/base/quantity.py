@@ -192,9 +192,8 @@ def parse(text: str, unit: str) -> float:
     value, name = float(read[1]), read[2]
     factor, si = UNITS.get(name, (0.0, ""))
     if not si:
-        raise ValueError(
-            f"must have a unit known here: {', '.join(k for k, v in UNITS.items() if v[1] == unit)}"
-        )
+        names = [key for key, (_, measured) in UNITS.items() if measured == unit]
+        raise ValueError(f"must have a unit known here: {', '.join(names)}")
     if si != unit:
         raise ValueError(f"must be in {unit or 'no unit'} or a multiple of it")
     return value * factor

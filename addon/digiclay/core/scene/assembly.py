@@ -72,6 +72,7 @@ def assemble(scene: Scene) -> System:
     bed = make_grid(scene.layout)
     controller, sensors, rows = _make_control(scene, bed, motion)
     fastest = find_speeds(motion.cell).rise
+    noisy = scene.sensors and scene.sensors.noisy
     return System(
         grid=bed,
         cell=motion.cell,
@@ -84,9 +85,7 @@ def assemble(scene: Scene) -> System:
         selection=Selection(bed, rows, motion.cell, period, fastest),
         instants=motion.instants,
         rows=rows,
-        by_set=bool(
-            (scene.sensors and scene.sensors.noisy) or (scene.control and find_method(scene.method).by_set)
-        ),
+        by_set=bool(noisy or (scene.control and find_method(scene.method).by_set)),
     )
 
 

@@ -151,9 +151,8 @@ def _forms_blister(method: str, own: Table) -> bool:
     """Return whether a method forms a blister; refuse a section [blister] where it does not."""
     formed = find_method(method).blister is not None
     if not formed and own:
-        raise ParameterError(
-            "blister", "", f"must be left out: the method {method} forms no blister", show_value(own)
-        )
+        rule = f"must be left out: the method {method} forms no blister"
+        raise ParameterError("blister", "", rule, show_value(own))
     return formed
 
 
@@ -170,9 +169,8 @@ def _read_path(owner: str, table: Any, rest_height: float) -> Path:
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             rule = "must be a list of tables such as {time = 0, position = [0, 0, 0.046]}"
             raise ParameterError(owner, "waypoints", rule, show_value(rows))
-        path = Path(
-            kind, tuple(_read_waypoint(f"{owner}.waypoints #{i}", row) for i, row in enumerate(rows, 1))
-        )
+        points = (_read_waypoint(f"{owner}.waypoints #{i}", row) for i, row in enumerate(rows, 1))
+        path = Path(kind, tuple(points))
     try:
         path.trajectory()
     except ParameterError as error:
@@ -244,9 +242,6 @@ def _write_path(section: str, path: Path) -> Iterator[str]:
     yield f"interpolation = {format_value(path.interpolation)}"
     yield "waypoints = ["
     for point in path.waypoints:
-        pairs = (
-            f"{field.name} = {format_value(getattr(point, field.name))}"
-            for field in dataclasses.fields(point)
-        )
+        pairs = (f"{name} = {format_value(value)}" for name, value in vars(point).items())
         yield f"  {{ {', '.join(pairs)} }},"
     yield "]"

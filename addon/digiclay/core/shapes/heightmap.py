@@ -113,10 +113,8 @@ def read_pixels(path: Path) -> Pixels:
     try:
         image: Any = importlib.import_module("PIL.Image")
     except ImportError:
-        rule, hint = (
-            "must be a mesh or an array where Pillow is not installed",
-            "Run 'pip install digiclay[images]'.",
-        )
+        rule = "must be a mesh or an array where Pillow is not installed"
+        hint = "Run 'pip install digiclay[images]'."
         raise ParameterError("shape", "file", rule, str(path), hint) from None
     image.init()  # formats that are named are not looked for
     with warnings.catch_warnings():

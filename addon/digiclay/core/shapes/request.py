@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..base.arrays import Flags, Floats
 from ..base.errors import ParameterError
@@ -21,6 +21,8 @@ UPWARDS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "-x": ((2, 1, 0), (1, 1, -1)),
 }
 AUTO = "auto"
+#: Unit and bounds of a length that places a shape.
+LENGTH: dict[str, Any] = {"unit": "m", "at_least": -100.0, "at_most": 100.0}
 
 
 @dataclass(frozen=True)
@@ -35,27 +37,17 @@ class Shape(Parameters):
         choices=("contain", "cover", "stretch", "actual", "placed"),
     )
     scale: float = quantity(1.0, "scale of the plan", above=0.0, at_most=1e6)
-    x: float = quantity(
-        0.0, "shift of the middle from that of the bed", unit="m", symbol="x_s",
-        at_least=-100.0, at_most=100.0,
-    )  # fmt: skip
-    y: float = quantity(
-        0.0, "shift of the middle from that of the bed", unit="m", symbol="y_s",
-        at_least=-100.0, at_most=100.0,
-    )  # fmt: skip
+    x: float = quantity(0.0, "shift of the middle from that of the bed", symbol="x_s", **LENGTH)
+    y: float = quantity(0.0, "shift of the middle from that of the bed", symbol="y_s", **LENGTH)
     relief: str = quantity(
         "rise",
         "height: `rise`, up to the end of the stroke, or in proportion to the plan",
         choices=("rise", "stroke", "true"),
     )
     rise: float = quantity(
-        15e-3, "lowest to highest point; a negative value inverts the shape", unit="m", symbol="h_r",
-        at_least=-100.0, at_most=100.0,
-    )  # fmt: skip
-    foot: float = quantity(
-        0.0, "lowest point above the bed at rest", unit="m", symbol="h_f",
-        at_least=-100.0, at_most=100.0,
-    )  # fmt: skip
+        15e-3, "lowest to highest point; a negative value inverts the shape", symbol="h_r", **LENGTH
+    )
+    foot: float = quantity(0.0, "lowest point above the bed at rest", symbol="h_f", **LENGTH)
     up: str = quantity(AUTO, "upward direction of a mesh", choices=(AUTO, *UPWARDS))
     unit: str = quantity(AUTO, "unit of length of a mesh", choices=(AUTO, *LENGTHS))
     refresh: str = quantity(

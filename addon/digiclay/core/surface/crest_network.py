@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats, Indices
+from ..base.arrays import Flags, Floats, Indices
 from .regions import label_components
 
 #: From so many half widths to so many from a junction a branch shows where it goes.
@@ -36,6 +35,8 @@ class Branch:
 
 #: A branch's end: its number, and 0 for the first point or 1 for the last.
 End = tuple[int, int]
+#: Which end of a branch continues in which, and the points in between.
+Joints = dict[End, tuple[End, Floats]]
 
 
 @dataclass(eq=False)
@@ -232,7 +233,7 @@ def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:
                     network.branches[max(network.branches, default=0) + 1] = Branch([node, free], part)
 
 
-def find_stretch(there: NDArray[np.bool_], at: int) -> tuple[int, int]:
+def find_stretch(there: Flags, at: int) -> tuple[int, int]:
     """Return the first and the last of the places about one that all are `there`."""
     out = np.flatnonzero(~there)
     before, after = out[out < at], out[out > at]
@@ -285,9 +286,9 @@ def _join_through(network: Network) -> None:
             network.branches[one[0]] = Branch(nodes, points)
 
 
-def _joints(network: Network) -> dict[End, tuple[End, Floats]]:
+def _joints(network: Network) -> Joints:
     """Return which end of a branch continues in which, and the points in between."""
-    joints: dict[End, tuple[End, Floats]] = {}
+    joints: Joints = {}
     nothing = np.empty((0, 2))
     for number in list(network.branches):
         _share(network, number, joints)
@@ -329,7 +330,7 @@ def _meeting(network: Network, one: End, two: End) -> Floats | None:
     return first + away[0] * sides[:, 0] if away.max() < 0.0 else None
 
 
-def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]]) -> None:
+def _share(network: Network, number: int, joints: Joints) -> None:
     """Let two lines run together along a branch when two at each of its ends go on into it."""
     branch = network.branches[number]
     one, two = branch.nodes
@@ -354,9 +355,7 @@ def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]])
     del network.branches[number]
 
 
-def _assembled(
-    network: Network, joints: dict[End, tuple[End, Floats]], junctions: frozenset[int]
-) -> Iterable[Chain]:
+def _assembled(network: Network, joints: Joints, junctions: frozenset[int]) -> Iterable[Chain]:
     """Give the lines that the branches make."""
     free = [(k, e) for k in network.branches for e in (0, 1) if (k, e) not in joints]
     used: set[int] = set()
@@ -380,7 +379,7 @@ def _assembled(
         yield Chain(np.concatenate(parts), closed, (joined[0], joined[1]), junctions & nodes)
 
 
-def _without_nodes(network: Network, end: End, joints: dict[End, tuple[End, Floats]]) -> Floats:
+def _without_nodes(network: Network, end: End, joints: Joints) -> Floats:
     """Return the points of a branch from one end on, without those in the junctions it runs through."""
     points, branch = network.away(end), network.branches[end[0]]
     kept = np.ones(len(points), bool)

@@ -154,11 +154,8 @@ def _is_simple(code: int, ways: int) -> bool:
 _SIMPLE = {ways: [_is_simple(code, ways) for code in range(1 << ways)] for ways in (6, 8)}
 #: How many neighbors the end of a line has with these bits, one or two side by side; 0 where it is no end.
 _ENDS = {
-    ways: [
-        code.bit_count() if code.bit_count() < 3 and _is_simple(code, ways) else 0
-        for code in range(1 << ways)
-    ]
-    for ways in (6, 8)
+    ways: [code.bit_count() if simple and code.bit_count() < 3 else 0 for code, simple in enumerate(table)]
+    for ways, table in _SIMPLE.items()
 }
 #: Steps to the neighbors, x + i y, in pitches.
 _STEPS = {

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Faces, Floats
+from ..base.arrays import Faces, Flags, Floats
 from ..base.spline import interpolate_monotone
 from .formed import NO_PIN, Formed, make_skin
 
@@ -54,9 +54,7 @@ def relax_membrane(formed: Formed, position: Floats, start: Floats, parts: int, 
     return height.reshape(start.shape)
 
 
-def _laid(
-    formed: Formed, position: Floats, start: Floats, parts: int, cap: float
-) -> tuple[Floats, NDArray[np.bool_]]:
+def _laid(formed: Formed, position: Floats, start: Floats, parts: int, cap: float) -> tuple[Floats, Flags]:
     """Return heights with every end of a pin level, and which points no pin carries."""
     height, free = start.copy(), np.ones(start.shape, bool)
     pins = position[::parts, ::parts]
