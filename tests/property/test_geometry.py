@@ -86,7 +86,6 @@ unit = st.floats(-1.0, 1.0)
 turns = st.tuples(unit, unit, unit, unit).filter(lambda q: np.hypot.reduce(q) > 0.1)
 spots = st.tuples(st.floats(-30e-3, 30e-3), st.floats(-30e-3, 30e-3), st.floats(0.0, 60e-3))
 peaks = st.floats(0.0, 0.1)
-Spot = tuple[float, ...]
 
 
 def pose(spot: tuple[float, ...], turn: tuple[float, ...]) -> Floats:

@@ -125,6 +125,7 @@ def assert_withstands(
 @given(jumps, turns, beds, parts, st.sampled_from(PERIODS), STEPPERS)
 @example(SIDEWAYS, LEVEL, Layout(13, 13), {}, 5e-3, "bernoulli")
 @example(DOWN, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
+@example(UP, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
 def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
     spots: list[Spot], turn: tuple[float, ...], bed: Layout, changes: dict[str, object], period: float,
     stepper: str,

@@ -132,10 +132,8 @@ def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: di
 PERIODS = 120
 BED = make_system(Layout(9, 9), control=VirtualMaster())
 
-#: Millimeters, to the tenth.
-near = st.integers(-120, 120).map(lambda tenths: tenths / 10)
 visits = st.lists(
-    st.tuples(near, near, st.integers(330, 550).map(lambda tenths: tenths / 10)), min_size=4, max_size=7
+    st.tuples(xy, xy, st.integers(330, 550).map(lambda tenths: tenths / 10)), min_size=4, max_size=7
 )
 
 
@@ -211,11 +209,8 @@ WAYPOINTS = np.array(
         (1.4, 4.4, -1.7, 60.0, 0.95, -0.1, 0.2, 0.2),
     ]
 )  # fmt: skip
-MOVED = 260
-
-
 #: A press in the middle of the bed, of the waypoints.
-MIDDLE = [1, 0, 0, 1, 1, 0, 0, 0]
+MIDDLE = WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0]
 #: What a mirror across x, or across y, makes of a waypoint.
 MIRRORED_X, MIRRORED_Y = np.array([1, -1, 1, 1, 1, 1, -1, -1]), np.array([1, 1, -1, 1, 1, -1, 1, -1])
 
@@ -245,7 +240,7 @@ def formed(arrangement: str, shape: tuple[int, int], points: Floats, profile: st
     system = make_system(
         Layout(*shape, 3e-3, arrangement), control=VirtualMaster(), blister=Blister(profile=profile)
     )
-    run = record(system, Trajectory(points[:, 0], points[:, 1:4] * 1e-3, points[:, 4:]), MOVED)
+    run = record(system, Trajectory(points[:, 0], points[:, 1:4] * 1e-3, points[:, 4:]), 260)
     return run.height.reshape(-1, *shape), run.force.reshape(-1, *shape)
 
 
@@ -255,10 +250,7 @@ def formed(arrangement: str, shape: tuple[int, int], points: Floats, profile: st
         *((case, WAYPOINTS, "cone") for case in CASES if case != "mirrored, odd"),
         ("mirrored", WAYPOINTS, "gaussian"),
         # A press on a cell in the middle: cells lie exactly on the circles of the control here.
-        *(
-            ("mirrored, odd", WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0], profile)
-            for profile in ("cone", "gaussian")
-        ),
+        *(("mirrored, odd", MIDDLE, profile) for profile in ("cone", "gaussian")),
     ],
 )
 def test_a_moved_scene_gives_the_moved_result(case: str, points: Floats, profile: str) -> None:
