@@ -155,7 +155,7 @@ def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(profile, distance
 def test_the_disc_reaches_farther_than_pins_are_led_and_holds_those_led_before() -> None:
     assert LEAD.find_reach(15e-3, 40e-3) == pytest.approx(7.5e-3 + 30e-3)
     assert LEAD.find_reach(-10e-3, 40e-3) == pytest.approx(7.5e-3 + 20e-3)
-    blister = LedBlister(Blister(), BlisterRule(Blister(), -0.05, 0.02, 1e-3), SKIRT, 10e-3)
+    blister = LedBlister(BlisterRule(Blister(), -0.05, 0.02, 1e-3), SKIRT, 10e-3)
     memory = Follower(Phase.SHAPING, top=50e-3, edge=40e-3)
     # 10 mm above the surface the skirt leads pins 20 mm around the level ring, 2 mm more are commanded.
     assert blister.find_disc(memory) == pytest.approx((0.0, 0.0, 29.5e-3))

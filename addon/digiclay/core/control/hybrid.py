@@ -171,7 +171,7 @@ class HybridControl:
         """Blister and the pins led ahead of it."""
         release = max(self.parameters.release_force, self.felt)
         rule = BlisterRule(self.blister, self.parameters.behind, release, self.felt)
-        return LedBlister(self.blister, rule, self.profile, self.servo.ahead)
+        return LedBlister(rule, self.profile, self.servo.ahead)
 
     @cached_property
     def _limits(self) -> Constants:

@@ -12,7 +12,7 @@ from ..base.arrays import Floats, Modes, count_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
-from .blister import Blister, BlisterCells, BlisterRule
+from .blister import BlisterCells, BlisterRule
 from .finger_estimate import STATES, Estimate
 from .ground import EdgeGround, raise_blister
 from .travel import Heading
@@ -107,7 +107,6 @@ class Region(NamedTuple):
 class LedBlister:
     """Blister that is led; `ahead`: time over which the fingertip is predicted, s."""
 
-    blister: Blister
     rule: BlisterRule
     profile: LeadProfile
     ahead: float
@@ -119,7 +118,7 @@ class LedBlister:
             return led if memory.led_radius else None
         x, y, _, vx, vy, *_ = memory.estimate.mean.tolist()
         reach = self.profile.find_reach(memory.top - memory.edge, math.hypot(vx, vy))
-        disc = (x, y, max(self.blister.edge_radius, reach) + MARGIN)
+        disc = (x, y, max(self.rule.blister.edge_radius, reach) + MARGIN)
         return enclose_discs(disc, led) if memory.led_radius else disc
 
     def survey(self, memory: Follower, basis: Floats, left: Floats) -> Region:
