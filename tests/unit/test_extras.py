@@ -17,7 +17,7 @@ from digiclay.commands import run as run_command
 from digiclay.commands.run import plan_meshes
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session.finished_run import find_row
-from digiclay.core.session.run_scene import RunRecording
+from digiclay.core.session.run_scene import Result, RunRecording
 
 from tests.scene_files import left
 
@@ -103,7 +103,7 @@ def test_plot_writes_into_a_folder_and_prints_its_files(here, capsys):
 
 
 def test_a_run_stopped_before_its_errors_are_estimated_says_so(here: Path, stopped: Any) -> None:
-    commands = stopped(run_command, "estimate_errors", "run", "my.toml")
+    commands = stopped(Result, "estimate_errors", "run", "my.toml")
     assert list(commands) == ["its errors were estimated"]
     assert "height_error" not in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
     assert main(commands["its errors were estimated"]) == 0

@@ -26,7 +26,6 @@ from ..core.files.run_folder import (
 )
 from ..core.scene.scene_source import load, load_recorded
 from ..core.scene.schema import Scene
-from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.finished_run import Run, has_files, is_whole, read_run
 from ..core.session.render_settings import format_range, list_missing, name_frame, read_range
 from ..core.session.run_scene import run, save
@@ -215,11 +214,10 @@ class Work:
                 raise KeyboardInterrupt
         if outputs.errors:
             with step("errors") as progress:
-                if has_every_command(scene):
-                    errors = estimate_errors(scene, result.history, progress=progress, stopped=stopped)
-                    if errors is None:
-                        raise KeyboardInterrupt
-                    result = result.with_errors(errors)
+                judged = result.estimate_errors(progress, stopped)
+                if judged is None:
+                    raise KeyboardInterrupt
+                result = judged
         with step("save"):
             save(result, out)
         history = result.history

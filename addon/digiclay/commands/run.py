@@ -18,7 +18,6 @@ from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
 from ..core.files.run_folder import Claim, claim_folder, find_name
 from ..core.scene.schema import Scene
-from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import History, Result, run, save
 from ..core.studies.omissions import Fitted, find_omissions
 from ..plugins.method_loader import describe_origin, write_code
@@ -117,13 +116,16 @@ def carry_out(arguments: argparse.Namespace) -> int:
             scene = fit.scene
         with Stop() as stop:
             result = simulate(arguments, scene, path, stop)
-            unjudged = False
+            judged: Result | None = result
             if not arguments.no_errors:
-                result, unjudged = _evaluate(result, stop, quiet=arguments.quiet)
+                period = scene.simulation.control_period
+                with Bar(sys.stderr, "errors", period, quiet=arguments.quiet) as bar:
+                    judged = result.estimate_errors(bar, stop)
+                result = judged or result
             if fit:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
             extras = _plan_extras(arguments, result)
-            return write_run(arguments, claim, result, extras, stop, unjudged=unjudged)
+            return write_run(arguments, claim, result, extras, stop, unjudged=judged is None)
 
 
 def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
@@ -139,15 +141,6 @@ def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
         refuse_without("--plots", "plots", "matplotlib")
     if arguments.render:
         refuse_without_blender()
-
-
-def _evaluate(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
-    """Return the result with its errors, where they can be estimated, and whether a stop left them out."""
-    if result.incomplete or not has_every_command(result.scene):
-        return result, False
-    with Bar(sys.stderr, "errors", result.scene.simulation.control_period, quiet=quiet) as bar:
-        errors = estimate_errors(result.scene, result.history, progress=bar, stopped=stop)
-    return (result.with_errors(errors), False) if errors else (result, True)
 
 
 def _plan_extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:

@@ -25,7 +25,7 @@ from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT, format_scene
-from .accuracy import Errors
+from .accuracy import Errors, estimate_errors, has_every_command
 from .memory_limit import check_memory
 
 History = dict[str, NDArray[Any]]
@@ -80,6 +80,17 @@ class Result:
         added = {f"{name}_error": value for name, value in asdict(errors).items()}
         units = {name: ERRORS[name].unit for name in added}
         return replace(self, metrics={**self.metrics, **added, "units": {**self.metrics["units"], **units}})
+
+    def estimate_errors(
+        self,
+        progress: Callable[[int, int], None] | None = None,
+        stopped: Callable[[], bool] | None = None,
+    ) -> Result | None:
+        """Return the result with its errors, as it is where they cannot be estimated; None when `stopped`."""
+        if self.incomplete or not has_every_command(self.scene):
+            return self
+        errors = estimate_errors(self.scene, self.history, progress=progress, stopped=stopped)
+        return self.with_errors(errors) if errors else None
 
 
 class Ended(NamedTuple):

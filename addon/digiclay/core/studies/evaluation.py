@@ -14,7 +14,7 @@ from ..batch.packing import Findings, describe_structure
 from ..batch.run_together import measure_together
 from ..metrics.metric_table import ERRORS, METRICS, RUN
 from ..scene.schema import Scene
-from ..session.accuracy import estimate_errors, has_every_command, make_reference
+from ..session.accuracy import make_reference
 from ..session.run_scene import Result, run
 from .axes import Measure, Point, Record
 from .series import Results, describe_error
@@ -150,15 +150,12 @@ def evaluate(
     try:
         if measure is not None:
             return measure(scene, stopped)
-        result = run(scene, stopped=stopped)
-        if errors and not result.incomplete and has_every_command(scene):
-            estimated = estimate_errors(scene, result.history, stopped=stopped)
-            if estimated is None:
-                return None
-            result = result.with_errors(estimated)
+        result: Result | None = run(scene, stopped=stopped)
+        if errors:
+            result = result.estimate_errors(stopped=stopped)
     except Exception as error:  # the other points are independent of this failure
         return {"error": describe_error(error)}
-    return None if result.incomplete else _make_record(result, errors=errors)
+    return None if result is None or result.incomplete else _make_record(result, errors=errors)
 
 
 def _make_record(result: Result, *, errors: bool) -> Record:
