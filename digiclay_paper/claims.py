@@ -62,9 +62,9 @@ CLAIMS: tuple[tuple[Callable[[Results], Evidence], str, str], ...] = (
 
 def claims(results: Results) -> list[Claim]:
     """Return all claims, in the order of the paper."""
-    slow, radius, found = results.slowness.lstrip(","), f"{evidence.find_radius(results) * MM:g}", []
+    slow, radius, judged = results.slowness.lstrip(","), f"{evidence.find_radius(results) * MM:g}", []
     for judge, printed, beginning in CLAIMS:
         shown = judge(results)
         measured = beginning.format(slow=slow, radius=radius) + shown.measured
-        found.append(Claim(printed, measured, shown.verdict, shown.why))
-    return found
+        judged.append(Claim(printed, measured, shown.verdict, shown.why))
+    return judged

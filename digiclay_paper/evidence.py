@@ -62,9 +62,9 @@ class Evidence:
         return "differs" if not any(self.holds) else "holds" if all(self.holds) else "holds in part"
 
 
-def _of_paper(found: Mapping[tuple[str, str], Value]) -> Iterator[tuple[str, str, Value]]:
+def _of_paper(values: Mapping[tuple[str, str], Value]) -> Iterator[tuple[str, str, Value]]:
     """Yield method, name of the trajectory and value of the paper's methods, without Method III's."""
-    return ((method, name, value) for (method, name), value in found.items() if method in METHODS)
+    return ((method, name, value) for (method, name), value in values.items() if method in METHODS)
 
 
 def speed(limit: float | None) -> str:

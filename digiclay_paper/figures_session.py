@@ -146,19 +146,19 @@ def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, 
 
 def profiles(results: Results) -> Any:
     """Draw sections through the final surfaces, formed and asked for."""
-    found = {method: list(sections(results.session[method])) for method in list_methods(results.session)}
-    count = len(found[METHODS[0]])
+    drawn = {method: list(sections(results.session[method])) for method in list_methods(results.session)}
+    count = len(drawn[METHODS[0]])
     with canvas(13.5, 8.6, f"Sections. The paper's session{results.slowness}") as (figure, place):
         for number in range(count):
             row, column = divmod(number, 3)
             axes = place(f"section {number}", 0.85 + 4.38 * column, 4.55 - 3.85 * row, 3.5, 2.7)
-            for method, color, marker in zip(found, LINES, "os^", strict=False):
-                one = found[method][number]
+            for method, color, marker in zip(drawn, LINES, "os^", strict=False):
+                one = drawn[method][number]
                 name = NAMES[method].split(",")[0]
                 asked: dict[str, Any] = {"color": color, "linewidth": 1.1, "linestyle": DASHES}
                 axes.plot(one.along * MM, one.asked * MM, label=f"{name}, asked for", **asked)
                 axes.plot(
-                    one.along * MM, one.found * MM, color=color, marker=marker, markersize=4.5, label=name
+                    one.along * MM, one.formed * MM, color=color, marker=marker, markersize=4.5, label=name
                 )
             axes.set(title=one.name, xlabel="y (mm)" if one.name.startswith("across") else "x (mm)")
             axes.set_ylabel("height over rest (mm)")

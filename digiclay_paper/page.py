@@ -22,7 +22,7 @@ from .paper_figures import curves, letter, list_methods, table
 from .relief_sections import LIMITS, sections
 from .results import PAPER_SPEED, WAYS, Extent, Results
 from .scenes import NAMES, THIRD
-from .simulations import Told, simulate
+from .simulations import Announce, simulate
 
 #: Metrics of the session: key, name, factor and unit.
 METRICS = (
@@ -81,7 +81,7 @@ CHAIN = (
 
 
 def list_lines(
-    results: Results, found: list[Claim], pictures: Mapping[str, str], took: float, version: str
+    results: Results, judged: list[Claim], pictures: Mapping[str, str], took: float, version: str
 ) -> Iterator[str]:
     """Give the lines of the page; `pictures`: files' names to captions; `took`: time of simulations, s."""
     yield "# The paper's results, and ours\n"
@@ -99,7 +99,7 @@ def list_lines(
     yield "## Claims\n"
     yield "| The paper | Measured here | | Remarks |"
     yield "| --- | --- | --- | --- |"
-    for claim in found:
+    for claim in judged:
         measured = claim.measured.replace("; ", ";<br>")
         yield f"| {claim.printed} | {measured} | **{claim.verdict}** | {claim.why} |"
     yield "\n## Figures\n"
@@ -173,16 +173,16 @@ FIGURES: tuple[tuple[str, str, Callable[[Results], Any]], ...] = (
 )  # fmt: skip
 
 
-def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
+def produce(folder: Path, extent: Extent, announce: Announce) -> list[str]:
     """Simulate, draw and write into an existing folder; return the claims' verdicts as lines."""
     started = time.perf_counter()
-    results = simulate(extent, told)
+    results = simulate(extent, announce)
     took = time.perf_counter() - started
     captions = {}
     for name, caption, draw in FIGURES:
         if name == OWN_TIMES and not results.slowness:
             continue
-        told(f"drawing {name}")
+        announce(f"drawing {name}")
         picture = draw(results)
         if name == SURFACES:
             rows = table(figures_session.surface_rows(results.session), ("method", *"xy", "height (mm)"))
@@ -192,11 +192,11 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
         save(picture, folder / f"{name}.svg")
         write_whole(folder / f"{name}.csv", rows.encode())
         captions[name] = caption.format(slow=results.slowness)
-    found = claims(results)
-    lines = list_lines(results, found, captions, took, __version__)
+    judged = claims(results)
+    lines = list_lines(results, judged, captions, took, __version__)
     write_whole(folder / "paper.md", "".join(f"{line}\n" for line in lines).encode())
     write_whole(folder / "metrics.json", format_json(_numbers(results)))
-    return [f"{claim.verdict:14} {claim.printed}" for claim in found]
+    return [f"{claim.verdict:14} {claim.printed}" for claim in judged]
 
 
 def _numbers(results: Results) -> dict[str, Any]:

@@ -267,26 +267,26 @@ def variants(results: Results) -> Any:
 def _rise(axes: Any, results: Results) -> None:
     names = [name for variant, _, name in results.dragged if variant == NO_RISE]
     for number, (variant, called) in enumerate(((AS_IT_IS, "with the rise"), (NO_RISE, "without"))):
-        found = [results.dragged[variant, METHODS[1], name] for name in names]
-        _across(axes, names, [one.force for one in found], number, called)
+        values = [results.dragged[variant, METHODS[1], name] for name in names]
+        _across(axes, names, [one.force for one in values], number, called)
     axes.set(xlabel="mean total force (N)", title=f"Method II, drags at {PAPER_SPEED * MM:g} mm/s")
     axes.set_xlim(0.0, 1.55 * max(line.get_xdata().max() for line in axes.get_lines()))
     axes.legend(loc="center right", borderaxespad=0.0)
 
 
 def _ahead(axes: Any, results: Results) -> None:
-    found = {
+    values = {
         (method, name): one.ahead * MM
         for (variant, method, name), one in results.dragged.items()
         if variant == AS_IT_IS and one.ahead is not None and "ridge" not in name
     }
-    names = list(dict.fromkeys(name for _, name in found))
+    names = list(dict.fromkeys(name for _, name in values))
     for number, (method, called) in enumerate(zip(METHODS, ("Method I", "Method II"), strict=True)):
-        _across(axes, names, [found.get((method, name), np.nan) for name in names], number, called)
+        _across(axes, names, [values.get((method, name), np.nan) for name in names], number, called)
     near, far = (f"{one * MM:g}" for one in AHEAD)
     axes.axvline(0.0, **DASHED)
     axes.set(xlabel="height over the bed at rest (mm)", title=f"Cells {near} to {far} mm ahead")
-    lowest, highest = min(found.values()), max(found.values())
+    lowest, highest = min(values.values()), max(values.values())
     axes.set_xlim(1.15 * lowest, max(-0.1 * lowest, 1.5 * highest))
     axes.legend(loc="upper left", borderaxespad=0.0)
 

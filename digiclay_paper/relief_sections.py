@@ -57,10 +57,10 @@ class Section(NamedTuple):
     """Boss or crease it belongs to: ridge, mound or valley."""
     along: Floats
     """(k,): Where its cells are on its line, m."""
-    found: Floats
+    formed: Floats
     asked: Floats
     """(k,): Heights over the bed at rest, m: formed, and asked for. `asked` is scaled so that in the middle
-    it is as high as `found`: how deep the pins press into the fingertip is no matter of shape."""
+    it is as high as `formed`: how deep the pins press into the fingertip is no matter of shape."""
     level: float
     """By how much it was higher there than it had been asked for, m; in a crease: lower."""
     middle: float
@@ -78,12 +78,12 @@ class Section(NamedTuple):
     @property
     def rms(self) -> float:
         """Root mean square deviation, m."""
-        return float(np.sqrt(np.mean((self.found - self.asked) ** 2)))
+        return float(np.sqrt(np.mean((self.formed - self.asked) ** 2)))
 
     @property
     def largest(self) -> float:
         """Largest deviation, m."""
-        return float(np.abs(self.found - self.asked).max())
+        return float(np.abs(self.formed - self.asked).max())
 
     def meets(self, limits: Limits) -> bool:
         """Return whether the section has the shape asked for."""
@@ -104,7 +104,7 @@ def asked_for(session: Session) -> Floats:
 def sections(session: Session) -> Iterator[Section]:
     """Give the sections along and across ridge, mound and valley."""
     place, scene = session.history["position"], session.scene
-    found, asked = session.history["height"][-1] - scene.actuator.rest_height, asked_for(session)
+    formed, asked = session.history["height"][-1] - scene.actuator.rest_height, asked_for(session)
     x, y = place.T
     near, far = y < 0.0, y > 0.0
     slant = (x - END) - (y - RIDGE)
@@ -123,10 +123,10 @@ def sections(session: Session) -> Iterator[Section]:
     for name, part, cells, where, middle in lines:
         if np.any(cells) and np.any(middle):
             sign = -1.0 if part == "valley" else 1.0
-            high, wanted = (float(np.median(sign * heights[middle])) for heights in (found, asked))
-            scale, rim = high / wanted if wanted else 1.0, float((sign * found)[cells].max()) - high
-            drawn, pins = scale * asked[cells], float((sign * found)[parts[part]].max()) - high
-            yield Section(name, part, where[cells], found[cells], drawn, high - wanted, wanted, rim, pins)
+            high, wanted = (float(np.median(sign * heights[middle])) for heights in (formed, asked))
+            scale, rim = high / wanted if wanted else 1.0, float((sign * formed)[cells].max()) - high
+            drawn, pins = scale * asked[cells], float((sign * formed)[parts[part]].max()) - high
+            yield Section(name, part, where[cells], formed[cells], drawn, high - wanted, wanted, rim, pins)
 
 
 def blister_section(done: Result) -> Section:
@@ -138,9 +138,9 @@ def blister_section(done: Result) -> Section:
     following = np.count_nonzero(history["mode"][-1:] == Mode.FORCE_FOLLOW, axis=1)
     distance = np.hypot(*(place - tip[:2]).T) - measure_reach(scene, place, following)
     wanted, sign = float(tip[2]) - rest, 1.0 if tip[2] > rest else -1.0
-    found, middle = history["height"][-1] - rest, int(np.argmin(np.hypot(*(place - tip[:2]).T)))
-    asked = evaluate_share(scene.blister, distance)[row] * found[middle]
-    high = sign * float(found[middle])
-    rim, pins = (float((sign * cells).max()) - high for cells in (found[row], found))
+    formed, middle = history["height"][-1] - rest, int(np.argmin(np.hypot(*(place - tip[:2]).T)))
+    asked = evaluate_share(scene.blister, distance)[row] * formed[middle]
+    high = sign * float(formed[middle])
+    rim, pins = (float((sign * cells).max()) - high for cells in (formed[row], formed))
     level, wanted = high - sign * wanted, sign * wanted
-    return Section("blister", "blister", place[row, 0], found[row], asked, level, wanted, rim, pins)
+    return Section("blister", "blister", place[row, 0], formed[row], asked, level, wanted, rim, pins)

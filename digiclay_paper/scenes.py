@@ -74,8 +74,8 @@ def at_rest(noise: float, radius: float | None = None) -> Scene:
 
     `noise`: standard deviation of a cell's force sensor, N; `radius`: r_VM, m.
     """
-    known = {} if radius is None else {"radius": radius}
-    table = _table("virtual_master", 13, known, {}) | {"sensors": {"force_noise": noise}}
+    blister = {} if radius is None else {"radius": radius}
+    table = _table("virtual_master", 13, blister, {}) | {"sensors": {"force_noise": noise}}
     return _with_path(resolve(table), [(0.0, 2e-3), (1.2, -4e-3), (3.2, -4e-3)])
 
 
@@ -89,12 +89,12 @@ def _table(
     }
 
 
-def _with_path(found: Scene, points: list[tuple[float, float]]) -> Scene:
+def _with_path(scene: Scene, points: list[tuple[float, float]]) -> Scene:
     """Return a scene with another path."""
-    rest, first = found.actuator.rest_height, found.section("trajectory").waypoints[0]
+    rest, first = scene.actuator.rest_height, scene.section("trajectory").waypoints[0]
     way = tuple(replace(first, time=t, position=(0.0, 0.0, rest + z)) for t, z in points)
-    lasting = replace(found.simulation, duration=0.0)
-    return found.with_sections(trajectory=Path("smooth", way), simulation=lasting)
+    lasting = replace(scene.simulation, duration=0.0)
+    return scene.with_sections(trajectory=Path("smooth", way), simulation=lasting)
 
 
 def slowed(session: Scene, factor: float) -> Scene:

@@ -69,15 +69,15 @@ def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:
     weight, wanted = compute_weights(time), find_set_point(done.scene.set_point, sums.following)
     above = np.full(len(time), np.nan)
     above[sums.touching] = measure_surface_under(sums, done.history["fingertip"])
-    found = {}
+    windows = {}
     for name, spans in WINDOWS.items():
         rows = sums.shaping & np.any([(time >= start) & (time <= end) for start, end in spans], axis=0)
-        found[name] = {
+        windows[name] = {
             "rfd": compute_rfd(time, sums.total, wanted, rows),
             "force_deviation": compute_deviation(sums.total[rows], weight[rows]),
             "height_deviation": compute_deviation(above[rows], weight[rows]),
         }
-    return found
+    return windows
 
 
 NO_RISE, STAGGERED, GAUSSIAN = "without the rise", "staggered", "gaussian"
@@ -92,18 +92,18 @@ EVERYWHERE = 1.0
 #: Control periods at the end in which the place of the fingertip is looked at.
 STILL = 300
 
-Told = Callable[[str], None]
+Announce = Callable[[str], None]
 
 
-def vary(results: Results, extent: Extent, told: Told) -> None:
+def vary(results: Results, extent: Extent, announce: Announce) -> None:
     """Run the drags of every variant, and locate a fingertip under noise."""
     for variant, (setting, methods) in VARIANTS.items():
         for method in methods:
             for name in extent.ways:
-                told(f"drag {variant}, {name}, {method}")
+                announce(f"drag {variant}, {name}, {method}")
                 results.dragged[variant, method, name] = dragged(_load(method, setting), WAYS[name])[0]
     for noise in extent.noises:
-        told(f"finger located under a noise of {noise * 1e3:g} mN")
+        announce(f"finger located under a noise of {noise * 1e3:g} mN")
         for thresholds in (False, True):
             for radius in (None, EVERYWHERE):
                 results.located.append(located(noise, radius, thresholds=thresholds))
@@ -122,11 +122,11 @@ def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragge
     seen = (away >= AHEAD[0]) & (away < AHEAD[1]) & (part["force"][:, line] == 0.0)
     seen &= place[line, 0] < 0.5 * way.length + AHEAD[0]
     over = part["height"][:, line] - scene.actuator.rest_height
-    found = Dragged(
+    measured = Dragged(
         follows, float(total.mean()), float(total.std()), float(following.mean()),
         done.figures["ridge_unevenness"], float(over[seen].mean()) if np.any(seen) else None,
     )  # fmt: skip
-    return found, done
+    return measured, done
 
 
 def located(noise: float, radius: float | None, *, thresholds: bool) -> Located:
@@ -159,104 +159,104 @@ WATCHED = 1.0
 THINNED, DETAIL = 4, 5.0
 
 
-def simulate(extent: Extent, told: Told) -> Results:
-    """Simulate all of it; `told` hears what comes next, and may raise KeyboardInterrupt."""
+def simulate(extent: Extent, announce: Announce) -> Results:
+    """Simulate all of it; `announce` hears what comes next, and may raise KeyboardInterrupt."""
     results = Results()
     for method in METHODS:
-        _form_blisters(results, method, told)
+        _form_blisters(results, method, announce)
     for method in METHODS:
-        _track(results, method, extent, told)
-    sessions(results, told)
+        _track(results, method, extent, announce)
+    sessions(results, announce)
     for position_gain, gain in product(extent.position_gains, extent.gains):
-        told(f"oscillation, K_p {position_gain:g} 1/m, K_f {gain:g} 1/N")
-        found, done, quick = _swing(gain, position_gain)
-        results.swings.append(found)
+        announce(f"oscillation, K_p {position_gain:g} 1/m, K_f {gain:g} 1/N")
+        swing, done, quick = _swing(gain, position_gain)
+        results.swings.append(swing)
         results.details[gain, position_gain] = done.history["time"] - quick, done.history["total_force"]
     for gain in extent.gains:
-        told(f"oscillation, a quicker device, K_f {gain:g} 1/N")
-        found, done, _ = _swing(gain, extent.position_gains[0], QUICKER)
-        results.quicker.append(found)
+        announce(f"oscillation, a quicker device, K_f {gain:g} 1/N")
+        swing, done, _ = _swing(gain, extent.position_gains[0], QUICKER)
+        results.quicker.append(swing)
         results.quicker_speed = find_free_speed(done.scene)
     for gain in extent.cell_gains:
-        told(f"oscillation, Method II, K_FF {gain:g} 1/N")
+        announce(f"oscillation, Method II, K_FF {gain:g} 1/N")
         results.cell_swings.append(_swing(gain, extent.position_gains[0], None, METHODS[1])[0])
-    _go_wild(results, told)
-    vary(results, extent, told)
-    _run_third(results, extent, told)
+    _go_wild(results, announce)
+    vary(results, extent, announce)
+    _run_third(results, extent, announce)
     return results
 
 
-def _form_blisters(results: Results, method: str, told: Told) -> None:
+def _form_blisters(results: Results, method: str, announce: Announce) -> None:
     """Raise and sink blisters with a method."""
-    told(f"blisters, {method}")
+    announce(f"blisters, {method}")
     for shape, height in (("convex", TALL), ("concave", SINK)):
         for profile in ("cone", "gaussian"):
             results.blisters[method, shape, profile] = _run(scenes.blister(method, height, profile))
 
 
-def _run_third(results: Results, extent: Extent, told: Told) -> None:
+def _run_third(results: Results, extent: Extent, announce: Announce) -> None:
     """Run blisters, drags, lifts and the session with Method III, which the paper does not have."""
     if "blisters" in extent.third:
-        _form_blisters(results, THIRD, told)
+        _form_blisters(results, THIRD, announce)
     if "tracks" in extent.third:
         highest, more = BEYOND
         wider = replace(extent, drags=(extent.drags[0], highest), speeds=(*extent.speeds, *more))
-        _track(results, THIRD, wider, told)
-    told(f"the paper's session, {THIRD}")
+        _track(results, THIRD, wider, announce)
+    announce(f"the paper's session, {THIRD}")
     scene = _load(THIRD)
     results.printed[THIRD] = results.session[THIRD] = _boiled_down(_run(scene))
     if results.slow > 1.0:
         results.session[THIRD] = _boiled_down(_run(scenes.slowed(scene, results.slow)))
 
 
-def _go_wild(results: Results, told: Told) -> None:
+def _go_wild(results: Results, announce: Announce) -> None:
     """Run the first seconds of the paper's session with Method I at the first gain that oscillates."""
     first = results.onset(results.printed[METHODS[0]].gain("position_gain"))[1]
     if first is not None:
-        told(f"the paper's session, K_f {first:g} 1/N")
-        found = _load(METHODS[0], Setting("control.force_gain", f"{first!r}"))
-        shorter = replace(found.simulation, duration=DETAIL)
-        results.wild = _boiled_down(_run(replace(found, simulation=shorter)))
+        announce(f"the paper's session, K_f {first:g} 1/N")
+        scene = _load(METHODS[0], Setting("control.force_gain", f"{first!r}"))
+        shorter = replace(scene.simulation, duration=DETAIL)
+        results.wild = _boiled_down(_run(replace(scene, simulation=shorter)))
 
 
-def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
+def _track(results: Results, method: str, extent: Extent, announce: Announce) -> None:
     """Measure how fast a fingertip a method follows; every drag of the bisection is one more of `tracks`."""
-    found = _load(method)
+    scene = _load(method)
     for name, way in DRAGS.items():
-        told(f"drag at {PAPER_SPEED * 1e3:g} mm/s, {name}, {method}")
-        results.dragged[AS_IT_IS, method, name], done = one, _ = dragged(found, way)
+        announce(f"drag at {PAPER_SPEED * 1e3:g} mm/s, {name}, {method}")
+        results.dragged[AS_IT_IS, method, name], done = one, _ = dragged(scene, way)
         if name in WAYS:
             results.simple[method, name] = one.follows
         if name == RIDGE:
-            _, start, end = way.path(PAPER_SPEED, found.actuator.rest_height)
+            _, start, end = way.path(PAPER_SPEED, scene.actuator.rest_height)
             results.drags[method] = done, start, end
     results.tracks[method] = []
     for speed in extent.speeds:
-        told(f"drag at {speed * 1e3:g} mm/s, {method}")
-        results.tracks[method].append(track(found, Drag(height=TALL), speed)[0])
+        announce(f"drag at {speed * 1e3:g} mm/s, {method}")
+        results.tracks[method].append(track(scene, Drag(height=TALL), speed)[0])
 
     def tried(one: Follows) -> None:
-        told(f"fastest drag, {name}, {one.speed * 1e3:.1f} mm/s, {method}")
+        announce(f"fastest drag, {name}, {one.speed * 1e3:.1f} mm/s, {method}")
         if name == RIDGE:
             results.tracks[method].append(one)
 
     for name, way in WAYS.items():
         results.fastest[method, name] = find_largest_speed(
-            found, way, results.criterion,
+            scene, way, results.criterion,
             low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, told=tried,
         )  # fmt: skip
     results.tracks[method].sort(key=lambda one: one.speed)
     results.lifting[method] = find_largest_speed(
-        found, Lift(), results.criterion,
+        scene, Lift(), results.criterion,
         low=extent.lifts[0], high=extent.lifts[1], resolution=extent.resolution,
-        told=lambda one: told(f"lift at {one.speed * 1e3:.1f} mm/s, {method}"),
+        told=lambda one: announce(f"lift at {one.speed * 1e3:.1f} mm/s, {method}"),
     )  # fmt: skip
 
 
-def sessions(results: Results, told: Told, session: str = SESSION) -> None:
+def sessions(results: Results, announce: Announce, session: str = SESSION) -> None:
     """Run the paper's session at its times, and again slowly where a method loses the fingertip."""
     for method in METHODS:
-        told(f"the paper's session, {method}")
+        announce(f"the paper's session, {method}")
         results.printed[method] = _boiled_down(_run(_load(method, session=session)))
     results.session = dict(results.printed)
     if not any(done.lost for done in results.printed.values()):
@@ -266,7 +266,7 @@ def sessions(results: Results, told: Told, session: str = SESSION) -> None:
     # Four fifths of what the slower method can lift, in steps of a tenth.
     results.slow = max(1.0, math.ceil(10.0 * lift / (0.8 * able)) / 10.0)
     for method in METHODS:
-        told(f"the paper's session, {results.slow:g} times as long, {method}")
+        announce(f"the paper's session, {results.slow:g} times as long, {method}")
         slowly = scenes.slowed(results.printed[method].scene, results.slow)
         results.session[method] = _boiled_down(_run(slowly))
 
@@ -305,8 +305,8 @@ def _swing(
     late, after = select_rows(done.history, end - WATCHED, end), select_rows(done.history, quick, end)
     wanted = find_set_point(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
     settled = measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
-    found = Swing(
+    swing = Swing(
         gain, position_gain, measure_amplitude(late["total_force"]),
         measure_frequency(late["time"], late["total_force"]), settled,
     )  # fmt: skip
-    return found._replace(settling=None) if found.sustained else found, done, quick
+    return swing._replace(settling=None) if swing.sustained else swing, done, quick

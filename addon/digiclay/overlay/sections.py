@@ -87,7 +87,7 @@ class Pen:
                 self.picture.words.append(Words(x, y, size, color, text, at_right))
         return top - ROW * self.scale
 
-    def plot(self, told: Readings, top: float, ends: tuple[float, float], unit: str) -> Box:
+    def plot(self, readings: Readings, top: float, ends: tuple[float, float], unit: str) -> Box:
         """Draw the frame of a plot, its axis and the time shown; return the box of its curves."""
         box = Box(self.x, top - PLOT * self.scale, self.width, PLOT * self.scale, self.look.back)
         step, size = 3.0 * self.scale, SMALL * self.scale
@@ -95,7 +95,7 @@ class Pen:
             self.level(box, y, self.look.frame, 1.0)
             label = f"{value:g} {unit}"
             self.picture.words.append(Words(box.x + step, y + lift, size, self.look.faint, label))
-        self.row(box.y, "", localize("last {:g} s", told.seconds), small=True)
+        self.row(box.y, "", localize("last {:g} s", readings.seconds), small=True)
         return box
 
     def level(self, box: Box, y: float, color: Color, width: float, *, dashed: bool = False) -> None:
@@ -103,9 +103,11 @@ class Pen:
         line = np.array([[box.x, y], [box.x + box.width, y]])
         self.picture.lines.append(Line(line, color, width * self.scale, dashed))
 
-    def curve(self, told: Readings, value: Floats, ends: tuple[float, float], box: Box, color: Color) -> None:
+    def curve(
+        self, readings: Readings, value: Floats, ends: tuple[float, float], box: Box, color: Color
+    ) -> None:
         """Draw a curve (t,) into the box of a plot."""
-        points = scale_curve(told.time, value, told.window, ends, box)
+        points = scale_curve(readings.time, value, readings.window, ends, box)
         if len(points) > 1:
             self.picture.lines.append(Line(points, color, 1.5 * self.scale))
 
@@ -137,74 +139,76 @@ def force_message(force: float, *, beyond: bool = False) -> str:
     return localize("{:.2f} N: beyond {:g} mm", force, MOST_INDENTATION * 1e3) if beyond else f"{force:.2f} N"
 
 
-def describe_state(told: Readings) -> str:
+def describe_state(readings: Readings) -> str:
     """Return whether a session is paused or waits, and else its speed."""
-    if told.paused or told.waiting:
-        return localize("paused" if told.paused else "waiting")
-    return "" if told.factor is None else localize("{:.2f} x real time", told.factor)
+    if readings.paused or readings.waiting:
+        return localize("paused" if readings.paused else "waiting")
+    return "" if readings.factor is None else localize("{:.2f} x real time", readings.factor)
 
 
-def _draw_head(told: Readings, pen: Pen, top: float) -> None:
+def _draw_head(readings: Readings, pen: Pen, top: float) -> None:
     """Name the bed, the method and how well the simulation keeps up."""
-    top = pen.row(top, told.name, describe_state(told))
-    top = pen.row(top, localize("Method: {}", localize(told.method.replace("_", " ") or "none")))
-    pen.row(top, error_message(told.errors), small=True)
+    top = pen.row(top, readings.name, describe_state(readings))
+    top = pen.row(top, localize("Method: {}", localize(readings.method.replace("_", " ") or "none")))
+    pen.row(top, error_message(readings.errors), small=True)
 
 
-def _draw_force(told: Readings, pen: Pen, top: float) -> None:
+def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
-    now = force_message(float(told.force[-1]), beyond=told.beyond) if told.force.size else ""
-    asked = "" if told.set_point is None else localize("set point {:.2f} N", told.set_point)
+    now = force_message(float(readings.force[-1]), beyond=readings.beyond) if readings.force.size else ""
+    asked = "" if readings.set_point is None else localize("set point {:.2f} N", readings.set_point)
     top = pen.row(top, localize("Total force  {}", now), asked)
-    recent = told.force[told.time >= told.window[0]]
-    asked_for = told.set_point or 0.0
+    recent = readings.force[readings.time >= readings.window[0]]
+    asked_for = readings.set_point or 0.0
     largest = float(recent.max(initial=0.0))
     if asked_for:
         largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
     largest = max(largest, LEAST_FORCE)
     ends = (0.0, round_axis(0.0, largest)[1])
-    box = pen.plot(told, top, ends, "N")
-    if told.set_point is not None:
-        y = box.y + told.set_point / ends[1] * box.height
+    box = pen.plot(readings, top, ends, "N")
+    if readings.set_point is not None:
+        y = box.y + readings.set_point / ends[1] * box.height
         pen.level(box, y, pen.look.set_point, 1.5, dashed=True)
-    pen.curve(told, told.force, ends, box, pen.look.force)
+    pen.curve(readings, readings.force, ends, box, pen.look.force)
 
 
-def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
+def _draw_heights(readings: Readings, pen: Pen, top: float) -> None:
     """Draw the heights of the picked pins over the last seconds."""
-    if not told.pins:
+    if not readings.pins:
         pen.row(top, localize("Pick pins to see their heights (Display panel)"), small=True)
         return
     top = pen.row(top, localize("Heights of picked pins"))
-    values = told.heights * 1e3
-    recent = values[told.time >= told.window[0]]
+    values = readings.heights * 1e3
+    recent = values[readings.time >= readings.window[0]]
     known = recent[np.isfinite(recent)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     spare = max(0.0, LEAST_SPAN - (high - low)) / 2
     ends = round_axis(low - spare, high + spare)
-    box, entries = pen.plot(told, top, ends, "mm"), []
-    for place, (pin, color) in enumerate(zip(told.pins, pen.look.pins, strict=False)):
-        pen.curve(told, values[:, place], ends, box, color)
+    box, entries = pen.plot(readings, top, ends, "mm"), []
+    for place, (pin, color) in enumerate(zip(readings.pins, pen.look.pins, strict=False)):
+        pen.curve(readings, values[:, place], ends, box, color)
         now = f" {values[-1, place]:.1f} mm" if len(values) and np.isfinite(values[-1, place]) else ""
         entries.append((color, f"{pin}:{now}"))
     pen.entries(box.y - ROW * pen.scale, 3, entries)
 
 
-def _draw_scale(told: Readings, pen: Pen, top: float) -> None:
+def _draw_scale(readings: Readings, pen: Pen, top: float) -> None:
     """Draw the colors of the force on a pin."""
-    assert told.top is not None  # or the section has no height
+    assert readings.top is not None  # or the section has no height
     top = pen.row(top, localize("Force on a pin"))
     width, height = pen.width / len(heat.COLORS), 0.5 * ROW * pen.scale
     for place, color in enumerate(heat.COLORS):
         pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, color))
-    pen.row(top - height, "0 N", f"{told.top:.3g} N", small=True)
+    pen.row(top - height, "0 N", f"{readings.top:.3g} N", small=True)
 
 
-def _draw_modes(told: Readings, pen: Pen, top: float) -> None:
+def _draw_modes(readings: Readings, pen: Pen, top: float) -> None:
     """List how many pins are in each mode that occurs, with its color."""
-    top = pen.row(top, localize("Pins by mode"), f"{int(told.modes.sum())}")
-    names = {mode: localize(mode.name.lower().replace("_", " ")) for mode in Mode if told.modes[mode]}
-    pen.entries(top, 2, [(told.colors[mode], f"{told.modes[mode]} {name}") for mode, name in names.items()])
+    top = pen.row(top, localize("Pins by mode"), f"{int(readings.modes.sum())}")
+    names = {mode: localize(mode.name.lower().replace("_", " ")) for mode in Mode if readings.modes[mode]}
+    pen.entries(
+        top, 2, [(readings.colors[mode], f"{readings.modes[mode]} {name}") for mode, name in names.items()]
+    )
 
 
 def _size(error: float, unit: str) -> str:
@@ -212,14 +216,14 @@ def _size(error: float, unit: str) -> str:
     return f"{error:.2g} {unit}" if error >= 0.01 else localize("0.01 {} or less", unit)
 
 
-def _draw_brief(told: Readings, pen: Pen, top: float) -> None:
+def _draw_brief(readings: Readings, pen: Pen, top: float) -> None:
     """Write force, set point, simulated time and state in two rows."""
     now = localize("no force yet")
-    if told.force.size:
-        now = force_message(float(told.force[-1]), beyond=told.beyond)
-    asked = "" if told.set_point is None else localize("of {:.2f} N", told.set_point)
+    if readings.force.size:
+        now = force_message(float(readings.force[-1]), beyond=readings.beyond)
+    asked = "" if readings.set_point is None else localize("of {:.2f} N", readings.set_point)
     top = pen.row(top, now, asked)
-    pen.row(top, f"{float(told.time[-1]) if told.time.size else 0.0:.1f} s", describe_state(told))
+    pen.row(top, f"{float(readings.time[-1]) if readings.time.size else 0.0:.1f} s", describe_state(readings))
 
 
 class Section(NamedTuple):
@@ -236,18 +240,18 @@ class Content(NamedTuple):
     width: float
 
 
-def _measure_heights(told: Readings) -> float:
-    return ROW * (2 + math.ceil(len(told.pins) / 3)) + PLOT + GAP if told.pins else ROW + GAP
+def _measure_heights(readings: Readings) -> float:
+    return ROW * (2 + math.ceil(len(readings.pins) / 3)) + PLOT + GAP if readings.pins else ROW + GAP
 
 
-COMPACT = Content((Section(lambda told: 2 * ROW, _draw_brief),), 190.0)
+COMPACT = Content((Section(lambda readings: 2 * ROW, _draw_brief),), 190.0)
 FULL = Content(
     (
-        Section(lambda told: 3 * ROW + GAP, _draw_head),
-        Section(lambda told: 2 * ROW + PLOT + GAP, _draw_force),
-        Section(lambda told: 0.0 if told.top is None else 2.6 * ROW, _draw_scale),
+        Section(lambda readings: 3 * ROW + GAP, _draw_head),
+        Section(lambda readings: 2 * ROW + PLOT + GAP, _draw_force),
+        Section(lambda readings: 0.0 if readings.top is None else 2.6 * ROW, _draw_scale),
         Section(_measure_heights, _draw_heights),
-        Section(lambda told: ROW * (1 + math.ceil(np.count_nonzero(told.modes) / 2)), _draw_modes),
+        Section(lambda readings: ROW * (1 + math.ceil(np.count_nonzero(readings.modes) / 2)), _draw_modes),
     ),
     290.0,
 )
@@ -273,7 +277,7 @@ def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> 
 
 
 def lay_out(
-    told: Readings, look: Look, room: Room, scale: float, content: Content = FULL,
+    readings: Readings, look: Look, room: Room, scale: float, content: Content = FULL,
     corner: str = "bottom_right",
 ) -> Picture:  # fmt: skip
     """Lay the overlay out in a corner of a room; sections that do not fit are left out."""
@@ -283,7 +287,7 @@ def lay_out(
     width, margin, padding = content.width * scale, MARGIN * scale, PADDING * scale
     space, sections = SHARE * (top - bottom) - 2 * padding, []
     for section in content.sections:
-        height = section.height(told) * scale
+        height = section.height(readings) * scale
         if 0.0 < height <= space:
             sections.append((height, section.draw))
             space -= height
@@ -297,6 +301,6 @@ def lay_out(
     pen = Pen(picture, look, x + padding, width - 2 * padding, scale)
     y += tall - padding
     for height, draw in sections:
-        draw(told, pen, y)
+        draw(readings, pen, y)
         y -= height
     return picture
