@@ -150,9 +150,8 @@ def evaluate(
     try:
         if measure is not None:
             return measure(scene, stopped)
-        result: Result | None = run(scene, stopped=stopped)
-        if errors:
-            result = result.estimate_errors(stopped=stopped)
+        done = run(scene, stopped=stopped)
+        result = done.estimate_errors(stopped=stopped) if errors else done
     except Exception as error:  # the other points are independent of this failure
         return {"error": describe_error(error)}
     return None if result is None or result.incomplete else _make_record(result, errors=errors)
