@@ -258,6 +258,7 @@ SPREAD, REACH = 1.0, 3
 
 def drape(cells: Grid, height: Floats, places: Floats) -> Floats:
     """Return places (k, 2) with the mean height of the pins about each, (k, 3), m, weighted normally."""
+    # Smoothed, a step between two pins makes no spike in a line.
     plan = cells.layout
     row, column = np.divmod(cells.at(places[:, 0], places[:, 1]), plan.columns)
     step = np.arange(-REACH, REACH + 1)
