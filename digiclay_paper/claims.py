@@ -46,7 +46,7 @@ CLAIMS: tuple[tuple[Callable[[Results], Evidence], str, str], ...] = (
     (evidence.rise, "The slight rise of Method II's blister causes its greater forces",
      f"Drags at {SPEED}: "),
     (evidence.ahead, "Method I lowers the cells ahead of a finger in the surface, however deep",
-     f"Mean height over the bed at rest, {AHEAD[0] * MM:g} to {AHEAD[1] * MM:g} mm ahead of the finger, "
+     f"Mean height over the bed at rest, {AHEAD[0] * MM:g} to {AHEAD[1] * MM:g} mm ahead of the fingertip, "
      "of cells that do not feel it: "),
     (evidence.escape, "Method II, without a virtual master, escapes the oscillation",
      f"Amplitude of the force in the last second of a hold after {PRESS}: "),

@@ -86,13 +86,13 @@ def relief(results: Results) -> Evidence:
         levels.append(f"{SHORT[method]} {', '.join(parts.values())}")
     evidence.why = (
         f"A section holds when its shape is {LIMITS}. Asked for is the method's own blister carried along "
-        "the finger's path, at the level that was formed: beyond the finger's lowest point by "
+        "the fingertip's path, at the level that was formed: beyond the fingertip's lowest point by "
         f"{'; '.join(levels)}."
     )
     if missed:
         evidence.why += (
-            f" {SHORT[TWO]} misses {', '.join(missed)}: every cell under the finger keeps its own force, so "
-            "the surface takes the shape of the fingertip, with a rim around it, and the cells that were "
+            f" {SHORT[TWO]} misses {', '.join(missed)}: every cell under the fingertip keeps its own force, "
+            "so the surface takes the shape of the fingertip, with a rim around it, and the cells that were "
             "left behind at different moments stay where they were."
         )
     return evidence
@@ -142,8 +142,8 @@ MUCH = 1.5
 #: A response is quicker that takes less than this share of the time.
 QUICKER = 0.9
 DEVIATIONS = {
-    "height_deviation": ("height under the finger, standard deviation over time", MM, "mm"),
-    "ridge_error": ("what is left behind over the finger's path, rms", MM, "mm"),
+    "height_deviation": ("height under the fingertip, standard deviation over time", MM, "mm"),
+    "ridge_error": ("what is left behind over the fingertip's path, rms", MM, "mm"),
     "ridge_unevenness": ("the same, standard deviation", MM, "mm"),
     "force_deviation": ("total force, standard deviation over time", 1.0, "N"),
     "rfd_shaping": ("total force from its set point while shaping, rms", 1.0, "N"),
@@ -151,7 +151,7 @@ DEVIATIONS = {
 #: Of them, what is compared in the paper's windows, too.
 WINDOWED = {
     "rfd": ("RFD", 1.0, "N"), "force_deviation": ("total force", 1.0, "N"),
-    "height_deviation": ("height under the finger", MM, "mm"),
+    "height_deviation": ("height under the fingertip", MM, "mm"),
 }  # fmt: skip
 
 
@@ -177,9 +177,9 @@ def deviations(results: Results) -> Evidence:
     evidence.why = (
         f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {session.followers:.1f} cells follow it on "
         f"average. Its set point, {each:g} N times the cells that follow at the moment, is "
-        f"{_newton(session.metrics['set_point'])} on average and changes as the finger passes from cell to "
-        "cell. A cell that is to rise needs a force below its set point, so the force falls short while the "
-        "finger lifts: in level drags the RFD is " + ", ".join(level) + ". "
+        f"{_newton(session.metrics['set_point'])} on average and changes as the fingertip passes from cell "
+        "to cell. A cell that is to rise needs a force below its set point, so the force falls short while "
+        "the fingertip lifts: in level drags the RFD is " + ", ".join(level) + ". "
         f"It holds where all are {MUCH:g} times as great."
     )
     return evidence
@@ -291,17 +291,17 @@ def blister(results: Results) -> Evidence:
     forms = {method: results.blisters[method, "convex", "cone"].scene.blister for method in METHODS}
     size = ", ".join(f"{SHORT[method]} {form.radius * MM:g} mm" for method, form in forms.items() if form)
     evidence.why = (
-        f"The finger is held {scenes.TALL * MM:g} mm over the bed, or {-scenes.SINK * MM:g} mm in it, and "
+        f"The fingertip is held {scenes.TALL * MM:g} mm over the bed, or {-scenes.SINK * MM:g} mm in it, and "
         f"the pins press into it. A section holds as those of Fig. 10 do. Radius: {size}; {SHORT[TWO]} "
-        "counts its own from the nearest cell under the finger, and there the cells take the shape of the "
+        "counts its own from the nearest cell under the fingertip, and there the cells take the shape of the "
         "fingertip."
     )
     return evidence
 
 
 def freezing(results: Results) -> Evidence:
-    """Whether the cells left behind stay where the finger left them."""
-    why = "Over the path is how far the pins press into the finger, and what they rise once it has passed."
+    """Whether the cells left behind stay where the fingertip left them."""
+    why = "Over the path is how far the pins press into the fingertip, and what they rise once it has passed."
     evidence = Evidence(why=why)
     for method in METHODS:
         metrics = results.drags[method][0].metrics
@@ -309,7 +309,7 @@ def freezing(results: Results) -> Evidence:
         if offset is None or uneven is None:
             evidence.add(SHORT[method], "left nothing behind", False)
         else:
-            text = f"left {offset * MM:.2f} mm over the finger's path, even to {uneven * MM:.2f} mm"
+            text = f"left {offset * MM:.2f} mm over the fingertip's path, even to {uneven * MM:.2f} mm"
             evidence.add(SHORT[method], text, uneven < 1e-3)
     return evidence
 
@@ -355,8 +355,8 @@ def rise(results: Results) -> Evidence:
     """Whether Method II's forces come from the slight rise of its blister."""
     evidence = Evidence(
         why=f"It holds where both the force and the RFD are {MUCH:g} times as great with the rise. The rise "
-        "has cells around the finger feel it, and each that follows asks for its own force; without it fewer "
-        "cells follow, and along a ridge too few to keep the finger."
+        "has cells around the fingertip feel it, and each that follows asks for its own force; without it "
+        "fewer cells follow, and along a ridge too few to keep the fingertip."
     )
     for _, name, less, more in _list_drags(results, NO_RISE):
         text = (
@@ -371,7 +371,7 @@ def rise(results: Results) -> Evidence:
 def ahead(results: Results) -> Evidence:
     """Whether Method I lowers cells before the fingertip is over them."""
     evidence = Evidence(
-        why=f"It holds where they are lowered by {LOWERED:.0%} of the finger's depth or more. "
+        why=f"It holds where they are lowered by {LOWERED:.0%} of the fingertip's depth or more. "
         f"{SHORT[TWO]} is there for comparison: its blister stands higher by the rise."
     )
     for method, name, one, _ in _list_drags(results, AS_IT_IS):
@@ -424,7 +424,7 @@ def radius(results: Results) -> Evidence:
         f"It holds where the radius leaves {REJECTED:.0%} at most of what there is without it. Without it "
         "all cells the fingertip may touch are looked at. Where readings below five standard deviations "
         "count as none, as they do in this program, few are left outside the radius for it to reject. "
-        + (f"The finger was lost with and without the radius: {', '.join(lost)}." if lost else "")
+        + (f"The fingertip was lost with and without the radius: {', '.join(lost)}." if lost else "")
     )
     return evidence
 

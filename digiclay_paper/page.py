@@ -128,7 +128,7 @@ def list_lines(
     )
     yield "| From | To | When | Decided by |"
     yield "| --- | --- | --- | --- |"
-    for arrows, by in ((BY_FORCE, "its own force"), (BY_PLACE, "the nearest cell under the finger")):
+    for arrows, by in ((BY_FORCE, "its own force"), (BY_PLACE, "the nearest cell under the fingertip")):
         for arrow in arrows:
             yield _row(arrow, by)
 

@@ -88,7 +88,7 @@ def blisters(results: Results) -> Any:
     """Draw sections through raised and sunken blisters, both profiles, all methods."""
     methods = list_methods(results.blisters)
     height = 0.8 + 3.4 * len(methods)
-    with canvas(12.5, height, "Blisters in section, the finger in place") as (figure, place):
+    with canvas(12.5, height, "Blisters in section, the fingertip in place") as (figure, place):
         for row, method in enumerate(methods):
             for column, shape in enumerate(HEIGHTS):
                 axes = place(f"{method} {shape}", 0.85 + 6.15 * column, height - 3.5 - 3.4 * row, 5.25, 2.55)
@@ -134,7 +134,7 @@ def freezing(results: Results) -> Any:
     """Draw sections along a drag at several times; frozen cells are marked."""
     methods = list_methods(results.drags)
     height = 0.8 + 3.7 * len(methods)
-    with canvas(12.5, height, "Freezing: what the finger has left keeps its height") as (figure, place):
+    with canvas(12.5, height, "Freezing: what the fingertip has left keeps its height") as (figure, place):
         from matplotlib import colormaps
 
         for panel, method in enumerate(methods):

@@ -42,7 +42,7 @@ QUICKER: Device = {
 def blister(method: str, height: float, profile: str) -> Scene:
     """Return a scene that presses, and raises or sinks a blister with a profile to `height`, m.
 
-    `height`: of the finger's lowest point over the bed at rest while it holds, m; `profile`: of the blister.
+    `height`: of the fingertip's lowest point over the bed at rest while it holds, m.
     """
     table = _table(method, 17, {}, {"profile": profile})
     there = 1.7 + abs(height + PRESS) / GENTLY

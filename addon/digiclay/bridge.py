@@ -97,7 +97,7 @@ def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
 
 
 def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
-    """Put the fingertip to a pose (7,), and give its ellipsoid the size of the finger."""
+    """Put the fingertip to a pose (7,), and give its ellipsoid its size."""
     move_fingertip(tip, at, finger)
     resize_fingertip(tip, finger)
 
@@ -112,7 +112,7 @@ def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
 
 
 def resize_fingertip(tip: Any, finger: Fingertip) -> None:
-    """Give the ellipsoid in a fingertip the finger's semi-axes, and the empty a size to be seen about it."""
+    """Give the ellipsoid in a fingertip its semi-axes, and the empty a size to be seen about it."""
     axes = np.array([finger.length, finger.width, finger.height])
     tip[AXES] = axes.tolist()
     tip.empty_display_size = 1.3 * float(axes.max()) * SCALE

@@ -87,7 +87,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
 
     bl_idname = "digiclay.press"
     bl_label = "Press"
-    # No undo step of its own: the session makes it when the finger has finished the stroke.
+    # No undo step of its own: the session makes it when the fingertip has finished the stroke.
     bl_options = {"INTERNAL"}
     needs = (no_place,)
 

@@ -72,7 +72,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
             label = f"set point {set_point.force:g} N{' a cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
-        force.set_title("Total force on the finger")
+        force.set_title("Total force on the fingertip")
         legend_above(heights)
         for axes in (heights, force):
             axes.yaxis.set_label_coords(-0.075, 0.5)

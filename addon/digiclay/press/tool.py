@@ -166,7 +166,7 @@ def _shown_brush(bed: Any, settings: Any) -> Brush:
 
 
 def _trail(target: aim.Target) -> list[Floats]:
-    """Return what the finger has still to go along, and its rim where it is now, on the pins; or nothing."""
+    """Return what the fingertip has still to go along, and its rim where it is, on the pins; or nothing."""
     session = running.find(target.bed)
     if session is None or not session.strokes:
         return []

@@ -151,8 +151,8 @@ APPROACH, SPEED = 0.1, 0.02
 #: How long a fingertip that takes a blister up gains speed, s: at once at half the free speed, it leaves the
 #: pins behind, whose valves have not opened yet.
 SPEED_UP = 1.0
-#: Fastest drag of a blister, in its radii a second: the control finds the finger so much later. The pins of
-#: small beds rise quickly enough to overtake it.
+#: Fastest drag of a blister, in its radii a second: the control finds the fingertip so much later. The pins
+#: of small beds rise quickly enough to overtake it.
 RADII = 2.0
 #: Likewise of a finger that presses a valley, and pushes the pins out of its way; `DRAG` on the paper's bed.
 PUSHED = 20.0 / 3.0

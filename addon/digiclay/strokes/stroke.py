@@ -15,9 +15,9 @@ from .tracking import Tracking
 #: Factors of x and y of a path and of its mirror images about the middle of the bed.
 Mirror = tuple[float, float]
 
-#: What the finger does: it waits for its turn, goes above the path's first place, presses there, rises with
-#: the blister (if its brush has one), goes along the path, leaves it, waits above until what it has left has
-#: settled; and the end.
+#: What the fingertip does: it waits for its turn, goes above the path's first place, presses there, rises
+#: with the blister (if its brush has one), goes along the path, leaves it, waits above until what it has left
+#: has settled; and the end.
 WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, SETTLING, DONE = range(8)
 #: Paths of a stroke, by its symmetry. There is one finger: it goes along them one after the other.
 SYMMETRIES: dict[str, tuple[Mirror, ...]] = {
@@ -121,7 +121,7 @@ class Stroke:
 
     @property
     def ahead(self) -> tuple[Floats, ...]:
-        """Places the finger has not come to yet, (k, 2), m: of the path it is at, and of those after it."""
+        """Places the fingertip has yet to come to, (k, 2), m: of the path it is at, and of those after it."""
         path = np.array([(sample.x, sample.y) for sample in self.samples])
         later = tuple(path * mirror for mirror in self.mirrors[self.image + 1 :])
         return (path[self.reached :] * self.mirrors[self.image], *later)

@@ -60,7 +60,7 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
     if not isinstance(control, VirtualMaster | CellStates | Hybrid) or touch is None or blister is None:
         return None
     asked = control.force_setpoint
-    # Method II holds a force on every pin, so that they take on the finger's form; the others hold their sum.
+    # Method II holds a force on every pin, so that they take on its form; the others hold their sum.
     if isinstance(control, CellStates):
         sink, trigger = _find_sink(touch, np.zeros(1), 1.0, asked), control.spring_trigger
     else:

@@ -27,10 +27,10 @@ MEANINGS: dict[Mode, str] = {
     Mode.HOLD: "keeps the height it was left at",
     Mode.EDGE: "just outside the blister, gives the boundary height",
     Mode.BLISTER: "part of the blister, follows its profile",
-    Mode.SPRING: "under the finger, virtual spring",
-    Mode.FORCE_FOLLOW: "under the finger, follows the force",
-    Mode.CRITICAL: "about to lose the finger",
-    Mode.FROZEN: "left behind by the finger, keeps its command",
+    Mode.SPRING: "under the fingertip, virtual spring",
+    Mode.FORCE_FOLLOW: "under the fingertip, follows the force",
+    Mode.CRITICAL: "about to lose the fingertip",
+    Mode.FROZEN: "left behind by the fingertip, keeps its command",
 }
 
 #: sRGB in [0, 1], one per mode.

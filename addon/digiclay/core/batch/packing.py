@@ -122,8 +122,8 @@ def _take_run(seen: Measurement, run: int) -> Measurement:
 #: Cells moved at a time: as many as stay in a core's cache, and few enough for the matrix products to stay
 #: on one core (waking a second one takes longer than the product).
 PIECE = 2048
-#: Cells of a run out of the finger's reach are moved by so many at a time, or a multiple: workspaces of few
-#: sizes serve for any number of them.
+#: Cells of a run out of the fingertip's reach are moved by so many at a time, or a multiple: workspaces of
+#: few sizes serve for any number of them.
 GROUP = 8
 
 

@@ -85,8 +85,8 @@ class ActiveSet:
     rows: Rows
     """Which row of the block holds what."""
     cells: Cells
-    """(m,) or (m, b): Numbers in their own beds: first those the finger may touch, then the others that move
-    or are controlled."""
+    """(m,) or (m, b): Numbers in their own beds: first those the fingertip may touch, then the others that
+    move or are controlled."""
     near: int
     """Number k of those the fingertip may touch."""
     block: Floats
@@ -97,8 +97,8 @@ class ActiveSet:
     """(6, m) or (6, m, b): Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product."""
     reach: Discs | None
     control: Discs | None
-    """Discs of which every cell is in, the finger's and the controller's: center x, y, radius, m; arrays (b,)
-    of b runs."""
+    """Discs of which every cell is in, the fingertip's and the controller's: center x, y, radius, m; arrays
+    (b,) of b runs."""
     peak: Any
     """No pin top in the fingertip's part is higher while this set is in use, m; a number or (b,)."""
     until: int

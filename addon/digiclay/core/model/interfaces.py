@@ -121,7 +121,7 @@ class Stepper(Protocol):
         """Compute once what all periods share, for a `physics.Cell` and the physics steps of a period."""
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
-        """Prepare to move cells on, of which the finger may touch the first k, as often as their set serves.
+        """Prepare to move cells, of which the fingertip may touch the first k, as often as their set serves.
 
         Rows (r + q, n[, b]) are those of `physics.Cell`, then the commands of the queue, oldest first.
         """

@@ -16,7 +16,7 @@ from .fingertip import LEVEL
 
 #: Waypoints are no nearer to each other, s: speeds stay finite.
 SHORTEST = 1e-9
-#: The finger's path when a scene names none: one press in the middle of the bed, m above the rest height.
+#: The fingertip's path when a scene names none: one press in the middle of the bed, m above the rest height.
 PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
 
 
@@ -110,7 +110,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Path:
-    """The finger's path, as a scene gives it."""
+    """The fingertip's path, as a scene gives it."""
 
     interpolation: str = "smooth"
     waypoints: tuple[Waypoint, ...] = ()

@@ -38,8 +38,8 @@ class AdaptivePlan:
     levels: tuple[BernoulliPlan, ...]
     """For whole steps, half steps, quarter steps and so on."""
     between: tuple[Floats, ...]
-    """(i, p): From the finger's underside at the period's instants to that at the ends and in the middle of a
-    level's steps: exact at the instants, by parabolas between them."""
+    """(i, p): From the fingertip's underside at the period's instants to that at the ends and in the middle
+    of a level's steps: exact at the instants, by parabolas between them."""
     allowed: float
     allowed_tension: float
     """Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's

@@ -56,8 +56,8 @@ class BernoulliPlan:
     """(4 s, 2 g): From conductances at the Gauss points, and the same with the signs of the openings, to what
     each step has: free rise, m; the same and its chord deviation, in 1/m; decay, see `closed_form`."""
     path: Floats
-    """(3 s + 1, p): From the finger's underside at the period's instants to what each step has, in 1/m: rise
-    and its chord deviation; underside at the start, and at the end of the last."""
+    """(3 s + 1, p): From the fingertip's underside at the period's instants to what each step has, in 1/m:
+    rise and its chord deviation; underside at the start, and at the end of the last."""
     loaded: Floats
     """(1 + 3 s, 2 g + p + 1): Both together: from conductances, underside and a row of ones to the exponent
     less m H at the start, with its sign changed; then what each step has: slip, chord deviation and decay."""

@@ -127,7 +127,7 @@ class StepStart:
     deviation: Floats
     """Chord deviation of the path without load, see `closed_form.solve_crossing`."""
     finger_deviation: Floats
-    """The finger's part in it, with its sign changed."""
+    """The fingertip's part in it, with its sign changed."""
     lift: Floats
     """Rise of the fingertip, in 1/m."""
     relaxed: Floats

@@ -31,7 +31,7 @@ class Criterion(Parameters):
 
     def __str__(self) -> str:
         return (
-            "the finger is never lost and never without contact, its lag stays below "
+            "the fingertip is never lost and never without contact, its lag stays below "
             f"{self.lag * 1e3:g} mm, the RFD below {self.deviation:g} N"
         )
 
