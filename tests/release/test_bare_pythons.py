@@ -211,7 +211,6 @@ def test_the_tests_of_the_core_pass(bare: BarePython, tmp_path: Path) -> None:
     if not bare.pins:
         return  # between the lowest and the highest versions, which are tested
     files = find_core_tests()
-    assert len(files) > 30
     install_pytest(bare, tmp_path / "pytest")
     # Not with the checkout's addon/ on the path: what is tested is the wheel.
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-o", "pythonpath=.", *files)
