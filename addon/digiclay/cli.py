@@ -48,7 +48,8 @@ def _parsed(argv: Sequence[str] | None) -> Any:
     with defer_interrupt():
         from .commands.parser import parser
 
-        return parser().parse_args(argv)
+        words = sys.argv[1:] if argv is None else argv
+        return parser(*words[:1]).parse_args(words)
 
 
 def _wrong(error: object) -> int:

@@ -293,6 +293,19 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said: str, cores: s
     assert finish(start(script))[1].split() == [cores, "False"]
 
 
+def test_a_run_imports_no_other_command_and_none_of_the_packages_it_does_without(here: Path) -> None:
+    script = "import sys; from digiclay.cli import main; main(sys.argv[1:]); print(*sys.modules)"
+    modules = finish(start(script, "run", "my.toml", "--out", "o", "--quiet"))[1].split()
+    parts = {name.removeprefix("digiclay.") for name in modules if name.startswith("digiclay")}
+    files = {"arguments", "parser", "progress", "run", "stop"}
+    assert {part for part in parts if part.startswith("commands.")} == {f"commands.{name}" for name in files}
+    unused = {"batch", "mesh_io", "shapes", "studies"}
+    assert not {part.split(".")[1] for part in parts if part.startswith("core.")} & unused
+    assert {part.split(".")[0] for part in parts} == {"digiclay", "cli", "commands", "core"}
+    assert {part for part in parts if "surface." in part} == {"core.surface.formed"}
+    assert "core.control.own_method" not in parts
+
+
 @pytest.mark.parametrize(
     ("line", "missing", "install"),
     [

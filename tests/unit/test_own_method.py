@@ -86,7 +86,7 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
     (here / "padpackage.py").write_text(PAD + "\n# another\n", encoding="utf-8")
     with pytest.raises(MethodError, match=r"The method pad must be that of pads 1.2 here too"):
         pickle.loads(packed)
-    monkeypatch.setattr(method_loader, "entry_points", lambda **_: [
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: [
         EntryPoint("pad", "one:Pad", method_loader.GROUP), EntryPoint("pad", "two:Pad", method_loader.GROUP)
     ])  # fmt: skip
     with pytest.raises(MethodError, match=r"one installed package \(got one:Pad, two:Pad\)"):

@@ -14,7 +14,6 @@ from ..core.base.errors import MethodError, OutputError, ParameterError
 from ..core.base.quantity import parse
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
-from ..plugins.method_loader import load_method
 
 #: The key of the control method in scene files.
 METHOD = "control.method"
@@ -113,6 +112,8 @@ def name_methods(varied: str) -> str:
 
 def load_by_option(word: str, option: str) -> str:
     """Return the name of the method that a word of the command line names; load one of the user's own."""
+    from ..plugins.method_loader import load_method
+
     try:
         return load_method(word)
     except MethodError as error:
@@ -184,6 +185,16 @@ def _measured(usual: str, unit: str) -> Callable[[str], float]:
 
 #: Readers of a time, ``0.3`` or ``"300 ms"``, of a length in m, and of one that is in mm without a unit.
 seconds, length, millimeters = _measured("s", "s"), _measured("m", "m"), _measured("mm", "m")
+
+
+def formats(text: str) -> list[str]:
+    """Read a list of mesh formats."""
+    from ..core.mesh_io.mesh_writer import find_format
+
+    try:
+        return list(dict.fromkeys(find_format(name.strip()) for name in text.split(",")))
+    except OutputError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
 
 
 def size(text: str) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from typing import Any
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_files
 from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
-from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix, write
+from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import find_row, read_run
@@ -19,7 +19,7 @@ from ..core.session.run_scene import History
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, Formed, make_formed
 from ..core.surface.skins import SKINS
-from .arguments import RUN, add_command, millimeters, say, seconds, told_as_options, whole_number
+from .arguments import RUN, add_command, formats, millimeters, say, seconds, told_as_options, whole_number
 from .progress import table as aligned
 from .stop import require_surface
 
@@ -89,14 +89,6 @@ def add(commands: Any) -> None:
     """Add the command."""
     purpose = "write the formed surface of a run as mesh files"
     add_command(commands, "export", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
-
-
-def formats(text: str) -> list[str]:
-    """Read a list of mesh formats."""
-    try:
-        return list(dict.fromkeys(find_format(name.strip()) for name in text.split(",")))
-    except OutputError as error:
-        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
 
 
 OPTIONS = {

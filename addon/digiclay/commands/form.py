@@ -20,8 +20,7 @@ from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import History, Result
 from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
-from .arguments import QUIET, add_command, add_options, add_scene, say, scene_of
-from .export import formats
+from .arguments import QUIET, add_command, add_options, add_scene, formats, say, scene_of
 from .run import plan_meshes, simulate, write_run
 from .stop import Stop, allow_interrupt, defer_interrupt, require_surface
 

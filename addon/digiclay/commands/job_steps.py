@@ -31,7 +31,8 @@ from ..core.session.render_settings import format_range, list_missing, name_fram
 from ..core.session.run_scene import run, save
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
 from ..plugins.method_loader import CODE, describe_origin
-from .export import exported, formats
+from .arguments import formats
+from .export import exported
 from .gallery import of_heights, of_picture
 from .render import ARRAYS, draw_moving, draw_still, stage_moving
 from .stop import refuse_without_blender, require_surface

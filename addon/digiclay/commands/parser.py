@@ -6,14 +6,22 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, NoReturn
 
 from .. import __version__
 from ..core.base.errors import one_line
 from ..core.base.quantity import find_nearest_name
-from . import batch, compare, describe, export, form, job, new_method, outside, render, run, sweep
 from .arguments import Help
 from .stop import WRONG
+
+#: Functions that add the commands, without those of other packages: only the command asked for is imported.
+COMMANDS = {
+    "run": "run.add", "batch": "batch.add", "job": "job.add", "page": "job.add_page", "form": "form.add",
+    "describe": "describe.add", "export": "export.add", "features": "export.add_features",
+    "plot": "render.add_plot", "render": "render.add", "sweep": "sweep.add", "compare": "compare.add",
+    "new-method": "new_method.add",
+}  # fmt: skip
 
 EXAMPLES = """\
 examples:
@@ -73,8 +81,8 @@ def _asked(word: str, names: Sequence[str]) -> str:
     return f" Did you mean {bare[close]}?" if close else ""
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands."""
+def parser(first: str = "") -> argparse.ArgumentParser:
+    """Return the parser of all commands, or of the one that a command line begins with."""
     top = Parser(
         prog="digiclay",
         description="Shape-design sessions on Digital Clay, a simulated bed of fluidic pins.",
@@ -84,10 +92,8 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    every = (
-        run.add, batch.add, job.add, job.add_page, form.add, describe.add, export.add, export.add_features,
-        render.add_plot, render.add, sweep.add, compare.add, new_method.add, outside.add,
-    )  # fmt: skip
-    for add in every:
-        add(commands)
+    every = [] if first == "--version" else [*COMMANDS.values(), "outside.add"]
+    for place in [COMMANDS[first]] if first in COMMANDS else every:
+        module, _, add = place.partition(".")
+        getattr(import_module(f".{module}", __package__), add)(commands)
     return top

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shlex
 import shutil
-import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from typing import Self, TextIO
@@ -121,4 +120,8 @@ def format_duration(seconds: float) -> str:
 def format_command(arguments: Sequence[str]) -> str:
     """Return a command of this program as it is typed into a terminal."""
     words = ["digiclay", *arguments]
-    return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)
+    if os.name != "nt":
+        return shlex.join(words)
+    from subprocess import list2cmdline
+
+    return list2cmdline(words)

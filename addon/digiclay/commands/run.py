@@ -12,24 +12,36 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
+from ..core.control.methods import list_added
 from ..core.files.run_folder import Claim, claim_folder, find_name
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import History, Result, run, save
-from ..core.studies.omissions import Fitted, find_omissions
-from ..plugins.method_loader import describe_origin, write_code
-from .arguments import QUIET, add_command, add_options, add_scene, length, say, scene_of, told_as_options
-from .export import exported, file_names, formats
+from .arguments import (
+    QUIET,
+    add_command,
+    add_options,
+    add_scene,
+    formats,
+    length,
+    say,
+    scene_of,
+    told_as_options,
+)
 from .progress import Bar, Line, format_command, table
-from .render import PICTURE, PLOTS, STILL, draw_still, plotted
 from .stop import STOPPED, Stop, refuse_without, refuse_without_blender, require_surface
+
+if TYPE_CHECKING:
+    from ..core.studies.omissions import Fitted
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is."""
+    from ..core.studies.omissions import find_omissions
+
     with Line(sys.stderr, quiet=quiet) as line, told_as_options("run"):
         fit = find_omissions(scene, budget, show=lambda text: line.draw(f"trying: {text}"))
     if not quiet:
@@ -150,8 +162,12 @@ def _plan_extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
         return []
     extras = [plan_meshes(scene, history, arguments.export)] if arguments.export else []
     if arguments.plots:
+        from .render import PLOTS, plotted
+
         extras.append(Extra(PLOTS, partial(plotted, scene, history), lambda run: ["plot", str(run)]))
     if arguments.render:
+        from .render import PICTURE, STILL, draw_still
+
         draw = partial(draw_still, scene, history, STILL)
         extras.append(Extra([PICTURE], lambda out: draw(out / PICTURE), lambda run: ["render", str(run)]))
     return extras
@@ -173,6 +189,7 @@ def plan_meshes(
     scene: Scene, history: History, kinds: Sequence[str], row: int = -1, within: str = ""
 ) -> Extra:
     """Return the surface of one row as mesh files, in the run's folder or in one within it."""
+    from .export import exported, file_names
 
     def make(folder: Path) -> None:
         (folder / within).mkdir(exist_ok=True)
@@ -188,7 +205,11 @@ def plan_meshes(
 
 def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop) -> Result:
     """Run the session of a scene under a progress bar; `path`: of its file."""
-    versions = {"digiclay": __version__, **describe_origin(scene)}
+    versions = {"digiclay": __version__}
+    if scene.method in list_added():
+        from ..plugins.method_loader import describe_origin
+
+        versions |= describe_origin(scene)
     try:
         with Bar(sys.stderr, scene.name, scene.simulation.control_period, quiet=arguments.quiet) as bar:
             return run(scene, progress=bar, stopped=stop, versions=versions)
@@ -209,7 +230,10 @@ def write_run(
     wrong: list[DigiclayError] = []
     with claim.write() as folder:
         save(result, folder)
-        write_code(result.scene, folder)
+        if result.scene.method in list_added():
+            from ..plugins.method_loader import write_code
+
+            write_code(result.scene, folder)
         for extra in extras:
             if stop():
                 skipped.append(extra)

@@ -18,7 +18,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.abc import ExecutionLoader
 from importlib.machinery import ModuleSpec
-from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec
 from pathlib import Path
 from types import ModuleType
@@ -92,7 +91,9 @@ def read_file(path: Path, attribute: str) -> MethodSource:
 
 def find_installed(name: str) -> MethodSource | None:
     """Return the code of an entry point, without importing it; None without one, MethodError of several."""
-    points: dict[str, EntryPoint] = {point.value: point for point in entry_points(group=GROUP, name=name)}
+    from importlib.metadata import entry_points
+
+    points = {point.value: point for point in entry_points(group=GROUP, name=name)}
     if not points:
         return None
     if len(points) > 1:

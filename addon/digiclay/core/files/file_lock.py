@@ -8,7 +8,6 @@ import importlib
 import os
 import platform
 import re
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -67,6 +66,8 @@ def _find_start_in_linux(pid: int) -> float | None:
 
 def _ask_ps(pid: int) -> float | None:
     """Return when a process was started, from ps; macOS has no /proc."""
+    import subprocess
+
     with suppress(OSError, ValueError, subprocess.SubprocessError):
         answer = subprocess.run(
             ["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=10.0,
