@@ -243,13 +243,13 @@ def _track(results: Results, method: str, extent: Extent, announce: Announce) ->
     for name, way in WAYS.items():
         results.fastest[method, name] = find_largest_speed(
             scene, way, results.criterion,
-            low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, told=tried,
+            low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, report=tried,
         )  # fmt: skip
     results.tracks[method].sort(key=lambda one: one.speed)
     results.lifting[method] = find_largest_speed(
         scene, Lift(), results.criterion,
         low=extent.lifts[0], high=extent.lifts[1], resolution=extent.resolution,
-        told=lambda one: announce(f"lift at {one.speed * 1e3:.1f} mm/s, {method}"),
+        report=lambda one: announce(f"lift at {one.speed * 1e3:.1f} mm/s, {method}"),
     )  # fmt: skip
 
 

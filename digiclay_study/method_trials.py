@@ -221,30 +221,30 @@ def measure_trial(
     spent = time.thread_time() - begun
     if done.incomplete:
         return None
-    found = dict(done.figures)
-    found["losses"] = float(len(find_unintended_losses(done)))
+    figures = dict(done.figures)
+    figures["losses"] = float(len(find_unintended_losses(done)))
     if phase is not None:
         judged, part = judge(done, *phase, 0.0), select_rows(done.history, *phase)
         own = compute_metrics(part, scene.set_point)
-        found |= {name: own[name] for name in ("lag_mean", "lag_max", "max_total_force")}
-        found |= {"rfd": own["rfd_session"], "losses": float(judged.losses)}
-        found["contact_loss_share"] = judged.loss_share
-        found |= perceive(found["rfd"], found["set_point"], found["ridge_unevenness"])
-    relief = measure_relief(scene, done.history, sum_cells(done.history).following, found["ridge_offset"])
-    found |= {"relief_rms": relief.rms, "relief_largest": relief.largest}
-    found["period_cost"] = spent / done.periods
-    return {"figures": {name: found.get(name) for name in OUTCOMES}}
+        figures |= {name: own[name] for name in ("lag_mean", "lag_max", "max_total_force")}
+        figures |= {"rfd": own["rfd_session"], "losses": float(judged.losses)}
+        figures["contact_loss_share"] = judged.loss_share
+        figures |= perceive(figures["rfd"], figures["set_point"], figures["ridge_unevenness"])
+    relief = measure_relief(scene, done.history, sum_cells(done.history).following, figures["ridge_offset"])
+    figures |= {"relief_rms": relief.rms, "relief_largest": relief.largest}
+    figures["period_cost"] = spent / done.periods
+    return {"figures": {name: figures.get(name) for name in OUTCOMES}}
 
 
 def search_limit(scene: Scene, stopped: Stopped = None, *, way: Drag | Lift) -> Record | None:
     """Search the largest speed at which a motion is followed, and return the record; None after a stop."""
 
-    def told(_: Follows) -> None:
+    def check_stop(_: Follows) -> None:
         if stopped and stopped():
             raise _StoppedError
 
     try:
-        speed = find_largest_speed(scene, way, Criterion(), low=LOW, high=HIGH, told=told)
+        speed = find_largest_speed(scene, way, Criterion(), low=LOW, high=HIGH, report=check_stop)
     except _StoppedError:
         return None
     return {"figures": {**dict.fromkeys(OUTCOMES), "speed_limit": speed}}

@@ -214,11 +214,11 @@ def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
 
 def _mark_interval(axes: Any, row: Row, measure: str, line: int, number: int, factor: float) -> None:
     """Draw the mark of a method with its interval, and the mean beside it."""
-    found = row.measures.get(measure)
-    if found is None:
+    interval = row.measures.get(measure)
+    if interval is None:
         axes.text(0.0, line, " –", va="center", fontsize=11, color=INK)
         return
-    mean, half = found.mean * factor, (found.half or 0.0) * factor
+    mean, half = interval.mean * factor, (interval.half or 0.0) * factor
     style = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
     axes.errorbar(mean, line, xerr=half, markersize=8, capsize=4, **style)
     beside = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 11}

@@ -132,9 +132,9 @@ def format_trajectories(source: Provenance, table: Table) -> str:
     for name in _list_trajectories(table):
         for method in source.plan.methods:
             for measure, metric in OUTCOMES.items():
-                found = find_interval(list_values(table, method, name, measure))
-                if found is not None:
-                    rows.append([name, method, measure, metric.unit, found.mean, found.half, found.number])
+                interval = find_interval(list_values(table, method, name, measure))
+                if interval is not None:
+                    rows.append([name, method, measure, metric.unit, *interval])
     return _format_csv(source, head, rows)
 
 
@@ -148,8 +148,8 @@ def format_league(source: Provenance, league: Sequence[Row]) -> str:
     for rank, row in enumerate(league, 1):
         cells: list[Any] = [rank, row.method]
         for name in MEASURES:
-            found = row.measures[name]
-            cells += [None, None] if found is None else [found.mean, found.half]
+            interval = row.measures[name]
+            cells += [None, None] if interval is None else [interval.mean, interval.half]
         rows.append([*cells, row.worse, row.trajectories])
     return _format_csv(source, head, rows)
 
@@ -183,9 +183,9 @@ def format_page(
     for name in SHOWN:
         body, factor = [], MEASURES[name].factor
         for trajectory in _list_trajectories(table):
-            found = [find_interval(list_values(table, method, trajectory, name)) for method in methods]
-            if any(found):
-                body.append([trajectory, *(_format(interval, factor) for interval in found)])
+            intervals = [find_interval(list_values(table, method, trajectory, name)) for method in methods]
+            if any(intervals):
+                body.append([trajectory, *(_format(interval, factor) for interval in intervals)])
         lines.append(f"<h2>{escape(titles[name])} by trajectory</h2>")
         lines += make_table(["trajectory", *methods], body)
     if failed:

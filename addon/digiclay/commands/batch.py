@@ -39,7 +39,7 @@ examples:
 After Ctrl-C or a kill, the same command continues: finished jobs are kept, and repeated only after a change
 in the JOBS file. Exit code 1: some jobs failed, the others are complete.
 """
-#: Frames of a film that a task draws unless told otherwise.
+#: Frames of a film that a task draws by default.
 CHUNK = 50
 #: Options that need --submit.
 FARM_OPTIONS = {

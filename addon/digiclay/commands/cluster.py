@@ -211,10 +211,10 @@ class Cluster(Executor):
             scheduler: Any = self._client.run_on_scheduler(pickle.loads, call)
         except Exception as error:
             scheduler = error
-        found = {f"The scheduler {self._address}": scheduler}
+        versions_of = {f"The scheduler {self._address}": scheduler}
         workers = self._client.run(pickle.loads, call, on_error="return")
-        found |= {f"Worker {name}": versions for name, versions in workers.items()}
-        _refuse_others(found, self._versions)
+        versions_of |= {f"Worker {name}": versions for name, versions in workers.items()}
+        _refuse_others(versions_of, self._versions)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Release what is left of the tasks: workers stop at the next control period."""
@@ -223,9 +223,9 @@ class Cluster(Executor):
                 self._client.cancel(list(self._remote), force=True)
 
 
-def _refuse_others(found: Mapping[str, Any], here: Versions) -> None:
+def _refuse_others(versions_of: Mapping[str, Any], here: Versions) -> None:
     """Refuse versions other than those here; one without digiclay has an error in their place."""
-    others = {name: versions for name, versions in found.items() if versions != here}
+    others = {name: versions for name, versions in versions_of.items() if versions != here}
     if not others:
         return
     (name, versions), *rest = others.items()
@@ -316,7 +316,7 @@ async def _try_address(address: str) -> None:
 
 
 def _silence_log() -> None:
-    """Keep Dask's log and warnings off the terminal: what matters is told in lines of this program.
+    """Keep Dask's log and warnings off the terminal: what matters is printed in lines of this program.
 
     For good: its threads still write when a client has been closed whose scheduler is gone.
     """

@@ -29,7 +29,7 @@ def list_choices(choices: Mapping[str, str], form: str = "{}: {}", separator: st
     return separator.join(form.format(*choice) for choice in choices.items())
 
 
-#: What counts as a feature unless told otherwise.
+#: What counts as a feature by default.
 USUAL = Finding()
 #: Options of the surface of a run, and of its features.
 SURFACE = {

@@ -116,13 +116,13 @@ def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]
     change = height[-1] - height[row]
     area = layout.pitch * layout.row_spacing
     raised, lowered = (float(np.maximum(way, 0.0).sum() * area) for way in (change, -change))
-    known = {"display_error": error, "raised_volume": raised, "lowered_volume": lowered}
+    figures = {"display_error": error, "raised_volume": raised, "lowered_volume": lowered}
     counts = {
         "shape_covered": laid.covered, "shape_clipped": laid.too_low + laid.too_high,
         "shape_overhanging": laid.overhanging,
     }  # fmt: skip
-    units = dict(zip(known, ("m", "m3", "m3"), strict=True))
-    metrics = {**result.metrics, **known, **counts, "units": {**result.metrics["units"], **units}}
+    units = dict(zip(figures, ("m", "m3", "m3"), strict=True))
+    metrics = {**result.metrics, **figures, **counts, "units": {**result.metrics["units"], **units}}
     lines = [
         f"displayed to within {error * 1e6:.2g} µm in {result.history['time'][stands]:.1f} s",
         f"formed: {raised * 1e6:.2g} cm³ raised by up to {max(change.max(), 0.0) * 1e3:.2g} mm, "

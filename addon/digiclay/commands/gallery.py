@@ -49,8 +49,8 @@ def height_map(height: NDArray[np.float64], wide: int = WIDTH) -> NDArray[np.uin
     shown = height[::every, ::every][::-1]
     times = max(1, wide // max(shown.shape))
     level = (shown - shown.min()) / max(float(np.ptp(shown)), 1e-9) * (len(COLORS) - 1)
-    known = np.arange(len(COLORS))
-    colors = np.stack([np.interp(level, known, channel) for channel in np.array(COLORS).T], axis=-1)
+    codes = np.arange(len(COLORS))
+    colors = np.stack([np.interp(level, codes, channel) for channel in np.array(COLORS).T], axis=-1)
     return (colors * 255.0 + 0.5).astype(np.uint8).repeat(times, axis=0).repeat(times, axis=1)
 
 

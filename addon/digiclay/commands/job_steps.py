@@ -268,10 +268,10 @@ class Work:
 
         began = time.perf_counter()
         with claim_files([out], PATIENCE):
-            found = read_run(run, *ARRAYS)
-            frames = range(looks.count(found.history["time"]))
+            finished = read_run(run, *ARRAYS)
+            frames = range(looks.count(finished.history["time"]))
             folder = make_folder(find_frames(run, kind))
-            self._draw(found, looks, kind, frames, folder)
+            self._draw(finished, looks, kind, frames, folder)
             with scratch():
                 encode_film([name_frame(folder, frame) for frame in frames], out, looks)
             note_film(run, kind, time.perf_counter() - began, encoded=True)

@@ -65,9 +65,9 @@ OPTIONS: Options = {
         "help": "plot of the total force over time; default: in films",
     },
 }  # fmt: skip
-#: What a picture is called unless told otherwise.
+#: What a picture is called by default.
 PICTURE = "pins.png"
-#: How a picture looks unless told otherwise.
+#: How a picture looks by default.
 STILL = Still(width=1600, height=1000, engine="cycles")
 #: What drawing needs of a history.
 ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force")

@@ -45,9 +45,9 @@ def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None 
 
 def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
     """Return the material of a part, as the user may have changed it, or make it."""
-    found = next((m for m in bpy.data.materials if m.get(ROLE) == name), None)
-    if found is not None:
-        return found
+    existing = next((m for m in bpy.data.materials if m.get(ROLE) == name), None)
+    if existing is not None:
+        return existing
     made = bpy.data.materials.new(f"Digital Clay {name.replace('_', ' ')}")
     made[ROLE] = name
     made.diffuse_color = bridge.linear(color, alpha)

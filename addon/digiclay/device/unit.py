@@ -149,26 +149,26 @@ def _beds() -> list[Any]:
     return [thing for thing in every if not thing.library and not thing.override_library and is_linked(thing)]
 
 
-def _lacks_part(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) -> bool:
+def _lacks_part(owner: Any, name: str, known: frozenset[int], mended: frozenset[int]) -> bool:
     """Return whether an object without a part of its own is to get one."""
     # A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
     # part the user has deleted, or taken off it, is not.
-    part, new = owner.get(held), owner.session_uid not in known
+    part, new = owner.get(name), owner.session_uid not in known
     if part is None:
-        return held == FINGER and (new or (FINGER not in owner and owner.session_uid in mended))
+        return name == FINGER and (new or (FINGER not in owner and owner.session_uid in mended))
     if part.parent == owner:  # it stands nowhere: of a bed that was linked and made local, or deleted
-        return held == FINGER and new
+        return name == FINGER and new
     return new or part.parent is not None or owner.session_uid in mended
 
 
 def _is_orphan(part: Any) -> bool:
     """Return whether nothing that stands has this part any more."""
-    kind, held = (FINGERTIP, BALL) if part.get(ROLE) == ELLIPSOID else (BED, FINGER)
+    kind, name = (FINGERTIP, BALL) if part.get(ROLE) == ELLIPSOID else (BED, FINGER)
     owner = part.parent
     if owner is not None and owner.get(ROLE) == kind and is_linked(owner):
         return False
     # With its parent cleared or exchanged by hand it is still held by its bed, and stays as long as that.
-    return not any(thing.get(held) == part and is_linked(thing) for thing in bpy.data.objects)
+    return not any(thing.get(name) == part and is_linked(thing) for thing in bpy.data.objects)
 
 
 def _complete(bed: Any) -> None:
@@ -299,24 +299,24 @@ def repair_beds() -> None:
     came, _watch.came = _watch.came, ""
     if _watch.known is not None:
         # In a step that undo has come back to, what was put right since is as it had come.
-        found = find_faults(_watch.known, frozenset(_watch.mended) if came else frozenset())
-        if any(found):
+        faults = find_faults(_watch.known, frozenset(_watch.mended) if came else frozenset())
+        if any(faults):
             if came and _repeat_step(came):
                 return
-            _repair(found)
+            _repair(faults)
             bpy.ops.ed.undo_push(message="Complete Beds")
     _watch.known = mark_parts()
     follow_visibility()
     follow_selection()
 
 
-def _repair(found: Faults) -> None:
+def _repair(faults: Faults) -> None:
     """Put right what was found, and what that has left over."""
     for _ in range(PASSES):
-        _watch.mended.update(thing.session_uid for thing in (*found.bare, *found.strewn))
-        repair(found)
-        found = find_faults(mark_parts())
-        if not any(found):
+        _watch.mended.update(thing.session_uid for thing in (*faults.bare, *faults.strewn))
+        repair(faults)
+        faults = find_faults(mark_parts())
+        if not any(faults):
             return
 
 

@@ -180,8 +180,8 @@ def _draw_heights(readings: Readings, pen: Pen, top: float) -> None:
     top = pen.row(top, localize("Heights of picked pins"))
     values = readings.heights * 1e3
     recent = values[readings.time >= readings.window[0]]
-    known = recent[np.isfinite(recent)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    finite = recent[np.isfinite(recent)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     spare = max(0.0, LEAST_SPAN - (high - low)) / 2
     ends = round_axis(low - spare, high + spare)
     box, entries = pen.plot(readings, top, ends, "mm"), []

@@ -141,9 +141,9 @@ def write_force_legend(front: Front) -> None:
     x, small = left + 1.5 * size, front.readable(front.note)
     for level in range(0, count, 3):
         force = 1e3 * heat.TOP * level / len(heat.COLORS)
-        said = "none" if level == 0 else f"{force:.0f} mN" + (" and more" if level == count - 1 else "")
+        label = "none" if level == 0 else f"{force:.0f} mN" + (" and more" if level == count - 1 else "")
         # Level 0 is no force at all; every other ends at its force.
-        front.write(said, small, x, low + step * (level + (0.3 if level == 0 else 0.75)), FADED)
+        front.write(label, small, x, low + step * (level + (0.3 if level == 0 else 0.75)), FADED)
 
 
 def flat(name: str, color: Color) -> Any:
@@ -228,9 +228,9 @@ def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float 
         front.box("set point", (left, at - thick), (right, at + thick), ASKED, 2)
         front.write(f"set point {set_point:.2f} N", size, 0.0, above, ASKED, "CENTER")
     cursor = front.box("cursor", (left, bottom), (left + 1.5 * thick, bottom + rise), INK, 1)
-    said = front.write("total force", size, left, above, INK)
+    label = front.write("total force", size, left, above, INK)
     moment = front.write("time", size, right, above, FADED, "RIGHT")
-    return ForcePlot(areas[1], cursor, said, moment, place, height, float(time[0]), (right - left) / lasts)
+    return ForcePlot(areas[1], cursor, label, moment, place, height, float(time[0]), (right - left) / lasts)
 
 
 def reduce_columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:

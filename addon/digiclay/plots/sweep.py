@@ -47,8 +47,8 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
 def read_unit(unit: str, values: Any) -> tuple[float, str]:
     """Return factor and name of the unit people read; times below half a second are read in ms."""
     if unit == "s":
-        known = [abs(value) for value in np.ravel(values) if np.isfinite(value)]
-        return (1e3, "ms") if known and max(known) < 0.5 else (1.0, "s")
+        finite = [abs(value) for value in np.ravel(values) if np.isfinite(value)]
+        return (1e3, "ms") if finite and max(finite) < 0.5 else (1.0, "s")
     return READ.get(unit, (1.0, unit))
 
 
@@ -102,10 +102,10 @@ def _write_values(axes: Axes, shown: Any) -> None:
     """Write each value into its cell, light on dark and dark on light."""
     low, high = shown.min(), shown.max()
     for (row, column), value in np.ndenumerate(shown.filled(np.nan)):
-        known = np.isfinite(value)
-        bright = not known or high == low or (value - low) / (high - low) > 0.5
+        finite = np.isfinite(value)
+        bright = not finite or high == low or (value - low) / (high - low) > 0.5
         axes.text(
-            column + 0.5, row + 0.5, f"{value:.3g}" if known else "×", ha="center", va="center",
+            column + 0.5, row + 0.5, f"{value:.3g}" if finite else "×", ha="center", va="center",
             fontsize=9.5, color=INK if bright else "white",
         )  # fmt: skip
 
@@ -165,8 +165,8 @@ def _bars(axes: Any, values: list[float | None], colors: list[str], factor: floa
     for line, (value, color) in enumerate(zip(values, colors, strict=True)):
         size = 0.0 if value is None else value * factor
         axes.barh(-line, size, height=0.7, color=color)
-        said = "–" if value is None else f"{size:.3g}"
-        axes.text(max(size, 0.0) + 0.03 * longest, -line, said, va="center", fontsize=11)
+        label = "–" if value is None else f"{size:.3g}"
+        axes.text(max(size, 0.0) + 0.03 * longest, -line, label, va="center", fontsize=11)
     axes.set(xlim=(0.0, 1.3 * longest), ylim=(-len(values) + 0.4, 0.6))
     axes.set_yticks(-np.arange(len(values)), [""] * len(values))
     axes.tick_params(left=False, bottom=False, labelbottom=False)

@@ -28,7 +28,7 @@ from .running import Running
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
-#: What is told when the state of other parts is taken up.
+#: Message when the state of other parts is taken up.
 CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or its method have changed"
 #: A fingertip that moves on after resting so long makes another gesture, s.
 REST = 0.5

@@ -133,7 +133,7 @@ def method_items() -> list[tuple[str, str, str]]:
         name: importlib.import_module(f"..core.{method.module}", __package__).__doc__ or ""
         for name, method in METHODS.items()
     }
-    return [(name, title(name), said.partition("\n")[0].removesuffix(".")) for name, said in words.items()]
+    return [(name, title(name), text.partition("\n")[0].removesuffix(".")) for name, text in words.items()]
 
 
 def use_properties() -> dict[str, Any]:

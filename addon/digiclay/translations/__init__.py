@@ -38,17 +38,17 @@ def _catalog(language: str) -> dict[str, dict[str, str]]:
 def translate(text: str, language: str) -> str | None:
     """Return the translation of a label or a tooltip, or None where the catalog has none."""
     # A unit in brackets, and what a tooltip adds of a parameter, stay what they are.
-    known = _catalog(language)
+    catalog = _catalog(language)
     for section in ("labels", "tooltips", "parameters", "messages"):
-        if text in known[section]:
-            return known[section][text]
+        if text in catalog[section]:
+            return catalog[section][text]
     label, bracket, unit = text.rpartition(" (")
-    if bracket and label in known["labels"]:
-        return f"{known['labels'][label]} ({unit}"
+    if bracket and label in catalog["labels"]:
+        return f"{catalog['labels'][label]} ({unit}"
     parts = text.split("; ")
     for count in range(len(parts) - 1, 0, -1):
-        meaning = known["parameters"].get("; ".join(parts[:count]))
-        details = [_translate_detail(part, known["details"]) for part in parts[count:]]
+        meaning = catalog["parameters"].get("; ".join(parts[:count]))
+        details = [_translate_detail(part, catalog["details"]) for part in parts[count:]]
         if meaning is not None and None not in details:
             return "; ".join([meaning, *filter(None, details)])
     return None
@@ -56,20 +56,20 @@ def translate(text: str, language: str) -> str | None:
 
 def _translate_detail(part: str, words: dict[str, str]) -> str | None:
     """Return the translation of a part such as ``at least 3 mm``."""
-    found = next((word for word in words if part.startswith(f"{word} ")), None)
-    return None if found is None else words[found] + part[len(found) :]
+    word = next((word for word in words if part.startswith(f"{word} ")), None)
+    return None if word is None else words[word] + part[len(word) :]
 
 
 def collect_strings() -> set[str]:
     """Return labels and tooltips of all that is registered: of classes, their properties and enum items."""
     owners = (*operators.CLASSES, *panels.CLASSES, *groups.CLASSES, preferences.Preferences, display.Display)
-    found = {title(name) for name in PRESETS} | {PressTool.bl_label}
+    texts = {title(name) for name in PRESETS} | {PressTool.bl_label}
     for owner in owners:
-        found.add(getattr(owner, "bl_label", ""))
+        texts.add(getattr(owner, "bl_label", ""))
         if issubclass(owner, bpy.types.Operator):
-            found.add(inspect.cleandoc(owner.__doc__ or ""))
-        found.update(_property_strings(owner))
-    return found - {""}
+            texts.add(inspect.cleandoc(owner.__doc__ or ""))
+        texts.update(_property_strings(owner))
+    return texts - {""}
 
 
 def _property_strings(owner: Any) -> Iterator[str]:
@@ -82,23 +82,25 @@ def _property_strings(owner: Any) -> Iterator[str]:
     if issubclass(owner, bpy.types.Operator):  # its class does not list them
         area, _, name = owner.bl_idname.partition(".")
         described = getattr(getattr(bpy.ops, area), name).get_rna_type()
-    for known in described.properties if described is not None else ():
+    for shown in described.properties if described is not None else ():
         if (
-            known.identifier not in declared
-            or known.identifier.startswith(("bl_", "menu_"))
-            or known.is_hidden
+            shown.identifier not in declared
+            or shown.identifier.startswith(("bl_", "menu_"))
+            or shown.is_hidden
         ):
             continue
-        yield from (known.name, known.description)
-        for item in known.enum_items if known.type == "ENUM" else ():
+        yield from (shown.name, shown.description)
+        for item in shown.enum_items if shown.type == "ENUM" else ():
             yield from (item.name, item.description)
 
 
 def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], str]:
     """Return the entries that Blender takes, by context and text. `language`: one of `LANGUAGES`."""
-    found = {text: translate(text, language) for text in texts}
-    brushes = {(BRUSH, text): said for text, said in _catalog(language)["brushes"].items() if text in found}
-    return brushes | {(context, text): said for text, said in found.items() if said for context in CONTEXTS}
+    translated = {text: translate(text, language) for text in texts}
+    shown = _catalog(language)["brushes"].items()
+    brushes = {(BRUSH, text): words for text, words in shown if text in translated}
+    labels = {text: words for text, words in translated.items() if words}
+    return brushes | {(context, text): words for text, words in labels.items() for context in CONTEXTS}
 
 
 def register() -> None:

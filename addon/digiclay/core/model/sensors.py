@@ -137,10 +137,10 @@ class NoiseAhead:
     def draw(self, period: int, cells: NDArray[np.intp]) -> list[Floats | None]:
         """Return the noise of forces, N, and heights, m, in a period, (m[, b]) each; None: there is none."""
         count = len(cells)
-        known = bool(self._drawn) and cells.tobytes() == self._cells[:count].tobytes()
-        if not (known and self._first <= period < self._end):
+        continued = bool(self._drawn) and cells.tobytes() == self._cells[:count].tobytes()
+        if not (continued and self._first <= period < self._end):
             # The leading part of the cells is read before all of them.
-            self._cells = self._cells if known else cells.copy()
+            self._cells = self._cells if continued else cells.copy()
             self._first, self._end = period, period + max(1, min(AHEAD, MOST // max(1, self._cells.size)))
             radius, angle = draw_polar(self._seed, np.arange(self._first, self._end), self._cells)
             turns: tuple[np.ufunc, ...] = np.cos, np.sin

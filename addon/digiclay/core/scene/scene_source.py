@@ -71,7 +71,7 @@ def make_scene(
         return resolve(_override(merged, settings), path.stem, cache)
     except ParameterError as error:
         if settings:
-            make_scene(path, table)  # a file that is wrong by itself is told of first
+            make_scene(path, table)  # a file that is wrong by itself is reported first
         blamed = [one.option for one in settings if one.key == f"{error.owner}.{error.field}"]
         own = path.name if path.parent == SAMPLES else str(path)
         origin = (blamed or [one.option for one in settings] or [own])[-1]

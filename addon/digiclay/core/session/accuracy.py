@@ -32,7 +32,7 @@ Noted = tuple[tuple[State, Floats], ...]
 
 #: The reference's own error is taken to be a quarter of that of the run: halving the step leaves so much of
 #: an error of second order, which is what remains of a higher one across a kink. What comes out is an
-#: estimate, no bound, and is said as "about".
+#: estimate, no bound, and is printed as "about".
 SHARE = 4.0 / 3.0
 #: Control periods of a live session's stretch, and from the end of one to the start of the next. A period of
 #: the reference takes three times one of the session: one is done in so many, so that no tick is slow.

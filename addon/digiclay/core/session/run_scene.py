@@ -177,8 +177,8 @@ def run(
 ) -> Result:
     """Run a scene from rest to its end.
 
-    `progress`: told after each control period how many are done, and of how many; `stopped`: asked after each
-    control period; when it says True, the result is what there is so far; `versions`: what else to note as
+    `progress`: called after each control period with how many are done, and of how many; `stopped`: called
+    then too; when it returns True, the result is what there is so far; `versions`: what else to note as
     versions the run was made with. Raises ParameterError when the session cannot fit in memory. Raises
     DivergenceError when the integration leaves the finite numbers.
     """

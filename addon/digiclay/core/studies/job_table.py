@@ -142,7 +142,7 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
         files = [_find_scene(path, word) for word in words]
         for file in files:
-            load(file)  # what is wrong without any change is told of first
+            load(file)  # what is wrong without any change is reported first
         _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
         _refuse_twice("methods", methods, methods)
         parts = list(itertools.product(files, methods, changes.items()))
@@ -195,7 +195,7 @@ def _read_settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
     if not isinstance(given, dict) or not given:
         rule = "must be a section of labels such as soft = { control.force_gain = 2 }"
         raise ParameterError("settings", "", rule, show_value(given))
-    found = {}
+    settings = {}
     for label, changes in given.items():
         if not isinstance(changes, dict):
             rule = "must be a table such as { control.force_gain = 2 }"
@@ -203,8 +203,8 @@ def _read_settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
         if not re.fullmatch(r"\w[\w.+-]*", label):
             raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
         option = f"settings.{label}"
-        found[label] = [Setting(key, format_value(value), option) for key, value in _flatten(changes)]
-    return found
+        settings[label] = [Setting(key, format_value(value), option) for key, value in _flatten(changes)]
+    return settings
 
 
 def _flatten(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:

@@ -26,7 +26,7 @@ from ..scene.schema import Scene
 from ..session.accuracy import estimate_errors
 from ..session.run_scene import run
 
-#: Parts that can be left out, and what is said of it.
+#: Parts that can be left out, and its description.
 PARTS = {
     "conduit": "no conduit behind the valve",
     "valve_lag": "valves that follow at once",

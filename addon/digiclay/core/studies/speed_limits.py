@@ -167,13 +167,13 @@ def find_largest_speed(
     low: float = 2e-3,
     high: float = 40e-3,
     resolution: float = 0.5e-3,
-    told: Callable[[Follows], object] = lambda judged: None,
+    report: Callable[[Follows], object] = lambda judged: None,
 ) -> float | None:
     """Return the largest speed, m/s, at which a fingertip is followed, by bisection; see `bisect`."""
 
     def holds(speed: float) -> bool:
         judged, _ = track(scene, way, speed)
-        told(judged)
+        report(judged)
         return judged.meets(criterion)
 
     return bisect(holds, low, high, resolution)
