@@ -84,6 +84,15 @@ BENCHMARKS = {
         {"--whole-bed": "also peers that integrate all cells, on the paper's bed (11 minutes more)"},
         needs="scipy",
     ),
+    "peers": Benchmark(
+        "pinbench.run.measure", "engines on eight problems, by their adapters: error against run time",
+        ("", "my_adapter.py --out results"),
+        {
+            "files FILE": {"nargs": "*", "help": "more adapters: Python files, see benchmarks/README.md"},
+            "--make-references": "make the references of the problems again, instead (4 minutes)",
+        },
+        needs="scipy",
+    ),
     "terms": Benchmark(
         "session_parts.measure_terms", "cost and effect of each part of the model",
         ("tap", "ridge_mound_valley --out results"), scene="",
@@ -171,7 +180,7 @@ def run(name: str, arguments: argparse.Namespace) -> int:
         refuse_without_blender()
     elif benchmark.needs:
         refuse_without(f"python -m benchmarks {name}", EXTRAS[benchmark.needs], benchmark.needs)
-    module, _, function = benchmark.measure.partition(".")
+    module, _, function = benchmark.measure.rpartition(".")
     measure: Any = getattr(import_module(f"{__package__}.{module}"), function)
     with Steps(io.StringIO() if arguments.quiet else sys.stderr, name) as steps:
         reports: Report | list[Report] = measure(arguments, steps)

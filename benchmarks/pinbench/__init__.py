@@ -1,0 +1,1 @@
+"""PinBench: problems that name no engine, adapters of engines, and references."""

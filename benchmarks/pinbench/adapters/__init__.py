@@ -1,0 +1,1 @@
+"""Adapters: each a file with METHODS and `prepare`; see ../../README.md."""

@@ -1,0 +1,234 @@
+"""Benchmark ``peers``: engines on the problems of PinBench, by their adapters."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import statistics
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from digiclay.commands.progress import table
+from digiclay.core.base.arrays import Floats
+from digiclay.core.base.errors import DigiclayError
+
+from ..report import Curves, Report, Steps, tabulate
+from .problem import Problem, read_problems
+
+ADAPTERS = Path(__file__).parent / "adapters"
+NAMES = ("own", "numpy_runge_kutta", "scipy_solvers", "mujoco_force", "mujoco_contact")
+#: Engine whose adapter is left out where its package is absent.
+OPTIONAL = {"mujoco_force": "mujoco", "mujoco_contact": "mujoco"}
+#: Problems and settings of a method with --quick.
+QUICK, FEW = ("damped_pins", "relaxation_alone"), 2
+#: Runs, of which the median counts; processor time from which on one is enough, and from which on the finer
+#: settings of a method are left out, s.
+REPEATS, LONG, LONGEST = 3, 2.0, 15.0
+#: Errors of height and of force at which the fastest are compared, m and N: where pins cannot move, of force.
+LEVELS = {"height_error": (1e-5, 1e-6, 1e-7, 1e-8, 1e-9), "force_error": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)}
+RUNS = {
+    "problem": "problem", "method": "method", "step, ms, or tolerance": "setting", "height error, nm":
+    "height_error .3g 1e9", "force error, µN": "force_error .3g 1e6", "CPU, µs a period": "seconds .4g 1e6",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An engine's answer to a problem: SI units, processor time a period."""
+
+    problem: str
+    engine: str
+    method: str
+    setting: str
+    height_error: float
+    force_error: float
+    seconds: float
+    apart: bool
+    """Whether its contact model is another one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Adapter:
+    """An engine's file; `prepare` takes a problem, a method and a setting and returns what solves it."""
+
+    name: str
+    methods: dict[str, tuple[float, ...]]
+    prepare: Callable[..., Any]
+    apart: frozenset[str]
+
+
+def load_adapter(path: Path) -> Adapter:
+    """Return the adapter in a file; DigiclayError where it is none."""
+    spec = importlib.util.spec_from_file_location(f"pinbench_{path.stem}", path)
+    try:
+        if spec is None or spec.loader is None:
+            raise ImportError("it must end with .py")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        methods = {str(name): tuple(map(float, given)) for name, given in module.METHODS.items()}
+        if not all(methods.values()) or not callable(module.prepare):
+            raise ValueError("METHODS must have settings for each method, and prepare must be a function")
+        return Adapter(path.stem, methods, module.prepare, frozenset(getattr(module, "APART", ())))
+    except Exception as error:
+        raise DigiclayError(f"peers: {path} is no adapter: {_describe(error)}") from None
+
+
+def list_adapters(others: Sequence[str] = ()) -> list[Adapter]:
+    """Return all adapters, then those of other files."""
+    paths = [ADAPTERS / f"{name}.py" for name in NAMES]
+    present = [p for p in paths if p.stem not in OPTIONAL or importlib.util.find_spec(OPTIONAL[p.stem])]
+    return [load_adapter(path) for path in (*present, *map(Path, others))]
+
+
+def solve(adapter: Adapter, problem: Problem, method: str, setting: float) -> Answer | None:
+    """Return an answer, or None where the engine has no such pins; DigiclayError where it fails."""
+    shape = len(problem.judged), problem.pins.size
+    try:
+        run = adapter.prepare(problem, method, setting)
+        if run is None:
+            return None
+        seconds: list[float] = []
+        with np.errstate(all="ignore"):
+            while len(seconds) < REPEATS and sum(seconds) < LONG:
+                started = time.process_time()
+                answer = run()
+                seconds.append(time.process_time() - started)
+        heights, forces = (_check(values, shape) for values in answer)
+    except Exception as error:
+        where = f"{adapter.name}, {method} at {setting:g} on {problem.name}"
+        raise DigiclayError(f"peers: {where}: {_describe(error)}") from None
+    errors = problem.compare(heights, forces)
+    period = statistics.median(seconds) / problem.count
+    apart = method in adapter.apart
+    return Answer(problem.name, adapter.name, method, f"{setting:g}", *errors, period, apart)
+
+
+def _check(values: Any, shape: tuple[int, int]) -> Floats:
+    """Return heights or forces as an array; ValueError if they are no (t, p)."""
+    array = np.asarray(values, float)
+    if array.shape != shape:
+        raise ValueError(f"heights and forces must have the shape {shape}, got {array.shape}")
+    return array
+
+
+def _describe(error: Exception) -> str:
+    """Return an error as the end of one line."""
+    first = next(iter(str(error).splitlines()), "")
+    return f"{type(error).__name__}: {first.rstrip('.')}."
+
+
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Run all adapters on all problems, one after another, or make the references again."""
+    problems = read_problems()
+    if arguments.make_references:
+        from . import reference
+
+        for problem in steps.through(list(problems.values()), lambda problem: problem.name):
+            reference.write(problem)
+        return Report(list_problems(read_problems()))
+    adapters = list_adapters(arguments.files)
+    if arguments.quick:
+        problems = {name: problems[name] for name in QUICK}
+    answers: list[Answer] = []
+    steps.total = len(problems) * sum(len(adapter.methods) for adapter in adapters)
+    for problem in problems.values():
+        for adapter in adapters:
+            for method, settings in adapter.methods.items():
+                answers += run_method(
+                    adapter, problem, method, settings[:FEW] if arguments.quick else settings
+                )
+                steps(f"{problem.name}: {method}")
+    rows = [asdict(answer) for answer in answers]
+    return Report([*list_problems(problems), *list_answers(answers)], rows, draw_curves(answers))
+
+
+def run_method(
+    adapter: Adapter, problem: Problem, method: str, settings: tuple[float, ...]
+) -> Iterator[Answer]:
+    """Give the answers of a method at settings, coarse to fine, until it takes too long."""
+    for setting in settings:
+        answer = solve(adapter, problem, method, setting)
+        if answer:
+            yield answer
+        if answer is None or answer.seconds * problem.count > LONGEST:
+            return
+
+
+def draw_curves(answers: Sequence[Answer]) -> Curves:
+    """Return the work-precision plot; of forces where no pin moves."""
+    panels: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    for answer in answers:
+        label = f"{answer.method} (other contact)" if answer.apart else answer.method
+        points = panels.setdefault(answer.problem, {}).setdefault(label, [])
+        if 0.0 < answer.force_error < 1e3:
+            points.append((answer.seconds * 1e6, answer.force_error * 1e6))
+    return Curves(panels, "CPU time a period, µs", "largest force error, µN")
+
+
+def list_problems(problems: dict[str, Problem]) -> Iterator[str]:
+    """Give the table of problems."""
+    yield "\nThe problems; the last columns are how far another solver of SciPy is from the reference.\n"
+    head = ("problem", "pins", "judged", "periods", "height, pm", "force, nN")
+    rows = []
+    for problem in problems.values():
+        apart = problem.file["reference"]["apart"]
+        sizes = f"{problem.places[0].size}", f"{problem.pins.size}", f"{problem.count}"
+        rows.append([problem.name, *sizes, f"{apart['height'] * 1e12:.2g}", f"{apart['force'] * 1e9:.2g}"])
+    yield from table(head, rows)
+
+
+def list_answers(answers: Sequence[Answer]) -> Iterator[str]:
+    """Give the tables of answers, those of another contact model apart, and of the fastest."""
+    same, other = ([a for a in answers if a.apart == apart] for apart in (False, True))
+    yield "\nAnswers: largest errors of judged pins; processor time of a run, without set-up, over periods.\n"
+    yield from tabulate(map(asdict, same), RUNS, left=3)
+    if other:
+        yield "\nForms with another contact model: not comparable with those above.\n"
+        yield from tabulate(map(asdict, other), RUNS, left=3)
+    for quantity, unit, factor in (("height_error", "µm", 1e6), ("force_error", "µN", 1e6)):
+        yield f"\nThe fastest method at an error of {quantity.partition('_')[0]} of at most, µs a period;"
+        yield "(x) is the time of digiclay's fastest over that of the fastest other engine.\n"
+        levels = LEVELS[quantity]
+        rows = [
+            [name, *(compare([a for a in same if a.problem == name], quantity, level) for level in levels)]
+            for name in dict.fromkeys(answer.problem for answer in same)
+        ]
+        yield from table(("problem", *(f"{level * factor:g} {unit}" for level in levels)), rows)
+    lost = sorted({(a.problem, a.engine) for a in list_winners(same) if a.engine != "own"})
+    yield (
+        "\nAnother engine wins at one of these errors at least: "
+        + ("; ".join(f"{engine} on {problem}" for problem, engine in lost) or "none")
+        + "."
+    )
+
+
+def find_fastest(
+    answers: Sequence[Answer], quantity: str, level: float, *, own: bool | None
+) -> Answer | None:
+    """Return the fastest answer within an error: digiclay's, that of others, or of all."""
+    fit = [a for a in answers if getattr(a, quantity) <= level and own in (None, a.engine == "own")]
+    return min(fit, key=lambda answer: answer.seconds, default=None)
+
+
+def list_winners(answers: Sequence[Answer]) -> Iterator[Answer]:
+    """Give the fastest answers of all problems at all errors."""
+    for name in dict.fromkeys(answer.problem for answer in answers):
+        for quantity, levels in LEVELS.items():
+            for level in levels:
+                best = find_fastest([a for a in answers if a.problem == name], quantity, level, own=None)
+                if best:
+                    yield best
+
+
+def compare(answers: Sequence[Answer], quantity: str, level: float) -> str:
+    """Return the cell of a problem and an error: the fastest method, and digiclay's time over the others'."""
+    best = find_fastest(answers, quantity, level, own=None)
+    if best is None:
+        return "-"
+    ours, theirs = (find_fastest(answers, quantity, level, own=own) for own in (True, False))
+    ratio = f" ({ours.seconds / theirs.seconds:.2f})" if ours and theirs else ""
+    return f"{best.method} {best.seconds * 1e6:.0f}{ratio}"

@@ -1,0 +1,179 @@
+"""PinBench: every adapter answers the small problems, a stranger's file works, a broken one is refused."""
+
+from __future__ import annotations
+
+import shutil
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.pinbench import reference, run
+from benchmarks.pinbench.problem import Law, Problem, read_problems
+
+PROBLEMS = read_problems()
+#: By method: a setting, the largest errors of height on damped_pins, m, and of force on relaxation_alone, N.
+ANSWERS = {
+    "digiclay": (5e-3, 0.2e-9, 50e-6),
+    "digiclay richardson": (2.5e-3, 5e-12, 1.5e-6),
+    "digiclay runge_kutta_4": (2.5e-3, 20e-9, 20e-6),
+    "Runge-Kutta 4, numpy": (2.5e-3, 20e-9, 20e-6),
+    "SciPy LSODA": (1e-5, 5e-6, 30e-6),
+    "SciPy DOP853": (1e-5, 0.1e-6, 20e-6),
+    "SciPy RK45": (1e-5, 0.1e-6, 30e-6),
+    "MuJoCo, applied force": (1e-3, 7e-6, 12e-3),
+    "MuJoCo, moving joint limits": (1e-3, 7e-6, None),
+    "MuJoCo, contacts of spheres": (1e-3, 0.5e-3, None),
+}
+
+
+def find_adapter(method: str) -> run.Adapter:
+    """Return the adapter of a method; skip the test where MuJoCo is absent."""
+    if method.startswith("MuJoCo") and find_spec("mujoco") is None:
+        pytest.skip("mujoco-core is not installed")
+    return next(adapter for adapter in run.list_adapters() if method in adapter.methods)
+
+
+@pytest.mark.parametrize("method", list(ANSWERS))
+def test_an_adapter_answers_the_small_problems_within_its_tolerance(method: str) -> None:
+    setting, height, force = ANSWERS[method]
+    adapter = find_adapter(method)
+    damped, relaxed = (run.solve(adapter, PROBLEMS[name], method, setting) for name in run.QUICK)
+    assert damped is not None
+    assert 0.0 < damped.height_error < height
+    assert damped.seconds > 0.0
+    if force is None:
+        assert relaxed is None
+    else:
+        assert relaxed is not None
+        assert 0.0 < relaxed.force_error < force
+
+
+def test_every_method_has_a_row_and_every_adapter_at_most_60_lines_of_code() -> None:
+    adapters = run.list_adapters()
+    missing = {method for method in ANSWERS if method.startswith("MuJoCo") and find_spec("mujoco") is None}
+    assert {method for adapter in adapters for method in adapter.methods} == ANSWERS.keys() - missing
+    for path in run.ADAPTERS.glob("*.py"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        code = [line for line in lines if line.strip() and not line.lstrip().startswith(('"""', "#"))]
+        assert len(code) <= 60, path.name
+
+
+@pytest.mark.parametrize("name", list(PROBLEMS))
+def test_a_finer_step_of_another_method_comes_to_the_reference(name: str) -> None:
+    problem = PROBLEMS[name]
+    exact = problem.file["reference"]
+    assert exact["apart"]["height"] < 1e-12
+    assert exact["apart"]["force"] < 1e-10
+    shape = len(problem.judged), problem.pins.size
+    assert np.shape(exact["heights"]) == np.shape(exact["forces"]) == shape
+    assert (np.max(exact["forces"], axis=0) > 0.0).sum() > 3
+    method = "digiclay richardson"
+    answer = run.solve(find_adapter(method), problem, method, 1e-3)
+    assert answer is not None
+    # The steep contact and turbulence are the two that a step of 1 ms does not resolve.
+    height, force = {"stiff": (0.2e-6, 1e-3), "turbulent_valve": (2e-6, 0.2e-3)}.get(name, (5e-9, 1e-5))
+    assert answer.height_error < height
+    assert answer.force_error < force
+
+
+@pytest.mark.parametrize("name", ["end_stops", "relaxation_alone", "turbulent_valve"])
+def test_a_reference_is_what_its_method_finds(name: str) -> None:
+    problem = PROBLEMS[name]
+    found = reference.solve_pins(problem, problem.pins[:2], "DOP853", 1e-12)
+    exact = problem.file["reference"]
+    for values, key in zip(found, ("heights", "forces"), strict=True):
+        assert np.abs(values - np.array(exact[key])[:, :2]).max() < 1e-10
+
+
+def test_pins_that_cannot_move_carry_the_convolution_of_their_press() -> None:
+    # The first press of relaxation_alone, over the middle pin: depth a t - d; F = ∫ G(t - s) dT(s).
+    problem = PROBLEMS["relaxation_alone"]
+    law, (start, end), middle = Law(problem), problem.file["path"][:2], 24
+    speed = (start[3] - end[3]) / end[0]
+    touch = (start[3] - problem.file["pin"]["rest_height"]) / speed
+    pace, time = law.exponent * speed, 0.1 - touch
+    nu = law.rates[:, 0]
+    lost = law.shares * nu * law.unit * (
+        (np.exp(pace * time) - np.exp(-nu * time)) / (pace + nu) + np.expm1(-nu * time) / nu
+    )  # fmt: skip
+    exact = law.unit * np.expm1(pace * time) - lost.sum()
+    judged, at = problem.judged.index(20), problem.pins.tolist().index(middle)
+    assert problem.file["reference"]["forces"][judged][at] == pytest.approx(exact, rel=1e-12)
+
+
+BROKEN = {
+    "METHODS": "def prepare(problem, method, setting): pass\n",
+    "prepare": "METHODS = {'mine': (1e-3,)}\nprepare = None\n",
+    "settings": "METHODS = {'mine': ()}\ndef prepare(problem, method, setting): pass\n",
+    "SyntaxError": "METHODS = {\n",
+    "ZeroDivisionError": "METHODS = {'mine': (1e-3,)}\ndef prepare(problem, method, setting): 1 / 0\n",
+    "shape (6, 24), got (3,)": "METHODS = {'mine': (1e-3,)}\n"
+    "def prepare(problem, method, setting): return lambda: ([1, 2, 3], [1, 2, 3])\n",
+}
+
+
+@pytest.mark.parametrize("word", list(BROKEN))
+def test_a_broken_adapter_is_one_line_and_exit_code_2(word, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(run, "NAMES", ())
+    (tmp_path / "mine.py").write_text(BROKEN[word], encoding="utf-8")
+    code, told = main(["peers", "--quick", "--quiet", str(tmp_path / "mine.py")]), capsys.readouterr()
+    assert (code, told.out, told.err.count("\n"), word in told.err) == (2, "", 1, True)
+
+
+def test_a_missing_adapter_is_one_line_and_exit_code_2(capsys):
+    assert main(["peers", "--quick", "--quiet", "nowhere.py"]) == 2
+    assert "nowhere.py is no adapter" in capsys.readouterr().err
+
+
+def test_a_strangers_adapter_is_a_file_on_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(run, "NAMES", ("own",))
+    shutil.copy(run.ADAPTERS / "numpy_runge_kutta.py", tmp_path / "mine.py")
+    out = ["--out", str(tmp_path / "results")]
+    assert main(["peers", "--quick", "--quiet", str(tmp_path / "mine.py"), *out]) == 0
+    printed = capsys.readouterr().out
+    assert "Runge-Kutta 4, numpy" in printed
+    files = sorted(path.name for path in Path(tmp_path / "results").iterdir())
+    assert files == ["peers.csv", "peers.md", "peers.png"]
+    assert ',mine,"Runge-Kutta 4, numpy",' in (tmp_path / "results" / "peers.csv").read_text(encoding="utf-8")
+
+
+def test_the_page_says_where_another_engine_wins_and_keeps_other_contact_models_apart() -> None:
+    def make(engine: str, seconds: float, *, apart: bool = False) -> run.Answer:
+        return run.Answer("p", engine, engine, "0.001", 1e-8, 1e-6, seconds, apart)
+
+    answers = [make("own", 2.0), make("fast", 1.0), make("other", 0.5, apart=True)]
+    page = list(run.list_answers(answers))
+    assert page[-1].endswith("fast on p.")
+    split = next(i for i, line in enumerate(page) if "another contact model" in line)
+    assert not any("other " in line for line in page[:split])
+    assert run.compare(answers[:2], "height_error", 1e-7) == "fast 1000000 (2.00)"
+    assert list(run.list_answers(answers[:1]))[-1].endswith("none.")
+
+
+def test_an_engine_that_diverges_has_infinite_errors_and_is_never_the_fastest() -> None:
+    problem = PROBLEMS["stiff"]
+    answer = run.solve(find_adapter("digiclay"), problem, "digiclay runge_kutta_4", 5e-3)
+    assert answer is not None
+    assert (answer.height_error, answer.force_error) == (np.inf, np.inf)
+    assert run.compare([answer], "force_error", 1.0) == "-"
+
+
+def test_a_method_stops_at_settings_that_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = PROBLEMS["relaxation_alone"]
+    adapter = find_adapter("digiclay")
+    assert len(list(run.run_method(adapter, problem, "digiclay", (5e-3, 2.5e-3)))) == 2
+    monkeypatch.setattr(run, "LONGEST", 0.0)
+    assert len(list(run.run_method(adapter, problem, "digiclay", (5e-3, 2.5e-3)))) == 1
+
+
+def test_the_law_of_a_problem_holds_its_recorded_commands() -> None:
+    problem: Problem = PROBLEMS["press_and_drag"]
+    assert problem.commands.shape == (480, 625)
+    law = Law(problem, problem.pins)
+    pieces = list(law.pieces(100))
+    assert [piece[1] for piece in pieces] == pytest.approx([0.501, 0.505])
+    for _, end, segment in pieces[:1]:  # the opening is continuous where a command comes to the valve
+        assert law.opening(end, segment) == pytest.approx(law.opening(end, segment + 1), abs=1e-15)
