@@ -86,7 +86,7 @@ BENCHMARKS = {
     ),
     "peers": Benchmark(
         "pinbench.run.measure", "engines on eight problems, by their adapters: error against run time",
-        ("", "my_adapter.py --out results"),
+        ("", "mine.py --out results"),
         {
             "files FILE": {"nargs": "*", "help": "more adapters: Python files, see benchmarks/README.md"},
             "--make-references": "make the references of the problems again, instead (4 minutes)",

@@ -38,8 +38,8 @@ class Problem:
     @property
     def count(self) -> int:
         """Number of periods."""
-        end: float = self.file["path"][-1][0]
-        return round(end / self.file["period"])
+        periods: int = round(self.file["path"][-1][0] / self.file["period"])
+        return periods
 
     @cached_property
     def pins(self) -> NDArray[np.intp]:

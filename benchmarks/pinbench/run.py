@@ -27,7 +27,7 @@ OPTIONAL = {"mujoco_force": "mujoco", "mujoco_contact": "mujoco"}
 QUICK, FEW = ("damped_pins", "relaxation_alone"), 2
 #: Runs, of which the median counts; processor time from which on one is enough, and from which on the finer
 #: settings of a method are left out, s.
-REPEATS, LONG, LONGEST = 3, 2.0, 15.0
+REPEATS, LONG, LONGEST = 3, 1.0, 6.0
 #: Errors of height and of force at which the fastest are compared, m and N: where pins cannot move, of force.
 LEVELS = {"height_error": (1e-5, 1e-6, 1e-7, 1e-8, 1e-9), "force_error": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)}
 RUNS = {
@@ -65,10 +65,13 @@ def load_adapter(path: Path) -> Adapter:
     """Return the adapter in a file; DigiclayError where it is none."""
     spec = importlib.util.spec_from_file_location(f"pinbench_{path.stem}", path)
     try:
-        if spec is None or spec.loader is None:
+        if path.parent == ADAPTERS:
+            module = importlib.import_module(f".adapters.{path.stem}", __package__)
+        elif spec is None or spec.loader is None:
             raise ImportError("it must end with .py")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        else:
+            module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
         methods = {str(name): tuple(map(float, given)) for name, given in module.METHODS.items()}
         if not all(methods.values()) or not callable(module.prepare):
             raise ValueError("METHODS must have settings for each method, and prepare must be a function")

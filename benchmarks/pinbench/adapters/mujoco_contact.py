@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.pinbench.problem import Law
+from ..problem import Law
 
 LIMITS, SPHERES = "MuJoCo, moving joint limits", "MuJoCo, contacts of spheres"
 METHODS = dict.fromkeys((LIMITS, SPHERES), (5e-3, 1e-3, 5e-4))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.pinbench.problem import Law
+from ..problem import Law
 
 METHODS = {"MuJoCo, applied force": (5e-3, 1e-3, 5e-4)}
 #: Mass of a pin, kg: as good as none; damping of a shut valve, N s/m.

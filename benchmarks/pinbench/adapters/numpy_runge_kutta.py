@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.pinbench.problem import Law
+from ..problem import Law
 
 METHODS = {"Runge-Kutta 4, numpy": (5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4)}
 

@@ -8,7 +8,7 @@ import numpy as np
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.scene.toml_table import resolve
 
-from benchmarks.problems import run
+from ...problems import run
 
 METHODS = {
     "digiclay": (5e-3, 2.5e-3, 1e-3, 5e-4, 1e-4),

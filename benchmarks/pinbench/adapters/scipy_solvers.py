@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.pinbench.problem import Law
+from ..problem import Law
 
 METHODS = dict.fromkeys(("SciPy LSODA", "SciPy DOP853", "SciPy RK45"), (1e-3, 1e-5, 1e-7, 1e-9))
 
