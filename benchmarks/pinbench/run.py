@@ -6,8 +6,10 @@ import argparse
 import importlib.util
 import statistics
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +97,8 @@ def solve(adapter: Adapter, problem: Problem, method: str, setting: float) -> An
         if run is None:
             return None
         seconds: list[float] = []
-        with np.errstate(all="ignore"):
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")  # what comes out is compared
             while len(seconds) < REPEATS and sum(seconds) < LONG:
                 started = time.process_time()
                 answer = run()
@@ -146,7 +149,9 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
                 )
                 steps(f"{problem.name}: {method}")
     rows = [asdict(answer) for answer in answers]
-    return Report([*list_problems(problems), *list_answers(answers)], rows, draw_curves(answers))
+    mujoco = [f"mujoco-core {version('mujoco-core')}"] if importlib.util.find_spec("mujoco") else []
+    lines = [*mujoco, *list_problems(problems), *list_answers(answers)]
+    return Report(lines, rows, draw_curves(answers))
 
 
 def run_method(

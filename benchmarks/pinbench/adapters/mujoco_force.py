@@ -17,10 +17,9 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
     """Return what integrates a problem once at a step, s."""
     import mujoco
 
+    mujoco.set_mju_user_warning(lambda text: None)  # of instability, which is compared
     law, stroke = Law(problem), problem.file["pin"]["stroke"]
-    pin = (
-        f'<body><joint type="slide" axis="0 0 1" range="0 {stroke}"/><geom size="1e-3" mass="{MASS}"/></body>'
-    )
+    pin = f'<body><joint type="slide" axis="0 0 1"/><geom size="1e-3" mass="{MASS}"/></body>'
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="{setting}" gravity="0 0 0" integrator="implicitfast">'
         f'<flag contact="disable"/></option><worldbody>{pin * problem.places[0].size}</worldbody></mujoco>'
@@ -42,6 +41,7 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
             else:
                 np.negative(force, data.qfrc_applied)
             mujoco.mj_step(model, data)
+            np.clip(data.qpos, 0.0, stroke, out=data.qpos)  # limits of joints without mass are soft
             state[0] = data.qpos
             if aged.size:
                 state[1:] = aged * state[1:] + (1.0 - aged) * tension
