@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +85,8 @@ def serve(folder: Path, *options: str, rate: int = 200) -> Iterator[Server]:
     process = subprocess.Popen(
         command, cwd=folder, env={**os.environ, "PYTHONPATH": path}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        # Its end by SIGHUP is tested, also below a nohup, which would have it ignored.
+        preexec_fn=partial(signal.signal, signal.SIGHUP, signal.SIG_DFL),
     )  # fmt: skip
     try:
         assert process.stdout is not None
