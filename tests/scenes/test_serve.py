@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -373,7 +374,12 @@ def test_the_example_shows_the_heights_on_a_pin_display(server: Server, door: so
 
     with (
         subprocess.Popen(
-            [*command, "--rate", "100"], env=environment, stdout=subprocess.PIPE, text=True
+            [*command, "--rate", "100"],
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+            # In the background of a shell it would have Ctrl-C ignored.
+            preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
         ) as example,
         ExitStack() as stack,
     ):
