@@ -27,6 +27,26 @@ class ControlParameters(Parameters):
 
 
 @dataclass(frozen=True)
+class Pace:
+    """How fast a method can be led by a fingertip; the default suits any.
+
+    In radii of the blister and shares of the speed of a pin without load, so that it holds for all sizes
+    and valves.
+    """
+
+    drag: float = 2.0
+    """Fastest drag of a blister raised or leveled, radii/s."""
+    push: float = 20.0 / 3.0
+    """Fastest drag of a fingertip that presses a valley, radii/s."""
+    lift: float = 0.7
+    """Fastest rise, as a share of the speed of a pin without load."""
+    gain: float = 1.0
+    """Time to gain that speed, s: at once, it leaves the pins behind, whose valves have not opened yet."""
+    sink: float = 0.8
+    """Fastest press, as a share of the speed of a pin without load."""
+
+
+@dataclass(frozen=True)
 class Method:
     """Module of a control method, and its requirements."""
 
@@ -40,6 +60,8 @@ class Method:
     """Whether its cells go back to the height they had at rest."""
     by_set: bool = False
     """Whether its orders for a cell depend on which other cells are active; see `System.by_set`."""
+    pace: Pace = field(default=Pace())
+    """How fast a fingertip may lead its blister."""
     digest: str = ""
     """Identifies the code of a method that is no part of this package; empty: it is."""
 
@@ -75,7 +97,7 @@ METHODS: dict[str, Method] = {
     "push_pull": Method("control.push_pull", "PushPull", by_set=True),
     "force_display": Method("control.displays", "ForceDisplay", recovers=True),
     "shape_display": Method("control.displays", "ShapeDisplay"),
-    "hybrid": Method("control.hybrid", "Hybrid", {}),
+    "hybrid": Method("control.hybrid", "Hybrid", {}, pace=Pace(drag=8.0, gain=0.3)),
 }
 
 #: What has been added to this process, see `add_method`; a .blend keeps the names of these.
