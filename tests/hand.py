@@ -16,6 +16,7 @@ from digiclay.sessions.sculpting import change_stroke
 SIZES = {"rows": 15, "columns": 15}
 SCENE = resolve({"layout": SIZES})
 TICK = 1 / 30
+PERIOD = SCENE.simulation.control_period
 
 
 def pose(x: float = 0.0, z: float = 46.0) -> Floats:
@@ -50,10 +51,16 @@ class Hand:
 
 
 def go_on(session: Running, ticks: int) -> Running:
-    """Let the session go on; the fingertip stays where it is."""
+    """Let the session go on; the fingertip stays where it is, or follows strokes in the time of the ticks."""
     now = session.clock.seen or 0.0
     for count in range(ticks):
-        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
+        time = now + (count + 1) * TICK
+        if session.strokes and not session.paused:  # else the machine's speed would tell how far it comes
+            periods = round((time - now) / PERIOD) - round((time - TICK - now) / PERIOD)
+            session = replace(session, clock=replace(session.clock, seen=time), tick=session.tick + 1)
+            session = sculpting.follow_finger(session, session.pose, periods)
+        else:
+            session = sculpting.advance(session, session.pose, time, 100)
     return session
 
 

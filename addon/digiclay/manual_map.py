@@ -19,6 +19,7 @@ ENTRIES = (
     ("bpy.ops.digiclay.session", "#first-ridge"),
     ("bpy.ops.digiclay.session_go_on", "#first-ridge"),
     ("bpy.ops.digiclay.session_*", "#keys"),
+    ("bpy.ops.digiclay.finish_strokes", "#keys"),
     ("bpy.ops.digiclay.leave_mode", "#troubleshooting"),
     ("bpy.ops.digiclay.press", "#brushes"),
     ("bpy.ops.digiclay.press_brush", "#brushes"),

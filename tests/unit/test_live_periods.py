@@ -24,6 +24,8 @@ from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
     Clock,
     clamp_pose,
+    count_queue,
+    find_spare,
     interpolate_path,
     periods_due,
     simulate_path,
@@ -91,6 +93,35 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
     _, clock = looked([0.0])
     # 101 periods have gone by, and each takes five to simulate: 14 take 70, 15 would take 75.
     assert periods_due(update_cost(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)[0] == 14
+
+
+@pytest.mark.parametrize(
+    ("drawing", "spent", "between"),
+    [
+        pytest.param(1e-3, 23e-3, 33e-3, id="a graphics card: all of the time but a share for the person"),
+        pytest.param(15e-3, 19e-3, 34e-3, id="a slow one: what is left of the time between two ticks"),
+        pytest.param(30e-3, 12e-3, 42e-3, id="drawing takes all of it: a share of the drawing"),
+        pytest.param(0.5, 0.2, 0.7, id="drawing by software"),
+    ],
+)
+def test_the_periods_of_a_queue_leave_the_window_its_redraws(drawing, spent, between):
+    interval, clock, now = 1 / 30, Clock(), 0.0
+    for _ in range(60):
+        spare = find_spare(clock, now, interval)
+        clock = count_queue(clock, now, 8 * spare, spare)
+        gone = max(interval, spare + drawing)
+        now += gone
+    assert (spare, gone) == pytest.approx((spent, between), rel=0.05)
+    assert clock.factor == pytest.approx(8 * spent / between, rel=0.05)
+
+
+def test_a_queue_that_waits_for_the_hand_does_not_count() -> None:
+    clock = count_queue(Clock(seen=0.0), 0.1, 0.5, 0.05)
+    assert clock.factor == pytest.approx(5.0)
+    waited = count_queue(clock, 60.0, 0.0, 0.0)
+    assert waited.factor == clock.factor
+    # Nor is the time made up for by a finger that is moved by hand afterwards.
+    assert looked([60.012], clock=waited)[0] == [2]
 
 
 def pose(x: float = 0.0, z: float = 0.05) -> Floats:
@@ -312,6 +343,20 @@ def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next() -> N
     straight, aside = ways
     assert aside.pose[1] > straight.pose[1] == 0.0
     assert not np.array_equal(commands(straight), commands(aside))
+
+
+def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step() -> None:
+    session = hand.started()
+    for x in (-9e-3, 9e-3):
+        session, number = queue_stroke(session, x, 0.0, 4e-3)
+        session = hand.let_go(session, number)
+    finished = []
+    for now in (1.0, 2.0):
+        session = sculpting.advance(session, hand.pose(), now, 1, interval=1e3)
+        finished.append(session.finished_strokes)
+        assert session.snapshot == snapshot.dump(session.system, session.state)
+    assert finished == [1, 2]
+    assert len(session.gestures) == 2
 
 
 @pytest.mark.usefixtures("quick_machine")

@@ -32,6 +32,7 @@ OBJECT = ("Object Mode", "EMPTY")
 KEYS: tuple[tuple[tuple[str, str], str, str, dict[str, bool]], ...] = (
     (VIEW, "digiclay.session_pause", "P", {}),
     (VIEW, "digiclay.session_step", "P", {"shift": True}),
+    (VIEW, "digiclay.finish_strokes", "RET", {}),
     (VIEW, "digiclay.session_rewind", "BACK_SPACE", {}),
     (VIEW, "digiclay.session_reset", "BACK_SPACE", {"shift": True}),
     (WINDOW, "digiclay.session_escape", "ESC", {"any": True}),

@@ -14,6 +14,8 @@ from ..sessions import running
 GONE = 5.0
 #: Ticks may come this much early, as a share of the time between two: timers are not exact.
 EARLY = 0.2
+#: Time between ticks in haste, s: after so long the progress moves, and Esc is seen.
+HASTE = 0.3
 #: How often the numbers in the sidebar are drawn anew, s.
 NUMBERS = 0.25
 
@@ -31,6 +33,8 @@ class Loop:
     numbers: float = 0.0
     #: Whether for the moment no operator drives it, nor takes the keys.
     aside: bool = False
+    #: Whether strokes are being finished: ticks are long, and draw nothing until one is finished.
+    in_haste: bool = False
 
 
 LOOP = Loop()
@@ -78,9 +82,14 @@ def end() -> None:
     if LOOP.timer is None:
         return
     bpy.context.window_manager.event_timer_remove(LOOP.timer)
-    LOOP.timer, LOOP.aside = None, False
+    LOOP.timer, LOOP.aside, LOOP.in_haste = None, False, False
     bpy.types.STATUSBAR_HT_header.remove(draw)
     redraw_status()
+
+
+def find_interval(context: Any) -> float:
+    """Return the time between two ticks, s."""
+    return HASTE if LOOP.in_haste else 1.0 / float(preferences.get(context).redraw_rate)
 
 
 def is_due(context: Any, now: float) -> bool:
@@ -118,6 +127,8 @@ def draw(header: Any, context: Any) -> None:
     step = row.row(align=True)
     step.label(text="", icon="EVENT_SHIFT")
     step.label(text="Single Step", icon="EVENT_P")
+    if any(session.strokes for session in running.list_sessions()):
+        row.label(text="Finish Strokes", icon="EVENT_RETURN")
     row.label(text="Backspace: Take Back a Gesture")
     row.label(text="Shift Backspace: Reset")
     row.separator(factor=2.0)

@@ -24,7 +24,7 @@ from ..sessions.running import Running
 from ..sessions.sculpting import drop_strokes
 from ..settings import properties
 from ..ui_text import localize
-from . import beds, follow
+from . import beds, follow, loop
 from .beds import blocking_reason, find_bed
 
 
@@ -105,6 +105,12 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
     return bool(busy)
 
 
+def has_strokes() -> bool:
+    """Return whether a session has a stroke to finish that the hand has drawn, and is free to do so."""
+    free = (one for one in running.list_sessions() if not (one.paused or one.blocking_reason))
+    return any(not stroke.held for session in free for stroke in session.strokes)
+
+
 def tick(context: Any, now: float) -> list[Note]:
     """Advance every session to the current time of a monotonic clock, s; return the messages."""
     notes: list[Note] = []
@@ -148,7 +154,9 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         # The fingertip of a stroke is where the session has put it.
         pose = session.pose if session.strokes else followed
         pose = bridge.pose(fingertip_of(bed)) if pose is None else pose
-        later = sculpting.advance(session, pose, now, most, view.picked_pins(bed))
+        later = sculpting.advance(
+            session, pose, now, most, view.picked_pins(bed), loop.find_interval(context)
+        )
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)
@@ -156,6 +164,8 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
     running.put(later)
     moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
     beds.write(bed, later, before)
+    if loop.LOOP.in_haste and later.finished_strokes == session.finished_strokes:
+        return
     # Drawing costs most: where nothing has changed, nothing is redrawn.
     if before.stale or before.blocking_reason or changes or not np.array_equal(seen, _visible_rows(later)):
         view.show_state(bed, later.system, later.state)

@@ -14,7 +14,7 @@ from .. import bridge, preferences
 from ..compat import bpy
 from ..device import view
 from ..exchange import formed_bed
-from ..live import beds, follow, loop
+from ..live import beds, follow, loop, tick
 from ..live.beds import active_session, blocking_reason
 from ..press import brush
 from ..recorded import takes
@@ -99,6 +99,7 @@ no_server = Need(
     lambda context: not (active := active_session(context)) or follow.find(active[1].uid) is None,
     "The session follows no server",
 )
+no_stroke = Need(lambda context: not tick.has_strokes(), "No press stroke is queued")
 no_recording = Need(lambda context: _recording(context) is None, "Record a take first")
 no_tool = Need(lambda context: brush.tool_settings(context) is None, "Select the Press tool")
 no_tool_in_view = Need(

@@ -35,10 +35,27 @@ EVERY, MOMENT = 20.0, 0.1
 CLOSED = "ended: its window was closed"
 
 
-class LoopMixin(Polled):
-    """Mixin of the modal operators for the sessions of a window."""
+class Ticking(Polled):
+    """Mixin of the operators that advance sessions."""
 
     in_any_mode = True
+
+    def advance(self, context: Any, now: float) -> None:
+        """Advance all sessions until `now`, s; a stroke that this finishes is an undo step."""
+        drawn = _count_strokes()
+        self.tell(tick.tick(context, now))
+        if _count_strokes() > drawn:
+            bpy.ops.ed.undo_push(message="Press")
+
+    def tell(self, notes: list[tick.Note]) -> None:
+        """Report the messages, and keep them for the panel."""
+        for note in notes:
+            self.report({note.level}, note.message)
+            running.set_message(note.message, note.uid)
+
+
+class LoopMixin(Ticking):
+    """Mixin of the modal operators for the sessions of a window."""
 
     def drive(self, context: Any) -> set[str]:
         """Begin to drive the loop."""
@@ -61,10 +78,7 @@ class LoopMixin(Polled):
         now = time.perf_counter()
         if event.type != "TIMER" or not loop.is_due(context, now):
             return {"PASS_THROUGH"}
-        drawn = _count_strokes()
-        self.tell(tick.tick(context, now))
-        if _count_strokes() > drawn:
-            bpy.ops.ed.undo_push(message="Press")
+        self.advance(context, now)
         loop.redraw_numbers(context, now)
         if not running.list_sessions():
             handlers.end_all(handlers.STOPPED)
@@ -89,12 +103,6 @@ class LoopMixin(Polled):
         """End all sessions: nothing drives them any more."""
         handlers.end_all(localize("ended: {}", words))
 
-    def tell(self, notes: list[tick.Note]) -> None:
-        """Report the messages, and keep them for the panel."""
-        for note in notes:
-            self.report({note.level}, note.message)
-            running.set_message(note.message, note.uid)
-
 
 class GoOn(LoopMixin, bpy.types.Operator):
     """Continue the sessions after Blender's auto save"""
@@ -108,6 +116,51 @@ class GoOn(LoopMixin, bpy.types.Operator):
         return self.drive(context)
 
 
+class FinishStrokes(Ticking, bpy.types.Operator):
+    """Finish all press strokes at once, without drawing them meanwhile; Esc lets them go on as before"""
+
+    bl_idname = "digiclay.finish_strokes"
+    bl_label = "Finish Strokes"
+    needs = (poll.no_stroke,)
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Have the loop hurry, beside which this one shows the progress and takes Esc."""
+        self.whole = _estimate_time()
+        self.timer, loop.LOOP.in_haste = loop.time_window(context), True
+        context.window_manager.progress_begin(0, 100)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """End with the strokes, or at Esc; the loop has every other event."""
+        if event.type == "ESC" and event.value == "PRESS":
+            return self._end(context, "CANCELLED")
+        if not (loop.LOOP.in_haste and tick.has_strokes()):
+            return self._end(context, "FINISHED", "PASS_THROUGH")
+        if event.type == "TIMER":
+            done = 1.0 - _estimate_time() / self.whole
+            context.window_manager.progress_update(int(100.0 * max(0.0, done)))
+        return {"PASS_THROUGH"}
+
+    def execute(self, context: Any) -> set[str]:
+        """Finish them before anything else, as a script would have it."""
+        while tick.has_strokes():
+            self.advance(context, time.perf_counter())
+        return {"FINISHED"}
+
+    def cancel(self, context: Any) -> None:
+        self._end(context)
+
+    def _end(self, context: Any, *result: str) -> set[str]:
+        """Give back the cursor and the timer, and let the loop take its time again; return the result."""
+        loop.LOOP.in_haste = False
+        context.window_manager.progress_end()
+        if self.timer is not None:
+            context.window_manager.event_timer_remove(self.timer)
+            self.timer = None
+        return set(result)
+
+
 @action("digiclay.session_escape", "Stop Sessions", poll.driven, options=("INTERNAL",), in_any_mode=True)
 def escape(operator: Any, context: Any) -> None:
     """Stop the sessions while none of their operators receives the key"""
@@ -117,6 +170,11 @@ def escape(operator: Any, context: Any) -> None:
 def _count_strokes() -> int:
     """Return how many strokes the fingers of all sessions have finished."""
     return sum(session.finished_strokes for session in running.list_sessions())
+
+
+def _estimate_time() -> float:
+    """Return about how long the strokes of all sessions still take, s of simulated time."""
+    return sum(map(sculpting.estimate_time, running.list_sessions()))
 
 
 def _stop(context: Any) -> bool:

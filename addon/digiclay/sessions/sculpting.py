@@ -19,7 +19,7 @@ from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
 from ..device.instant import CLEARANCE, find_ellipsoid
-from ..strokes.motion import follow
+from ..strokes.motion import DRAG, follow
 from ..strokes.stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
 from ..strokes.sweep import begin_settling, find_radius, settle, sweep
 from ..strokes.tracking import find_tracking
@@ -32,6 +32,13 @@ GESTURES, GESTURE_BYTES = 20, 200_000_000
 CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or its method have changed"
 #: A fingertip that moves on after resting so long makes another gesture, s.
 REST = 0.5
+#: Control periods of a queue that are simulated at a time, and between two estimates of the error: so many
+#: go by in a second that one as often as under a hand takes a quarter of the time.
+CHUNK, PAUSE = 8, 10 * accuracy.PAUSE
+#: Time that a stroke takes beside its path, s: to come, press, rise and leave.
+BESIDE = 1.0
+#: Time between two ticks, s, unless told.
+INTERVAL = 1.0 / 30.0
 #: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one that is put
 #: to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by 1e-6 m beside it.
 STILL = 2e-6
@@ -68,17 +75,42 @@ def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
 
 
 def advance(
-    running: Running, pose: Floats, now: float, most: int, pins: Sequence[int] | None = None
-) -> Running:
-    """Let a session follow the fingertip to a pose (7,) until `now`, s, monotonic; uses `running` up."""
+    running: Running, pose: Floats, now: float, most: int, pins: Sequence[int] | None = None,
+    interval: float = INTERVAL,
+) -> Running:  # fmt: skip
+    """Let a session follow the fingertip to a pose (7,) until `now`, s, monotonic; uses `running` up.
+
+    Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s.
+    """
     if pins is not None:
         running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))
+    running = replace(running, tick=running.tick + 1)
+    if running.strokes and not running.paused:
+        return _work_off(running, now, live_session.find_spare(running.clock, now, interval))
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:
         count, clock = live_session.periods_due(running.clock, now, running.system.period, most)
-    running = replace(running, clock=clock, steps=0, tick=running.tick + 1)
+    running = replace(running, clock=clock, steps=0)
     return follow_finger(running, pose, count) if count else running
+
+
+def _work_off(running: Running, now: float, spare: float) -> Running:
+    """Simulate strokes for a wall time, s, until one is finished or waits for the hand."""
+    finished, first, started, spent = running.finished_strokes, running.state.period, time.perf_counter(), 0.0
+    while running.finished_strokes == finished:
+        cost = running.clock.cost
+        count = int((spare - spent) / cost) if cost > 0.0 else 1
+        if count < 1 and spent > 0.0:
+            break
+        before = running.state.period
+        running = _follow_stroke(running, min(max(count, 1), CHUNK))
+        spent = time.perf_counter() - started
+        if running.state.period == before:
+            break
+    done = (running.state.period - first) * running.system.period
+    running = replace(running, clock=live_session.count_queue(running.clock, now, done, spent))
+    return _pack(running) if done > 0.0 else running
 
 
 def request_step(running: Running) -> Running:
@@ -88,21 +120,43 @@ def request_step(running: Running) -> Running:
 
 def follow_finger(running: Running, pose: Floats, count: int) -> Running:
     """Simulate control periods while the fingertip moves along its strokes, or else to a pose (7,)."""
-    system, monitor, smoothing = running.system, running.monitor, None
     if running.strokes:
-        running, path, smoothing = take_path(running, count)
-    else:
-        pose = live_session.clamp_pose(pose, system.cell.actuator.stroke)
-        running = _mark_gesture_start(running, pose, count)
-        path = live_session.interpolate_path(running.pose[None], pose[None], count)[:, 0]
+        return _pack(_follow_stroke(running, count))
+    pose = live_session.clamp_pose(pose, running.system.cell.actuator.stroke)
+    running = _mark_gesture_start(running, pose, count)
+    path = live_session.interpolate_path(running.pose[None], pose[None], count)[:, 0]
+    return _pack(_follow(running, path, None, accuracy.PAUSE))
+
+
+def _follow_stroke(running: Running, count: int) -> Running:
+    """Simulate at most so many control periods of the first stroke; none where it waits for the hand."""
+    running, path, smoothing = take_path(running, count)
+    return _follow(running, path, smoothing, PAUSE) if len(path) > 1 else running
+
+
+def estimate_time(running: Running) -> float:
+    """Return about how long the session's strokes still take, s of simulated time."""
+    paths = [path for stroke in running.strokes for path in stroke.ahead]
+    length = sum(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in paths)
+    return length / DRAG + len(paths) * BESIDE
+
+
+def _pack(running: Running) -> Running:
+    """Return the session with the snapshot of its state, which no chunk of a tick needs."""
+    return replace(running, snapshot=snapshot.dump(running.system, running.state))
+
+
+def _follow(running: Running, path: Floats, smoothing: Floats | None, pause: int) -> Running:
+    """Simulate the control periods of a path (k + 1, 7); `pause` of them are between two error estimates."""
+    system, monitor = running.system, running.monitor
     rows, first, trace, paths = [], running.state.period + 1, running.trace, wrap_one(path)
     started = time.perf_counter()
-    monitor = monitor and accuracy.begin_stretch(monitor, running.state)
+    monitor = monitor and accuracy.begin_stretch(monitor, running.state, pause)
 
     def watch(state: State) -> None:
         nonlocal monitor
         index = state.period - first
-        monitor = monitor and accuracy.note(monitor, state, paths[index : index + 2])
+        monitor = monitor and accuracy.note(monitor, state, paths[index : index + 2], pause)
         if state.period % trace.every == 0:
             rows.append(recent_trace.sample(system, state, running.scene.set_point, trace.pins))
 
@@ -111,8 +165,8 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
         monitor, errors = accuracy.catch_up(monitor, gone.state, len(path) - 1)
     clock = live_session.update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
-        gone, clock=clock, snapshot=snapshot.dump(system, gone.state), monitor=monitor,
-        errors=errors or running.errors, trace=recent_trace.extend(trace, rows),
+        gone, clock=clock, monitor=monitor, errors=errors or running.errors,
+        trace=recent_trace.extend(trace, rows),
     )  # fmt: skip
     return _count_gesture(gone, smoothed=smoothing is not None and bool(smoothing.any()))
 

@@ -169,18 +169,18 @@ def reset(monitor: ErrorMonitor) -> ErrorMonitor:
     return ErrorMonitor(monitor.system)
 
 
-def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
+def begin_stretch(monitor: ErrorMonitor, state: State, pause: int = PAUSE) -> ErrorMonitor:
     """Return the monitor with a copy of a session's state, where a stretch is due; else as it is."""
-    if monitor.state is not None or 0 < monitor.age < STRETCH + PAUSE:
+    if monitor.state is not None or 0 < monitor.age < STRETCH + pause:
         return monitor
     return ErrorMonitor(monitor.system, state.copy(), before=monitor.before)
 
 
-def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
+def note(monitor: ErrorMonitor, after: State, path: Floats, pause: int = PAUSE) -> ErrorMonitor:
     """Return the monitor with the period that a session has just done; `path` (2, f, 7): its fingertips."""
     monitor = replace(monitor, age=monitor.age + 1)
     if monitor.state is None:
-        return begin_stretch(monitor, after)
+        return begin_stretch(monitor, after, pause)
     if monitor.age > STRETCH:
         return monitor
     kept = after._replace(active=replace(after.active, block=after.active.block.copy()))

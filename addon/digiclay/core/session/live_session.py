@@ -24,10 +24,16 @@ WINDOW = 1.0
 #: Longest time the periods of one tick may take, as a share of the time between two ticks: the rest
 #: is for drawing, and for the person at the window.
 SHARE = 0.7
+#: Least time of those of a queue, as a share of what Blender draws for: software draws for half a second.
+LEAST = 0.4
+#: Share of the time beside the periods that is drawing for certain: Blender also waits for the next tick.
+DRAWN = 0.9
 #: Shortest time between two ticks that is counted with, s: ticks may come in a burst.
 SHORTEST = 1e-2
 #: Rounding errors of times count as whole periods when they are below this share of one.
 SLACK = 1e-6
+
+Ticks = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -40,8 +46,10 @@ class Clock:
     """Time gone by that is not simulated yet, less than a control period, s."""
     cost: float = 0.0
     """Wall time one control period takes, s, as measured of late; 0: not known."""
-    ticks: tuple[tuple[float, float], ...] = ()
-    """When the clock was looked at within the last second, and what was simulated then, s."""
+    spent: float = 0.0
+    """Wall time that the periods of a queue took in the last tick, s; 0: there were none."""
+    ticks: Ticks = ()
+    """Wall time between looks within the last second, and what was simulated then, s."""
 
     @property
     def factor(self) -> float:
@@ -51,7 +59,7 @@ class Clock:
 
     def stopped(self) -> Clock:
         """Return the clock of a session that pauses: the time of the pause will not count."""
-        return replace(self, seen=None, left=0.0, ticks=())
+        return replace(self, seen=None, left=0.0, spent=0.0, ticks=())
 
 
 def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int, Clock]:
@@ -63,10 +71,32 @@ def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int
     affordable = max(1, int(SHARE * max(gone, SHORTEST) / clock.cost)) if clock.cost > 0.0 else most
     count = max(0, min(whole, most, affordable))
     left = max(0.0, clock.left + gone - whole * period)
-    ticks = (*clock.ticks, (gone, count * period))
+    ticks = _extend_window(clock.ticks, gone, count * period)
+    return count, replace(clock, seen=now, left=left, spent=0.0, ticks=ticks)
+
+
+def _extend_window(ticks: Ticks, gone: float, done: float) -> Ticks:
+    """Return the ticks within the last second and one more; wall time and simulated time, s."""
+    ticks = (*ticks, (gone, done))
     while len(ticks) > 1 and sum(time for time, _ in ticks[1:]) >= WINDOW:
         ticks = ticks[1:]
-    return count, replace(clock, seen=now, left=left, ticks=ticks)
+    return ticks
+
+
+def find_spare(clock: Clock, now: float, interval: float) -> float:
+    """Return how long the periods of a queue may take in a tick at `now`, of ticks an `interval` apart, s."""
+    # Drawing is not seen from here, only all the time between two ticks that the periods did not take.
+    beside = interval if clock.seen is None else max(0.0, now - clock.seen - clock.spent)
+    return max(min(SHARE * interval, interval - DRAWN * beside), LEAST * beside)
+
+
+def count_queue(clock: Clock, now: float, done: float, spent: float) -> Clock:
+    """Return the clock after a queue's periods: simulated, and by the wall, s; a wait does not count."""
+    clock = replace(clock, left=0.0, spent=spent)
+    if done > 0.0:
+        gone = spent if clock.seen is None else max(spent, now - clock.seen)
+        clock = replace(clock, ticks=_extend_window(clock.ticks, gone, done))
+    return replace(clock, seen=now)
 
 
 def update_cost(clock: Clock, count: int, took: float) -> Clock:
