@@ -71,7 +71,7 @@ class Preferences(bpy.types.AddonPreferences):
     )  # fmt: skip
     run_own_methods: flag(
         "Run Own Methods", "Run all Python files of a folder, now and whenever Blender starts: "
-        "the control methods in them are offered in the panel Control", default=False, update=take_methods,
+        "the control methods in them are offered in Laboratory > Control", default=False, update=take_methods,
     )  # fmt: skip
     methods_folder: text(
         "Own Methods", "Folder with Python files of control methods; a change turns Run Own Methods off",

@@ -59,18 +59,21 @@ def test_every_part_of_a_scene_has_a_panel() -> None:
     assert [name for name in names if not hasattr(bpy.types, f"DIGICLAY_PT_part_{name}")] == []
 
 
-def test_the_tab_begins_with_what_is_used_first_and_the_technical_panels_are_closed_at_its_end() -> None:
+def test_the_tab_shows_what_a_sculptor_needs_and_keeps_what_a_researcher_needs_closed() -> None:
     drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
     drawn = [kind for kind in drawn if kind.bl_region_type != "HEADER"]  # opens from the header of the tool
     places = {(kind.bl_space_type, kind.bl_region_type, kind.bl_category) for kind in drawn}
     assert places == {("VIEW_3D", "UI", CATEGORY)}
-    orders = [(getattr(kind, "bl_parent_id", ""), kind.bl_order) for kind in drawn]
+    orders = [(kind.bl_parent_id, kind.bl_order) for kind in drawn]
     assert len(set(orders)) == len(orders)
-    roots = sorted((kind for kind in drawn if not hasattr(kind, "bl_parent_id")), key=lambda k: k.bl_order)
-    names = "Digital Clay,Session,Finger,Display,Shapes,Takes,Export,Device,Control"
-    assert [kind.bl_label for kind in roots] == names.split(",")
-    closed = {kind.bl_label for kind in roots if "DEFAULT_CLOSED" in getattr(kind, "bl_options", ())}
-    assert closed == {"Shapes", "Takes", "Export", "Device", "Control"}
+    tree: dict[str, list[str]] = {}
+    for kind in sorted(drawn, key=lambda kind: kind.bl_order):
+        tree.setdefault(kind.bl_parent_id.removeprefix("DIGICLAY_PT_"), []).append(kind.bl_label)
+    assert tree[""] == ["Digital Clay", "Session", "Show", "Export", "Laboratory"]
+    assert (tree["session"], tree["export"]) == (["Shapes", "Takes"], ["Features"])
+    assert tree["laboratory"] == ["View Details", "Fingertip", "Device", "Control"]
+    opened = {kind.bl_label for kind in drawn if "DEFAULT_CLOSED" not in kind.bl_options}
+    assert opened == {"Digital Clay", "Session", "Show", "Export"}
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -214,7 +214,7 @@ def test_a_form_of_a_bed_without_a_skin_is_refused(bed: Any) -> None:
     tree.interface.remove(tree.interface.items_tree["Form"])
     assert not view.can_show_skin(bed)
     assert not bpy.ops.digiclay.skin_toggle.poll()
-    with pytest.raises(DigiclayError, match=r"has no skin\. Rebuild it in the panel Device"):
+    with pytest.raises(DigiclayError, match=r"has no skin\. Rebuild it in Laboratory > Device"):
         view.set_form(bed, "skin")
     assert bed.digiclay_display.form == "pins"
 

@@ -190,6 +190,8 @@ def unfolded(name: str, root: str, *sections: str) -> Iterator[str]:
         if kind.bl_idname in (root, *(f"DIGICLAY_PT_part_{section}" for section in sections)):
             kind.bl_category, kind.bl_options = tab, set()
             kind.bl_idname = f"{kind.bl_idname}_{name}"
+        if kind.bl_idname == f"{root}_{name}":
+            kind.bl_parent_id = ""
         if getattr(kind, "bl_parent_id", "") == root:
             kind.bl_parent_id = f"{root}_{name}"
     panels.register()

@@ -15,7 +15,9 @@ FINE_PINS = True
 PICTURES = {
     "device": ("DIGICLAY_PT_device", "layout actuator supply fluid valve"),
     "device_rest": ("DIGICLAY_PT_device", "conduit valve_lag delay contact relaxation"),
-    "finger": ("DIGICLAY_PT_finger", "fingertip"),
+    "laboratory": ("DIGICLAY_PT_laboratory", "fingertip"),
+    "details": ("DIGICLAY_PT_display", ""),
+    "takes": ("DIGICLAY_PT_takes", ""),
     "control": ("DIGICLAY_PT_control", "control blister"),
     "control_rest": ("DIGICLAY_PT_control", "sensors simulation recorder"),
 }
@@ -88,7 +90,7 @@ def export(blender: Any) -> Iterator[float | None]:
     yield from blender.add_paper_bed()
     bed = blender.beds()[0]
     form(blender, bed)
-    with blender.unfolded("export", "DIGICLAY_PT_export") as tab:
+    with blender.unfolded("export", "DIGICLAY_PT_features") as tab:
         yield from blender.open_sidebar(tab)
         blender.call(bpy.ops.digiclay.find_features)
         yield None

@@ -33,7 +33,7 @@ def read_formed(bed: Any) -> Formed:
     """Return the pins of a bed, and before: as kept, or at rest; DigiclayError when it is no bed."""
     if any(name not in bed.data.attributes for name in bridge.ATTRIBUTES):
         raise OutputError(
-            f"{bed.name} has lost the attributes of its pins: press Rebuild in the Device panel."
+            f"{bed.name} has lost the attributes of its pins: press Rebuild in Laboratory > Device."
         )
     cells = bridge.read_cells(bed.data) | _of_session(bed)
     before: Any = _scene(bed).actuator.rest_height

@@ -175,7 +175,7 @@ def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
 def _draw_heights(readings: Readings, pen: Pen, top: float) -> None:
     """Draw the heights of the picked pins over the last seconds."""
     if not readings.pins:
-        pen.row(top, localize("Pick pins to see their heights (Display panel)"), small=True)
+        pen.row(top, localize("Pick pins to see their heights (Laboratory)"), small=True)
         return
     top = pen.row(top, localize("Heights of picked pins"))
     values = readings.heights * 1e3

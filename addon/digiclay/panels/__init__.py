@@ -5,13 +5,13 @@ from __future__ import annotations
 from ..compat import bpy
 from . import display, parameters, press_options, session, shape_exchange
 
-#: In the order they are drawn, each with a `bl_order` of its own: session 10, finger 20, display 30,
-#: shapes 40, takes 50, export 60; then what is technical, device 70 and control 80.
+#: A panel before its sub-panels: Session (with Shapes and Takes), Show and Export for a sculptor, and the
+#: Laboratory for a researcher.
 CLASSES: tuple[type, ...] = (
-    *parameters.CLASSES,
     *session.CLASSES,
     *display.CLASSES,
     *shape_exchange.CLASSES,
+    *parameters.CLASSES,
     *press_options.CLASSES,
 )
 

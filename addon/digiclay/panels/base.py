@@ -10,6 +10,8 @@ from ..compat import bpy
 from ..roles import bed_of
 
 CATEGORY = "Digital Clay"
+#: The panels that others are sub-panels of.
+SESSION, EXPORT, LABORATORY = "DIGICLAY_PT_session", "DIGICLAY_PT_export", "DIGICLAY_PT_laboratory"
 #: Letters a line of the sidebar holds at its usual width.
 LINE = 36
 
@@ -45,13 +47,13 @@ def declare(
 
 
 def panel(
-    idname: str, label: str, order: int, *, closed: bool = True, with_bed: bool = True
+    idname: str, label: str, order: int, *, parent: str = "", closed: bool = True, with_bed: bool = True
 ) -> Callable[[Callable[[Any, Any], None]], Any]:
-    """Return a decorator that makes a panel of its `draw`."""
+    """Return a decorator that makes a panel of its `draw`, a sub-panel of `parent` if that is given."""
 
     return declare(
-        (Panel, bpy.types.Panel), "draw", idname, label, bl_order=order, with_bed=with_bed,
-        bl_options={"DEFAULT_CLOSED"} if closed else set(),
+        (Panel, bpy.types.Panel), "draw", idname, label, bl_order=order, bl_parent_id=parent,
+        bl_options={"DEFAULT_CLOSED"} if closed else set(), with_bed=with_bed,
     )  # fmt: skip
 
 

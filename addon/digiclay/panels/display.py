@@ -1,4 +1,4 @@
-"""Display of a bed: its properties, and the sub-panel of colors, arrows, skin and overlay.
+"""Panels Show and View Details, and their properties: pins or skin, colors, arrows, overlay.
 
 Colors, arrows and skin are settings of the bed's geometry nodes; these properties read and write
 them there, so that there is one place they stand in.
@@ -22,7 +22,7 @@ from ..sessions import running
 from ..settings import properties
 from ..settings.declared import choice, flag, number
 from ..ui_text import localize
-from .base import draw_property, panel
+from .base import LABORATORY, draw_property, panel
 
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
@@ -130,27 +130,35 @@ class Display(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
-@panel("DIGICLAY_PT_display", "Display", 30, closed=False)
-def display(sidebar: Any, context: Any) -> None:
-    """Display of the bed; a disabled item takes no time."""
+@panel("DIGICLAY_PT_show", "Show", 20, closed=False)
+def show(sidebar: Any, context: Any) -> None:
+    """What is seen of the bed."""
+    bed, layout = bed_of(context), sidebar.layout
+    layout.enabled = not is_edited(context)
+    if not view.is_drawn(bed):
+        layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
+    row = layout.row()
+    row.enabled = view.can_show_skin(bed)
+    row.prop(bed.digiclay_display, "form", text="")
+    layout.prop(bed.digiclay_display, "overlay")
+
+
+@panel("DIGICLAY_PT_display", "View Details", 0, parent=LABORATORY)
+def details(sidebar: Any, context: Any) -> None:
+    """Skin, colors and arrows of the bed, details of the overlay; a disabled item takes no time."""
     bed, layout = bed_of(context), sidebar.layout
     layout.enabled = not is_edited(context)
     layout.use_property_split = True
     layout.use_property_decorate = False
-    shown, drawn = bed.digiclay_display, view.is_drawn(bed)
-    if not drawn:
-        layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
-    column = layout.column()
-    column.enabled = drawn
+    shown, column = bed.digiclay_display, layout.column()
+    column.enabled = view.is_drawn(bed)
     skin = column.column()
     skin.enabled = view.can_show_skin(bed)
-    draw_property(skin, shown, "form")
     draw_property(skin, shown, "skin", shown.form != "pins", expand=True)
     draw_property(column, shown, "color", expand=True)
     draw_property(column, shown, "top_force", shown.color == "force")
     draw_property(column, shown, "arrows")
     draw_property(column, shown, "arrow_length", shown.arrows)
-    draw_property(layout, shown, "overlay")
     column = layout.column()
     column.active = shown.overlay
     draw_property(column, shown, "overlay_full")
@@ -162,7 +170,7 @@ def display(sidebar: Any, context: Any) -> None:
     row.operator("digiclay.clear_pins")
 
 
-CLASSES = (display,)
+CLASSES = (show, details)
 
 
 def register() -> None:

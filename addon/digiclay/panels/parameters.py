@@ -1,4 +1,4 @@
-"""Panels Device, Finger and Control: presets, method, and a sub-panel of parameters for each part."""
+"""Panels Device and Control: presets, method, and a sub-panel of parameters for each part."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..settings.declared import WHOLE, title
 from ..settings.groups import method_of, method_property
 from ..settings.properties import part_group
 from ..ui_text import localize
-from .base import Panel, draw_lines, menu, panel
+from .base import LABORATORY, Panel, draw_lines, menu, panel
 
 #: Kinds of properties whose label stands beside the field.
 BESIDE = {"ENUM", "STRING"}
@@ -44,7 +44,7 @@ def presets(entries: Any, context: Any) -> None:
         entries.layout.operator("digiclay.preset_apply", text=name).preset = name
 
 
-@panel("DIGICLAY_PT_device", "Device", 70)
+@panel("DIGICLAY_PT_device", "Device", 2, parent=LABORATORY)
 def device(sidebar: Any, context: Any) -> None:
     """Type of device."""
     bed = bed_of(context)
@@ -61,14 +61,7 @@ def device(sidebar: Any, context: Any) -> None:
     sidebar.layout.operator("digiclay.rebuild", icon="FILE_REFRESH")
 
 
-@panel("DIGICLAY_PT_finger", "Finger", 20, closed=False)
-def finger(sidebar: Any, context: Any) -> None:
-    """Fingertip parameters."""
-    if not bed_of(context).digiclay.use_fingertip:
-        sidebar.layout.label(text="Omitted: nothing touches the bed", icon="INFO")
-
-
-@panel("DIGICLAY_PT_control", "Control", 80)
+@panel("DIGICLAY_PT_control", "Control", 3, parent=LABORATORY)
 def control(sidebar: Any, context: Any) -> None:
     """Control of the cells."""
     settings = bed_of(context).digiclay
@@ -82,7 +75,7 @@ def control(sidebar: Any, context: Any) -> None:
         )
 
 
-def section_panel(section: str, parent: str, order: int, words: str = "", closed: bool = True) -> type:
+def section_panel(section: str, parent: str, order: int, words: str = "") -> type:
     """Make the sub-panel of a part."""
 
     class Section(Panel, bpy.types.Panel):
@@ -90,7 +83,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
         bl_label = words or title(section)
         bl_parent_id = parent
         bl_order = order
-        bl_options = {"DEFAULT_CLOSED"} if closed else set()
+        bl_options = {"DEFAULT_CLOSED"}
 
         @classmethod
         def poll(cls, context: Any) -> bool:
@@ -135,10 +128,9 @@ PARTS = [part for part in SECTIONS[: SECTIONS.index("sensors")] if part != "fing
 CLASSES = (
     presets,
     start,
+    section_panel("fingertip", LABORATORY, 1),
     device,
     *(section_panel(section, device.bl_idname, order) for order, section in enumerate(PARTS)),
-    finger,
-    section_panel("fingertip", finger.bl_idname, 0, words="Size", closed=False),
     control,
     section_panel("control", control.bl_idname, 0, words="Gains and Thresholds"),
     section_panel("blister", control.bl_idname, 1),

@@ -1,4 +1,4 @@
-"""Panels Session and Takes: start and stop, speed and error, recordings."""
+"""Panels Session, Takes and Laboratory: start and stop, recordings, speed and error."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..roles import bed_of
 from ..sessions import running
 from ..sessions.running import Running
 from ..ui_text import localize
-from .base import draw_lines, panel
+from .base import LABORATORY, SESSION, draw_lines, panel
 
 
-@panel("DIGICLAY_PT_session", "Session", 10, closed=False)
+@panel(SESSION, "Session", 10, closed=False)
 def session_panel(sidebar: Any, context: Any) -> None:
     """Live sculpting."""
     bed = bed_of(context)
@@ -32,8 +32,8 @@ def session_panel(sidebar: Any, context: Any) -> None:
             row.scale_y = 1.4
             row.operator("digiclay.leave_mode", icon="LOOP_BACK")
         _buttons(column, session)
-        _server(sidebar.layout, session)
-        _numbers(sidebar.layout, session)
+        if session.recording is not None:
+            column.label(text=localize("Recording: {:.1f} s", _measure_recording(session)), icon="REC")
     words = (
         session.blocking_reason and localize("Waits: {}", session.blocking_reason)
         if session
@@ -50,24 +50,11 @@ def _buttons(column: Any, session: Running) -> None:
     pause = ("Resume", "PLAY") if session.paused else ("Pause", "PAUSE")
     row.operator("digiclay.session_pause", text=pause[0], icon=pause[1])
     row.operator("digiclay.session_stop", text="Stop", icon="SNAP_FACE")
-    row = column.row(align=True)
-    row.operator("digiclay.session_step", icon="FRAME_NEXT")
-    row.operator("digiclay.session_reset", icon="LOOP_BACK")
+    column.operator("digiclay.finish_strokes", icon="FF")
+    column.operator("digiclay.session_reset", icon="LOOP_BACK")
     count = len(session.gestures)
     words = localize("Take Back a Gesture ({})", count) if count else "Take Back a Gesture"
     column.operator("digiclay.session_rewind", text=words, icon="REW")
-
-
-def _server(layout: Any, session: Running) -> None:
-    """Draw the server that a session follows."""
-    following = follow.find(session.uid)
-    if following is None:
-        layout.operator("digiclay.follow_server", icon="LINKED")
-        return
-    column = layout.column(align=True)
-    column.operator("digiclay.leave_server", icon="UNLINKED")
-    icon = "ERROR" if following.silent else "LINKED"
-    column.label(text=localize("Follows {}", following.address), icon=icon)
 
 
 def _numbers(layout: Any, session: Running) -> None:
@@ -81,8 +68,6 @@ def _numbers(layout: Any, session: Running) -> None:
         words = localize("Speed: {:.2f} × real time", factor)
         column.label(text=words, icon="ERROR" if factor < 0.9 else "NONE")
     draw_lines(column, error_line(session), "NONE")
-    if session.recording is not None:
-        column.label(text=localize("Recording: {:.1f} s", _measure_recording(session)), icon="REC")
 
 
 def _measure_recording(session: Running) -> float:
@@ -96,7 +81,23 @@ def error_line(session: Running) -> str:
     return error_message((errors.height, errors.force) if errors else None)
 
 
-@panel("DIGICLAY_PT_takes", "Takes", 50)
+@panel(LABORATORY, "Laboratory", 40)
+def laboratory(sidebar: Any, context: Any) -> None:
+    """Single steps, speed and error of a session, and the server that it follows."""
+    session, column = running.find(bed_of(context)), sidebar.layout.column(align=True)
+    column.operator("digiclay.session_step", icon="FRAME_NEXT")
+    following = session and follow.find(session.uid)
+    if following:
+        column.operator("digiclay.leave_server", icon="UNLINKED")
+        words = localize("Follows {}", following.address)
+        column.label(text=words, icon="ERROR" if following.silent else "LINKED")
+    else:
+        column.operator("digiclay.follow_server", icon="LINKED")
+    if session is not None:
+        _numbers(sidebar.layout, session)
+
+
+@panel("DIGICLAY_PT_takes", "Takes", 1, parent=SESSION)
 def takes_panel(sidebar: Any, context: Any) -> None:
     """Takes of the bed, and its bake."""
     layout, bed = sidebar.layout, bed_of(context)
@@ -122,4 +123,4 @@ def takes_panel(sidebar: Any, context: Any) -> None:
         layout.operator("digiclay.bake", text="Bake Animated Fingertip").source = "FINGERTIP"
 
 
-CLASSES = (session_panel, takes_panel)
+CLASSES = (session_panel, takes_panel, laboratory)

@@ -1,4 +1,4 @@
-"""Panels Shapes and Export: initial shape of the bed, export of the formed surface."""
+"""Panels Shapes, Export and Features: initial shape of the bed, export of the formed surface."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from ..exchange import formed_bed
 from ..roles import bed_of, is_edited
-from .base import panel
+from .base import EXPORT, SESSION, panel
 
 #: Property of a bed that holds the list of its features; the operator that lists them writes it.
 LISTED = "digiclay_features"
@@ -14,7 +14,7 @@ LISTED = "digiclay_features"
 MOST = 24
 
 
-@panel("DIGICLAY_PT_shapes", "Shapes", 40)
+@panel("DIGICLAY_PT_shapes", "Shapes", 0, parent=SESSION)
 def shapes(sidebar: Any, context: Any) -> None:
     """Initial shape of the bed."""
     settings = bed_of(context).digiclay
@@ -47,9 +47,17 @@ def _draw_shape(layout: Any, shape: Any) -> None:
         column.prop(shape, "surfaces")
 
 
-@panel("DIGICLAY_PT_export", "Export", 60)
+@panel(EXPORT, "Export", 30, closed=False)
 def export(sidebar: Any, context: Any) -> None:
     """Formed surface as meshes."""
+    column = sidebar.layout.column(align=True)
+    column.operator_menu_enum("mesh.digital_clay_make", "kind", text="Make Mesh", icon="MESH_DATA")
+    column.menu("DIGICLAY_MT_export", text="Export", icon="EXPORT")
+
+
+@panel("DIGICLAY_PT_features", "Features", 0, parent=EXPORT)
+def features(sidebar: Any, context: Any) -> None:
+    """List of bosses and creases, and the surface they are measured from."""
     bed, layout = bed_of(context), sidebar.layout
     column = layout.column(align=True)
     column.operator("digiclay.find_features", icon="VIEWZOOM")
@@ -67,9 +75,6 @@ def export(sidebar: Any, context: Any) -> None:
     row = column.row(align=True)
     row.operator("digiclay.keep_surface")
     row.operator("digiclay.forget_surface")
-    column = layout.column(align=True)
-    column.operator_menu_enum("mesh.digital_clay_make", "kind", text="Make Mesh", icon="MESH_DATA")
-    column.menu("DIGICLAY_MT_export", text="Export", icon="EXPORT")
 
 
-CLASSES = (shapes, export)
+CLASSES = (shapes, export, features)

@@ -72,7 +72,7 @@ def scene_of(bed: Any) -> Scene:
     reason = find_layout_mismatch(bed, scene.layout)
     if reason:
         plan = scene.layout
-        rule, remedy = "must be that of the bed's pins", f"{reason}: press Rebuild in the Device panel."
+        rule, remedy = "must be that of the bed's pins", f"{reason}: press Rebuild in Laboratory > Device."
         raise ParameterError("Layout", "", rule, f"{plan.rows} x {plan.columns}, {plan.arrangement}", remedy)
     return scene
 
