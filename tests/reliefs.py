@@ -6,6 +6,7 @@ import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.exchange import make_exchange
+from digiclay.core.control.orders import ORDER, Orders, Verb
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
@@ -29,13 +30,16 @@ def heighten(system: System, relief: Floats) -> State:
     return state._replace(peak=float(height.max()))
 
 
-def make_orders(periods: int, start: float, end: float, y: float, radius: float, settle: int = 60) -> Floats:
+def make_orders(
+    periods: int, start: float, end: float, y: float, radius: float, settle: int = 60,
+    verb: Verb = Verb.AVERAGE,
+) -> Orders:  # fmt: skip
     """Return the orders of a stroke along a row, m, at full strength, and of a wait (control periods)."""
-    orders = np.zeros((periods + settle, 4))
-    orders[:periods, 0] = np.linspace(start, end, periods)
-    orders[periods:, 0] = end
-    orders[:, 1:3], orders[:periods, 3] = (y, radius), 1.0
-    return orders
+    rows = np.zeros((periods + settle, ORDER))
+    rows[:periods, 0] = np.linspace(start, end, periods)
+    rows[periods:, 0] = end
+    rows[:, 1:3], rows[:periods, 3], rows[:, 4] = (y, radius), 1.0, verb
+    return Orders(rows)
 
 
 def stay_away(periods: int) -> Floats:

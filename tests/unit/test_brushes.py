@@ -243,7 +243,7 @@ def test_a_recording_of_smooth_strokes_is_a_take_that_replays_bit_for_bit() -> N
     session = finish(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)))
     take = read_recording(session)
     assert take is not None
-    assert take.smoothing is not None
+    assert take.orders is not None
     assert replayed(take)
 
 
@@ -255,7 +255,7 @@ def test_undo_shortens_the_orders_of_a_recording_with_its_path() -> None:
     keep = back.recording
     assert keep is not None
     start = snapshot.load(back.system, keep.start)
-    *_, again = simulate_path(back.system, start, keep.path, keep.smoothing)
+    *_, again = simulate_path(back.system, start, keep.path, keep.orders)
     assert snapshot.dump(back.system, again) == back.snapshot
 
 

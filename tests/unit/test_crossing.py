@@ -82,15 +82,15 @@ def test_after_a_groove_at_an_angle_what_settles_moves_clay_and_is_replayed_bit_
     session = crossed("design", 30.0, Brush.LOWER)[1]
     take = read_recording(session)
     assert take is not None
-    assert take.smoothing is not None
+    assert take.orders is not None
     targets = [state.row(session.system.rows.target).copy() for state in replay(take)]
     np.testing.assert_array_equal(targets[-1], session.state.row(session.system.rows.target))
-    first = int(np.flatnonzero(take.smoothing[:, 2])[0])
+    first = int(np.flatnonzero(take.orders.rows[:, 2])[0])
     before, after = targets[first - 1], targets[-1]
     assert after.sum() == pytest.approx(before.sum(), abs=1e-9)
     # Only pins about a spike move: within two pins of one, four where it takes long.
     x, y = session.system.grid.x, session.system.grid.y
-    orders = take.smoothing[first:][take.smoothing[first:, 3] > 0.0]
+    orders = take.orders.rows[first:][take.orders.rows[first:, 3] > 0.0]
     far = np.ones(x.size, np.bool_)
     for order in orders:
         far &= (x - order[0]) ** 2 + (y - order[1]) ** 2 > order[2] ** 2

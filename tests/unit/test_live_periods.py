@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
+from digiclay.core.control.orders import Orders, Verb, place, repeat_order
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.model.control_interface import SetPoint
@@ -23,6 +24,7 @@ from digiclay.core.session import accuracy, recent_trace, snapshot
 from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
     Clock,
+    Recording,
     clamp_pose,
     count_queue,
     find_spare,
@@ -154,6 +156,30 @@ def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
 )
 def test_a_finger_stays_where_a_finger_can_be(given, wanted):
     assert clamp_pose(np.array([*given, *LEVEL]), 0.1)[:3].tolist() == wanted
+
+
+def test_a_recording_keeps_each_surface_once_under_its_own_number_and_drops_what_undo_took_back() -> None:
+    low, high = np.full(9, 30e-3), np.full(9, 45e-3)
+    keep = Recording.begin(b"", 0, pose()[None], 1)
+    assert keep.orders is None
+    path = np.tile(pose(), (4, 1, 1))
+    given = [place(4, low), place(4, low.copy()), None, place(4, high)]
+    given.append(Orders(repeat_order(4, Verb.PLACE, 1.0), (low, high)))
+    for tick, orders in enumerate(given, 2):
+        keep = keep.extend(path, tick, orders)
+    assert keep.orders is not None
+    np.testing.assert_array_equal(keep.orders.rows[:, 0], np.repeat([0.0, 0.0, 0.0, 1.0, 3.0], 4))
+    np.testing.assert_array_equal(keep.surfaces, (low, high, low, high))
+    for period, numbers in ((20, 4), (16, 2), (12, 1), (4, 1)):
+        cut = keep.cut_at_period(period)
+        assert cut is not None
+        assert len(cut.surfaces) == numbers
+    earlier = keep.cut_at_tick(3, 8)
+    assert earlier is not None
+    assert (len(earlier.surfaces), earlier.count) == (1, 9)
+    again = earlier.extend(path, 9, place(4, high))
+    assert again.orders is not None
+    assert (again.orders.rows[-1, 0], len(again.surfaces)) == (1.0, 2)
 
 
 def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it_along() -> None:

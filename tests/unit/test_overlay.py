@@ -36,7 +36,7 @@ def session(**changes: object) -> Readings:
         name="Digital Clay", method="virtual_master", paused=False, waiting=False, factor=0.97,
         errors=(2.1e-6, 4.6e-4), set_point=0.4, time=time, force=0.4 + 0.1 * np.sin(time), pins=(312, 40),
         heights=np.column_stack([0.04 + 0.001 * np.sin(time), np.full(1001, 0.035)]),
-        modes=np.array([600, 10, 0, 15, 0, 0, 0, 0]), colors=tuple(COLORS[mode] for mode in Mode),
+        modes=np.array([600, 10, 0, 15, 0, 0, 0, 0, 0]), colors=tuple(COLORS[mode] for mode in Mode),
         seconds=5.0,
     )  # fmt: skip
     return replace(told, **changes)

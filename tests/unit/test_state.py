@@ -60,7 +60,7 @@ def test_the_stored_codes_never_change() -> None:
     # Histories on disk hold them.
     assert {mode.name: int(mode) for mode in Mode} == {
         "REST": 0, "HOLD": 1, "EDGE": 2, "BLISTER": 3,
-        "SPRING": 4, "FORCE_FOLLOW": 5, "CRITICAL": 6, "FROZEN": 7,
+        "SPRING": 4, "FORCE_FOLLOW": 5, "CRITICAL": 6, "FROZEN": 7, "LOCKED": 8,
     }  # fmt: skip
 
 

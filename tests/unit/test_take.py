@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.control.orders import Orders, Verb, repeat_order
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
@@ -133,12 +134,23 @@ def test_a_path_that_is_none_is_refused(poses: Floats, rule: str) -> None:
 
 
 SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
-ORDERS = make_orders(30, -6e-3, 6e-3, 0.0, 10e-3, 10)
+SURFACE = np.where(np.arange(121) % 3 == 0, np.nan, 42e-3)
+
+
+def every_order() -> Orders:
+    """Return orders of every verb, one after the other."""
+    smooth, average = (make_orders(12, -6e-3, 6e-3, 0.0, 10e-3, 0, verb).rows for verb in Verb if verb < 2)
+    others = [repeat_order(4, verb, 3e-3, 0.0, 5e-3, 2.0) for verb in (Verb.LOCK, Verb.ERASE, Verb.INVERT)]
+    free = repeat_order(1, Verb.UNLOCK, radius=1.0)
+    return Orders(np.concatenate([smooth, average, *others, free, repeat_order(30, Verb.PLACE)]), (SURFACE,))
+
+
+ORDERS = every_order()
 
 
 @cache
-def smooth_take() -> Take:
-    """Return the take of a stroke over a relief."""
+def ordered_take() -> Take:
+    """Return the take of orders of every verb over a relief."""
     system = assemble(SCENE)
     state = heighten(system, make_spike_and_ridge(system.grid))
     start, poses = snapshot.dump(system, state), stay_away(len(ORDERS))
@@ -146,42 +158,77 @@ def smooth_take() -> Take:
     return Take(SCENE, start, poses, snapshot.dump(system, last), ORDERS)
 
 
-def test_bytes_bring_smooth_strokes_back_as_version_3_and_a_take_without_is_version_2() -> None:
-    data, plain = to_bytes(smooth_take()), to_bytes(replace(smooth_take(), smoothing=None))
-    assert [int(np.load(io.BytesIO(one))["version"]) for one in (data, plain)] == [3, 2]
-    assert "smoothing" not in np.load(io.BytesIO(plain))  # older versions read it
+def change_file(take: Take, **parts: object) -> bytes:
+    """Return the bytes of a take with other arrays; None: left out."""
+    written, arrays = io.BytesIO(), {**np.load(io.BytesIO(to_bytes(take))), **parts}
+    np.savez(written, **{name: array for name, array in arrays.items() if array is not None})
+    return written.getvalue()
+
+
+def test_bytes_bring_orders_back_as_version_4_and_a_take_without_is_version_2() -> None:
+    data, plain = to_bytes(ordered_take()), to_bytes(replace(ordered_take(), orders=None))
+    assert [int(np.load(io.BytesIO(one))["version"]) for one in (data, plain)] == [4, 2]
+    assert "orders" not in np.load(io.BytesIO(plain))  # older versions read it
     back = from_bytes(data)
-    assert back.smoothing is not None
-    np.testing.assert_array_equal(back.smoothing, ORDERS)
+    assert back.orders is not None
+    np.testing.assert_array_equal(back.orders.rows, ORDERS.rows)
+    np.testing.assert_array_equal(back.orders.surfaces, (SURFACE,))
     assert (replayed(back), replayed(from_bytes(plain))) == (True, False)
-    with pytest.raises(ParameterError, match=r"Take.smoothing must hold .* \(got row 0 is \[nan"):
-        replace(back, smoothing=np.full_like(ORDERS, np.nan))
+
+
+def test_a_take_of_version_3_whose_orders_have_no_verb_is_replayed_bit_for_bit() -> None:
+    rows = make_orders(30, -6e-3, 6e-3, 0.0, 10e-3, 10).rows
+    system, take = assemble(SCENE), replace(ordered_take(), poses=stay_away(len(rows)), orders=None)
+    *_, last = simulate_path(system, snapshot.load(system, take.start), take.poses, Orders(rows))
+    take = replace(take, end=snapshot.dump(system, last))
+    old = change_file(take, version=np.array(3), smoothing=np.ascontiguousarray(rows[:, :4]))
+    assert replayed(from_bytes(old))
+    assert not replayed(take)
+
+
+def rows_with(at: int, **columns: float) -> Floats:
+    """Return the rows of orders, one of them changed."""
+    rows = ORDERS.rows.copy()
+    for name, value in columns.items():
+        rows[at, ("x", "y", "radius", "strength", "verb").index(name)] = value
+    return rows
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    ("parts", "said"),
     [
-        ("smoothing", np.full(ORDERS.shape, "a"), "The take is damaged"),
-        ("version", np.array(4), "its version must be at most 3"),
+        ({"orders": np.full(ORDERS.rows.shape, "a")}, "damaged and cannot be read"),
+        ({"orders": ORDERS.rows[1:]}, "got an array of the shape"),
+        ({"orders": ORDERS.rows[:, :4]}, "got an array of the shape"),
+        ({"orders": rows_with(-1, x=1.0)}, "got row .* is .1.0"),
+        ({"orders": rows_with(-1, x=-1.0)}, "got row .* is .-1.0"),
+        ({"orders": rows_with(2, y=np.nan)}, "got row 2 is .*nan"),
+        ({"orders": rows_with(2, verb=7.0)}, "got row 2 is"),
+        ({"surfaces": np.full((1, 120), 0.04)}, "got surface 0 is an array of the shape .120,."),
+        ({"surfaces": np.full((1, 121), np.inf)}, "got surface 0 has the height inf m"),
+        ({"surfaces": np.full((1, 121), 1.0)}, "got surface 0 has the height 1 m"),
+        ({"surfaces": np.full((1, 121), "a")}, "got surface 0 is an array of .* of <U1"),
+        ({"surfaces": np.array(0.04)}, "damaged and cannot be read"),
+        ({"surfaces": np.empty((0, 121))}, "got row"),
+        ({"surfaces": None}, "damaged and cannot be read"),
+        ({"version": np.array(5)}, "its version must be at most 4"),
     ],
 )
-def test_orders_of_text_and_a_version_yet_to_come_are_refused(name: str, value: object, said: str) -> None:
-    parts = dict(np.load(io.BytesIO(to_bytes(smooth_take()))))
-    written = io.BytesIO()
-    np.savez(written, **{**parts, name: value})
-    with pytest.raises(OutputError, match=said):
-        from_bytes(written.getvalue())
+def test_hostile_orders_and_a_version_yet_to_come_are_refused_in_one_line(parts, said) -> None:
+    with pytest.raises(OutputError, match=said) as refused:
+        from_bytes(change_file(ordered_take(), **parts))
+    assert "\n" not in str(refused.value)
 
 
 def test_a_take_with_smooth_strokes_is_no_scene_file() -> None:
-    take = smooth_take()
+    take = ordered_take()
     system = assemble(SCENE)
-    with pytest.raises(OutputError, match="has strokes that smooth pins"):
+    with pytest.raises(OutputError, match="has strokes in which the valves drive pins"):
         to_scene(replace(take, start=snapshot.dump(system, begin(system))), "mine")
 
 
 def test_a_bake_shows_what_was_smoothed() -> None:
-    take = smooth_take()
+    take = ordered_take()
     *_, last = replay(take)
     *_, frames = simulate_frames(take, 1.0 / take.duration)
     assert not isinstance(frames, float)

@@ -25,8 +25,12 @@ DEFAULT = "okabe_ito"
 #: sRGB of each mode.
 PALETTES: dict[str, dict[Mode, Color]] = {
     "okabe_ito": COLORS,
-    "tol_muted": _palette("dddddd", "332288", "ddcc77", "88ccee", "cc6677", "882255", "aa4499", "117733"),
-    "brightness": _palette("ffffff", "252525", "d7d7d7", "aeaeae", "888888", "000000", "656565", "454545"),
+    "tol_muted": _palette(
+        "dddddd", "332288", "ddcc77", "88ccee", "cc6677", "882255", "aa4499", "117733", "222222"
+    ),
+    "brightness": _palette(
+        "ffffff", "252525", "d7d7d7", "aeaeae", "888888", "000000", "656565", "454545", "151515"
+    ),
 }
 WORDS = {
     "okabe_ito": ("Okabe and Ito", "Eight clear colors, told apart with any kind of color vision"),

@@ -200,7 +200,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
         self._state = snapshot.load(self._system, self._take.start)
         take = self._take
-        self._states = simulate_path(self._system, self._state, take.poses, take.smoothing)
+        self._states = simulate_path(self._system, self._state, take.poses, take.orders)
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:

@@ -97,7 +97,7 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
     height = np.empty((wanted.size, count), np.float32)
     force, mode = np.empty_like(height), np.empty((wanted.size, count), np.int8)
     frame, start = 0, snapshot.load(system, take.start)
-    states = simulate_path(system, start, take.poses, take.smoothing)
+    states = simulate_path(system, start, take.poses, take.orders)
     for period, state in enumerate(chain([start], states)):
         while frame < wanted.size and wanted[frame] == period:
             height[frame], force[frame] = state.row(0), state.row(system.rows.force)

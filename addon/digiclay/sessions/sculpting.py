@@ -11,6 +11,7 @@ import numpy as np
 from ..core.base.arrays import Floats
 from ..core.base.errors import StateError
 from ..core.base.modes import Mode
+from ..core.control.orders import Orders, add_verbs
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
 from ..core.engine.system import System
@@ -160,7 +161,8 @@ def _follow(running: Running, path: Floats, smoothing: Floats | None, pause: int
         if state.period % trace.every == 0:
             rows.append(recent_trace.sample(system, state, running.scene.set_point, trace.pins))
 
-    gone, errors = live_session.follow_path(running, path, smoothing, running.tick, watch), None
+    orders = None if smoothing is None else Orders(add_verbs(smoothing))
+    gone, errors = live_session.follow_path(running, path, orders, running.tick, watch), None
     if monitor:
         monitor, errors = accuracy.catch_up(monitor, gone.state, len(path) - 1)
     clock = live_session.update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
@@ -168,7 +170,7 @@ def _follow(running: Running, path: Floats, smoothing: Floats | None, pause: int
         gone, clock=clock, monitor=monitor, errors=errors or running.errors,
         trace=recent_trace.extend(trace, rows),
     )  # fmt: skip
-    return _count_gesture(gone, smoothed=smoothing is not None and bool(smoothing.any()))
+    return _count_gesture(gone, smoothed=orders is not None and orders.given)
 
 
 def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..core.base.arrays import Floats
 from ..core.control.blister import Blister
-from ..core.control.smoothing import ORDER
+from ..core.control.orders import VERBLESS
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid, Layout
 from .motion import CLEARANCE, DRAG, LIFT, SEARCH, cross, drag, finish_image, run_clock
@@ -99,10 +99,10 @@ def settle(
         # The device still looks for the fingertip, and takes back what rises meanwhile.
         most = min(count, math.ceil(-gone / period))
         clock = min(stroke.clock + most * period, stroke.left)
-        return replace(stroke, clock=clock), np.tile(pose, (most + 1, 1)), np.zeros((most, ORDER))
+        return replace(stroke, clock=clock), np.tile(pose, (most + 1, 1)), np.zeros((most, VERBLESS))
     spike = None if gone >= LONGEST else find_spike(stroke, grid, target, finger, blister)
     if spike is None and (gone == 0.0 or arrived or gone >= LONGEST + PATIENCE):
-        return replace(stroke, phase=DONE), np.array([pose, pose]), np.zeros((1, ORDER))
+        return replace(stroke, phase=DONE), np.array([pose, pose]), np.zeros((1, VERBLESS))
     if spike is None:
         (x, y), strength, most = pose[:2], 0.0, count
     else:

@@ -20,6 +20,7 @@ class Mode(IntEnum):
     FORCE_FOLLOW = 5
     CRITICAL = 6
     FROZEN = 7
+    LOCKED = 8
 
 
 MEANINGS: dict[Mode, str] = {
@@ -31,6 +32,7 @@ MEANINGS: dict[Mode, str] = {
     Mode.FORCE_FOLLOW: "under the fingertip, follows the force",
     Mode.CRITICAL: "about to lose the fingertip",
     Mode.FROZEN: "left behind by the fingertip, keeps its command",
+    Mode.LOCKED: "locked by hand, its valve stays shut",
 }
 
 #: sRGB in [0, 1], one per mode.
@@ -43,4 +45,5 @@ COLORS: dict[Mode, tuple[float, float, float]] = {
     Mode.FORCE_FOLLOW: (0.84, 0.37, 0.00),
     Mode.CRITICAL: (0.80, 0.47, 0.65),
     Mode.FROZEN: (0.00, 0.62, 0.45),
+    Mode.LOCKED: (0.16, 0.14, 0.20),
 }

@@ -346,5 +346,7 @@ def make_batch(systems: Sequence[System]) -> Batch:
         instants=first.instants,
         rows=first.rows,
         by_set=first.by_set,
+        latency=first.latency,
+        height_floor=first.height_floor,
         systems=tuple(systems),
     )

@@ -44,11 +44,16 @@ class Exchange:
             pairs.append((start[here], order[at[here]], share))
         return pairs
 
-    def even_out(self, cells: Cells, values: Floats) -> Floats:
-        """Return values of some cells, (m,), after neighbors among them have exchanged; their sum is kept."""
+    def even_out(self, cells: Cells, values: Floats, weight: Floats | None = None) -> Floats:
+        """Return values of some cells, (m,), after neighbors among them have exchanged; their sum is kept.
+
+        Of two neighbors the lesser weight, (m,) from 0 to 1, is the part of the exchange that takes place.
+        """
         change = np.zeros(cells.size)
         for one, other, share in self.find_pairs(cells):
             flow = share * (values[other] - values[one])
+            if weight is not None:
+                flow *= np.minimum(weight[one], weight[other])
             change += np.bincount(one, flow, cells.size) - np.bincount(other, flow, cells.size)
         evened: Floats = values + change
         return evened

@@ -28,7 +28,7 @@ from .device_info import DeviceInfo, suppress_noise
 from .drive import Drive, DriveParameters, make_drive
 
 #: The highest code of a mode; the lowest is 0.
-HIGHEST = int(max(Mode))
+HIGHEST = int(Mode.FROZEN)
 
 
 class Cells(NamedTuple):

@@ -106,7 +106,8 @@ class Selection:
         state.aged.reshape(-1)[active.flat[: active.near]] = state.period * self.period
         moving: Flags = active.block[cell.lag_rows.start : rows.target].any(axis=0)
         moving |= active.block[rows.force] > 0.0
-        moving |= active.mode > Mode.HOLD
+        # A locked pin needs nobody.
+        moving |= (active.mode > Mode.HOLD) & (active.mode != Mode.LOCKED)
         return moving
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:

@@ -41,6 +41,10 @@ class System:
     by_set: bool
     """Whether what becomes of a cell depends on which others are active: in a batch each run then keeps the
     active set it has alone."""
+    latency: float
+    """From a valve's command to what is read of it: dead time, lag, and the delay of the sensors, s."""
+    height_floor: float
+    """Distance from which on a height that is read is not the true one, m."""
 
     def move(self, active: ActiveSet, finger: FingerPeriod | None) -> None:
         """Move active cells through a control period under their queued commands, in place."""

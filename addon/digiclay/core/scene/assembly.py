@@ -73,6 +73,8 @@ def assemble(scene: Scene) -> System:
     controller, sensors, rows = _make_control(scene, bed, motion)
     fastest = find_speeds(motion.cell).rise
     noisy = scene.sensors and scene.sensors.noisy
+    latency = scene.delay.dead_time if scene.delay else 0.0
+    latency += scene.valve_lag.time_constant if scene.valve_lag else 0.0
     return System(
         grid=bed,
         cell=motion.cell,
@@ -86,6 +88,8 @@ def assemble(scene: Scene) -> System:
         instants=motion.instants,
         rows=rows,
         by_set=bool(noisy or (scene.control and find_method(scene.method).by_set)),
+        latency=latency + (scene.sensors.delay * period if scene.sensors else 0.0),
+        height_floor=scene.sensors.height_floor if scene.sensors else 0.0,
     )
 
 

@@ -11,7 +11,8 @@ from typing import TypeVar
 import numpy as np
 
 from ..base.arrays import Floats
-from ..control.smoothing import ORDER, order_periods
+from ..base.modes import Mode
+from ..control.orders import ORDER, Orders, Verb, order_periods
 from ..engine.simulation import advance, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
@@ -125,38 +126,49 @@ def clamp_pose(pose: Floats, stroke: float) -> Floats:
 
 
 def simulate_path(
-    system: System, state: State, path: Floats, smoothing: Floats | None = None
+    system: System, state: State, path: Floats, orders: Orders | None = None
 ) -> Iterator[State]:
     """Yield the states along the path (t + 1, f, 7), each valid until the next one; `state` is used up."""
     fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
-    systems = repeat(system, len(fingers)) if smoothing is None else _order_smoothing(system, smoothing)
+    locked = bool((state.mode() == Mode.LOCKED).any())
+    systems: Iterator[System] = repeat(system, len(fingers))
+    if orders is not None or locked:
+        systems = _order(system, orders or Orders(np.zeros((len(fingers), ORDER))), locked=locked)
     for own, finger in zip(systems, fingers, strict=True):
         state = advance(own, state, finger)
         yield state
 
 
-def _order_smoothing(system: System, smoothing: Floats) -> Iterator[System]:
-    """Yield the system of each control period of a bed that is smoothed."""
-    method = system.controller
-    for controller in order_periods(method, system.grid, system.cell, system.period, smoothing):
+def _order(system: System, orders: Orders, *, locked: bool) -> Iterator[System]:
+    """Yield the system of each control period of a bed with orders, or whose pins are locked."""
+    method, kind = system.controller, (system.latency, system.height_floor)
+    own = order_periods(method, system.grid, system.cell, system.period, orders, *kind, locked=locked)
+    for controller in own:
         yield system if controller is method else replace(system, controller=controller)
+
+
+def has_arrived(state: State) -> bool:
+    """Return whether all pins that orders drive have come to their heights."""
+    return not bool((state.mode() == Mode.BLISTER).any())
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Fingertip path, and what was smoothed, since the start of the recording."""
+    """Fingertip path, and the orders beside it, since the start of the recording."""
 
     start: bytes
     """The state recording began with, kept by `snapshot.dump`."""
     first: int
     """Its period."""
     rows: Floats
-    """(capacity, 7 f + 4 + 1): Poses of the fingers at the end of each period, what was smoothed in it, see
-    `core.control.smoothing`, and the moment it was simulated in; row 0: the start."""
+    """(capacity, 7 f + 5 + 1): Poses of the fingers at the end of each period, the order in it, see
+    `core.control.orders`, and the moment it was simulated in; row 0: the start."""
     count: int
     """How many of the rows are in use."""
     saved: int = 0
     """How many of those the file has, as a take."""
+    surfaces: tuple[Floats, ...] = ()
+    """(n,) each: Heights that orders place pins at, m."""
 
     @classmethod
     def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
@@ -171,27 +183,34 @@ class Recording:
         return self.rows[: self.count, : -ORDER - 1].reshape(self.count, -1, 7)
 
     @property
-    def smoothing(self) -> Floats | None:
-        """What was smoothed in each period, shape (t, 4); None: nothing in any."""
-        orders = self.rows[1 : self.count, -ORDER - 1 : -1]
-        return orders if orders.any() else None
+    def orders(self) -> Orders | None:
+        """The orders of all periods; None: there is none in any."""
+        orders = Orders(self.rows[1 : self.count, -ORDER - 1 : -1], self.surfaces)
+        return orders if orders.given else None
 
     @property
     def unsaved(self) -> bool:
         """Whether something was recorded that the file does not have."""
         return self.count > max(self.saved, 1)
 
-    def extend(self, path: Floats, tick: int, smoothing: Floats | None = None) -> Recording:
-        """Return the recording with poses (k, f, 7) of more periods, and their smoothing (k, 4)."""
+    def extend(self, path: Floats, tick: int, orders: Orders | None = None) -> Recording:
+        """Return the recording with poses (k, f, 7) of more periods, and their orders."""
         end = self.count + len(path)
         rows = self.rows
         if end > len(rows):
             rows = np.empty((2 * end, self.rows.shape[1]))
             rows[: self.count] = self.rows[: self.count]
         rows[self.count : end, : -ORDER - 1] = path.reshape(len(path), -1)
-        rows[self.count : end, -ORDER - 1 : -1] = 0.0 if smoothing is None else smoothing
+        surfaces = self.surfaces
+        rows[self.count : end, -ORDER - 1 : -1] = 0.0
+        if orders is not None:
+            given = rows[self.count : end, -ORDER - 1 : -1]
+            given[:] = orders.rows
+            surfaces, numbers = _add_surfaces(surfaces, orders.surfaces)
+            placed = given[:, 4] == Verb.PLACE
+            given[placed, 0] = numbers[given[placed, 0].astype(np.intp)]
         rows[self.count : end, -1] = tick
-        return replace(self, rows=rows, count=end)
+        return replace(self, rows=rows, count=end, surfaces=surfaces)
 
     def cut_at_tick(self, tick: int, period: int) -> Recording | None:
         """Return the recording as of a moment undo came back to, in `period`; None if that is another."""
@@ -205,7 +224,19 @@ class Recording:
 
     def _first(self, count: int) -> Recording:
         """Return the recording with its first rows alone."""
-        return replace(self, count=count, saved=min(self.saved, count))
+        rows = self.rows[1:count, -ORDER - 1 : -1]
+        needed = int(rows[rows[:, 4] == Verb.PLACE, 0].max(initial=-1.0)) + 1
+        return replace(self, count=count, saved=min(self.saved, count), surfaces=self.surfaces[:needed])
+
+
+def _add_surfaces(kept: tuple[Floats, ...], more: tuple[Floats, ...]) -> tuple[tuple[Floats, ...], Floats]:
+    """Return surfaces (n,) with more, but for the last one once again, and the numbers of the latter."""
+    numbers = []
+    for surface in more:
+        if not (kept and (kept[-1] is surface or kept[-1].tobytes() == surface.tobytes())):
+            kept = (*kept, surface)
+        numbers.append(len(kept) - 1)
+    return kept, np.array(numbers, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +268,7 @@ Session = TypeVar("Session", bound=LiveSession)
 def follow_path(
     session: Session,
     path: Floats,
-    smoothing: Floats | None = None,
+    orders: Orders | None = None,
     tick: int = 0,
     watch: Callable[[State], None] | None = None,
 ) -> Session:
@@ -245,10 +276,10 @@ def follow_path(
     system, state, fingers = session.system, session.state, path[:, None]
     # The force of a pressed pin grows exponentially; the session itself reports what exceeds all floats.
     with np.errstate(over="ignore", invalid="ignore"):
-        for state in simulate_path(system, session.state, fingers, smoothing):
+        for state in simulate_path(system, session.state, fingers, orders):
             if watch:
                 watch(state)
-    recording = session.recording and session.recording.extend(fingers[1:], tick, smoothing)
+    recording = session.recording and session.recording.extend(fingers[1:], tick, orders)
     return replace(session, state=state, pose=path[-1], recording=recording)
 
 

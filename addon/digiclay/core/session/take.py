@@ -1,7 +1,7 @@
 """Take: initial state and fingers' paths of a session, replayed bit for bit.
 
 The path is a pose at the start and one at the end of every control period, between which the
-finger goes straight; that, what is smoothed in each period, and the state at the start decide all
+finger goes straight; that, the orders in each period, and the state at the start decide all
 that follows. The state at the end is kept as well, so that a replay can prove that it came to the same.
 """
 
@@ -11,13 +11,14 @@ import io
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
-from ..control.smoothing import FARTHEST, find_fault
+from ..control.orders import FARTHEST, STRONGEST, Orders, add_verbs, find_fault
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -35,10 +36,10 @@ STRAIGHT = 1e-12
 #: The arrays of a take.
 PARTS = ("scene", "start", "poses", "end")
 #: What the number of a format's version stands for: 1, which is not written down, has poses (t + 1, 7) of one
-#: finger; 2 has (t + 1, f, 7); 3 has the array `SMOOTHING` besides. A take without it is written as 2, which
-#: older versions can read.
-PLAIN, VERSION = 2, 3
-SMOOTHING = "smoothing"
+#: finger; 2 has (t + 1, f, 7); 3 has the array `SMOOTHING` besides, (t, 4), orders that smooth; 4 has orders
+#: (t, 5) and their surfaces (s, n) instead. A take without orders is written as 2, which older versions read.
+PLAIN, VERSION = 2, 4
+SMOOTHING, ORDERS, SURFACES = "smoothing", "orders", "surfaces"
 #: Most parts a physics step is cut into when a take is simulated once more.
 MOST_PARTS = 64
 
@@ -48,7 +49,7 @@ class Take:
     """Stretch of a session.
 
     Raises ParameterError when there is no period, a pose is not finite, the scene has another number of
-    fingers, or what is smoothed is no disc and strength a period.
+    fingers, or the orders are none.
     """
 
     scene: Scene
@@ -59,8 +60,8 @@ class Take:
     unit quaternion."""
     end: bytes
     """The states before and after, from `snapshot.dump`."""
-    smoothing: Floats | None = None
-    """(t, 4): What is smoothed in each period, see `control.smoothing`; None: nothing in any."""
+    orders: Orders | None = None
+    """What brushes do beside the fingers, see `control.orders`; None: nothing in any period."""
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
@@ -72,10 +73,16 @@ class Take:
         if not sound.all():
             rule = "must be finite numbers, quaternions not 0"
             raise ParameterError("Take", "poses", rule, f"row {int(np.argwhere(~sound)[0][0])} is not")
-        fault = "" if self.smoothing is None else find_fault(self.smoothing, self.periods)
+        if self.orders is None:
+            return
+        pins, stroke = self.scene.layout.rows * self.scene.layout.columns, self.scene.actuator.stroke
+        fault = find_fault(self.orders, self.periods, pins, stroke)
         if fault:
-            rule = f"must hold x, y, a radius and a strength from 0 to 1 for each of {self.periods} periods"
-            raise ParameterError("Take", SMOOTHING, rule, fault)
+            rule = (
+                f"must hold x, y or a surface, a radius, a strength up to {STRONGEST:g} and a verb for each "
+                f"of {self.periods} periods, and surfaces of {pins} heights within the stroke"
+            )
+            raise ParameterError("Take", ORDERS, rule, fault)
 
     @property
     def periods(self) -> int:
@@ -91,7 +98,7 @@ class Take:
 def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
     """Simulate a take once more, or as another scene integrates it; a state is valid until the next one."""
     system = assemble(scene or take.scene)
-    yield from simulate_path(system, snapshot.load(system, take.start), take.poses, take.smoothing)
+    yield from simulate_path(system, snapshot.load(system, take.start), take.poses, take.orders)
 
 
 def refine(scene: Scene, parts: int) -> Scene:
@@ -103,10 +110,10 @@ def refine(scene: Scene, parts: int) -> Scene:
 
 def to_scene(take: Take, name: str) -> Scene:
     """Return a take from rest as a scene that `digiclay run` simulates; OutputError of any other take."""
-    if take.smoothing is not None:
+    if take.orders is not None:
         raise OutputError(
-            f"The take {name!r} has strokes that smooth pins, of the brush Smooth or at a crossing, and a "
-            "scene file holds the fingertip's path alone: record a take without them for export."
+            f"The take {name!r} has strokes in which the valves drive pins by themselves, and a scene file "
+            "holds the fingertip's path alone: record a take of the fingertip for export."
         )
     system = assemble(take.scene)
     if not _is_at_rest(system, take.start):
@@ -153,15 +160,16 @@ def _find_turns(poses: Floats) -> NDArray[np.bool_]:
 def to_bytes(take: Take) -> bytes:
     """Write a take as numpy's ``.npz``"""
     written = io.BytesIO()
-    smoothed = {} if take.smoothing is None else {SMOOTHING: take.smoothing}
+    orders = take.orders
+    ordered = {} if orders is None else {ORDERS: orders.rows, SURFACES: np.array(orders.surfaces)}
     np.savez(
         written,
         scene=np.frombuffer(format_scene(take.scene).encode(), np.uint8),
         start=np.frombuffer(take.start, np.uint8),
         poses=take.poses,
         end=np.frombuffer(take.end, np.uint8),
-        version=np.array(VERSION if smoothed else PLAIN),
-        **smoothed,
+        version=np.array(VERSION if ordered else PLAIN),
+        **ordered,
     )
     return written.getvalue()
 
@@ -171,7 +179,10 @@ def from_bytes(data: bytes) -> Take:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             there = archive.namelist()
-            names = [*PARTS, *(name for name in ("version", SMOOTHING) if f"{name}.npy" in there)]
+            names = [
+                *PARTS,
+                *(name for name in ("version", SMOOTHING, ORDERS, SURFACES) if f"{name}.npy" in there),
+            ]
             heads = read_heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to no more than it is.
             size = sum(head.size for head in heads.values())
@@ -184,14 +195,22 @@ def from_bytes(data: bytes) -> Take:
         elif not PLAIN <= int(parts["version"].reshape(())) <= VERSION:
             raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
         resolved = resolve(parse_tables(scene.tobytes().decode()))
-        return Take(resolved, start.tobytes(), poses, end.tobytes(), parts.get(SMOOTHING))
+        return Take(resolved, start.tobytes(), poses, end.tobytes(), _read_orders(parts))
     except (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None
+
+
+def _read_orders(parts: dict[str, NDArray[Any]]) -> Orders | None:
+    """Return the orders of a take's arrays, of which some version has none."""
+    if SMOOTHING in parts:
+        return Orders(add_verbs(parts[SMOOTHING]))
+    return Orders(parts[ORDERS], tuple(parts[SURFACES])) if ORDERS in parts else None
 
 
 def make_take(scene: Scene, recording: Recording, end: bytes) -> Take | None:
     """Return what was recorded as a take, with the snapshot of its end; None without a control period."""
     if recording.count < 2:
         return None
-    smoothing = None if recording.smoothing is None else recording.smoothing.copy()
-    return Take(scene, recording.start, recording.path.copy(), end, smoothing)
+    orders = recording.orders
+    orders = orders and replace(orders, rows=orders.rows.copy())
+    return Take(scene, recording.start, recording.path.copy(), end, orders)

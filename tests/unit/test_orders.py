@@ -1,0 +1,432 @@
+"""Pins in a disc are driven to smoothed heights: the bed gets even, keeps its volume, and stays elsewhere."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from digiclay.core.base.arrays import Floats
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.drive import DriveParameters
+from digiclay.core.control.methods import METHODS
+from digiclay.core.control.orders import Orders, Verb, find_fault, order_periods, place, repeat_order
+from digiclay.core.control.virtual_master import Master, Phase
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.control_interface import Controller, Measurement
+from digiclay.core.model.physics import find_speeds
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import snapshot
+from digiclay.core.session.live_session import has_arrived, simulate_path
+
+from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
+
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
+BAND = DriveParameters().dead_band
+RADIUS = 10e-3
+KEEP_HEIGHTS = ("virtual_master", "cell_states", "plastic", "push_pull")
+#: Pins of a quarter of the area behind the same valves.
+STIFF = {"preset": "fast", "actuator": {"bore": 1e-3}}
+#: A stroke between spike and ridge: both are in the disc.
+STROKE = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS)
+
+
+@cache
+def bed(
+    arrangement: str = "aligned", method: str = "virtual_master", size: int = 13, period: float = 5e-3,
+    *, shape: bool = False,
+) -> System:  # fmt: skip
+    """Return a small bed, whose display shows a shape first if it has one."""
+    layout = {"rows": size, "columns": size, "arrangement": arrangement}
+    control: object = "absent" if method == "absent" else {"method": method}
+    simulation = {"control_period": period}
+    shown = {"shape": {"file": "crater"}} if shape else {}
+    return assemble(resolve({"layout": layout, "control": control, "simulation": simulation, **shown}))
+
+
+def order(system: System, x: float, y: float, radius: float) -> Controller:
+    """Return the controller of a period in which a disc is smoothed, m."""
+    orders = Orders(repeat_order(1, Verb.AVERAGE, x, y, radius, 1.0))
+    (control,) = order_periods(system.controller, system.grid, system.cell, system.period, orders)
+    assert control is not None
+    return control
+
+
+@pytest.mark.parametrize("verb", [Verb.SMOOTH, Verb.AVERAGE])
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_each_stroke_makes_a_spike_and_a_ridge_less_rough_and_keeps_the_volume(
+    arrangement: str, verb: Verb
+) -> None:
+    system = bed(arrangement)
+    stroke = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS, verb=verb)
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    first = state.row(0)
+    rough = [measure_roughness(system.grid, first)]
+    for _ in range(3):
+        *_, state = simulate_path(system, state, stay_away(len(stroke)), stroke)
+        rough.append(measure_roughness(system.grid, state.row(0)))
+        # A pin stands within the dead band of its height; the heights' own sum does not change.
+        assert abs((state.row(0) - first).sum()) <= BAND * first.size
+        assert abs((state.row(system.rows.target) - first).sum()) < 1e-12
+    assert max(rough[1:]) < 0.45 * rough[0]
+    # A quick one leaves so little that its own rim shows.
+    assert verb is Verb.SMOOTH or np.diff(rough).max() < 0.0
+
+
+@pytest.mark.parametrize(
+    ("period", "swing", "verb"),
+    [(5e-3, 1e-9, Verb.AVERAGE), (20e-3, BAND, Verb.AVERAGE), (5e-3, BAND, Verb.SMOOTH)],
+)
+def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(
+    period: float, swing: float, verb: Verb
+) -> None:
+    system = bed(period=period)
+    relief = make_spike_and_ridge(system.grid)
+    state = heighten(system, relief)
+    first, spike = state.row(0), int(relief.argmax())
+    orders = make_orders(150, 0.0, 0.0, 0.0, RADIUS, 100, verb)
+    heights = np.array([one.row(0) for one in simulate_path(system, state, stay_away(len(orders)), orders)])
+    assert np.diff(heights[:, spike]).max() <= swing
+    # No pin leaves the range of the others; all stand still before the wait is over.
+    assert heights.min() >= first.min() - BAND
+    assert heights.max() <= first.max() + BAND
+    assert np.abs(heights[-20:] - heights[-1]).max() < 1e-9
+    speed, limit = np.diff(heights, axis=0) / system.period, find_speeds(system.cell)
+    assert speed.max() <= limit.rise * (1.0 + 1e-9)
+    assert limit.fall * (1.0 + 1e-9) <= speed.min() < 0.45 * limit.fall
+
+
+def test_pins_are_in_the_mode_blister_until_they_have_arrived_and_then_hold_or_rest() -> None:
+    system = bed(method="absent")
+    rest = system.cell.actuator.rest_height
+    state = heighten(system, np.where(system.grid.x < 0.0, 4e-3, 0.0))
+    *_, state = simulate_path(system, state, stay_away(20), make_orders(20, 0.0, 0.0, 0.0, RADIUS, 0))
+    inside = np.hypot(system.grid.x, system.grid.y) < RADIUS - 1e-9
+    np.testing.assert_array_equal(state.mode() == Mode.BLISTER, inside)
+    *_, state = simulate_path(system, state, stay_away(60), make_orders(0, 0.0, 0.0, 0.0, RADIUS))
+    formed = np.abs(state.row(system.rows.target) - rest) > BAND
+    np.testing.assert_array_equal(state.mode(), np.where(formed, Mode.HOLD, Mode.REST))
+
+
+def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
+    system, ends = bed(size=21), []
+    path = stay_away(80)
+    path[:, 0, :3] = np.column_stack([np.full(81, -15e-3), np.zeros(81), np.linspace(42e-3, 36e-3, 81)])
+    for radius in (0.0, 7e-3):
+        relief = np.zeros(system.grid.count)
+        relief[system.grid.at(np.array([18e-3]), np.array([18e-3]))] = 5e-3
+        orders = Orders(repeat_order(80, Verb.AVERAGE, 18e-3, 18e-3, radius, 1.0))
+        *_, state = simulate_path(system, heighten(system, relief), path, orders)
+        ends.append(state.row(0))
+    near = np.hypot(system.grid.x - 18e-3, system.grid.y - 18e-3) < 7e-3
+    assert ends[0].min() < 38e-3
+    # Sums over other cells round in another way.
+    np.testing.assert_allclose(ends[0][~near], ends[1][~near], rtol=0, atol=1e-12)
+    assert (ends[0] - ends[1])[near].max() > 2e-3
+
+
+@pytest.mark.parametrize(
+    ("place", "radius", "held"),
+    [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)],
+)
+def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(place, radius, held):
+    system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
+    cells, none = np.empty(0, np.intp), np.empty(0)
+    basis, own = system.grid.compute_basis(cells), np.empty((0, 0))
+    touched = Measurement(basis, none, none, none, np.empty(0, np.int8), own, cells)
+    smoothed = order(bed(method="absent"), *place, radius)
+    discs = [system.controller.locate(memory, touched)[1], smoothed.locate(None, touched)[1]]
+    x, y, whole = order(system, *place, radius).locate(memory, touched)[1]
+    for disc in discs:
+        assert np.hypot(disc[0] - x, disc[1] - y) + disc[2] <= whole * (1.0 + 1e-12)
+    (a, b, one), (c, d, other) = discs
+    least = (np.hypot(a - c, b - d) + one + other) / 2.0
+    assert whole == pytest.approx(least if held is None else (one, other)[held])
+
+
+@pytest.mark.parametrize("method", [*METHODS, "absent"])
+def test_every_method_lets_its_pins_be_smoothed_and_keeps_them_if_it_keeps_heights(method: str) -> None:
+    system = bed(method=method)
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    spike = int(state.row(0).argmax())
+    before = float(state.row(0)[spike])
+    *_, state = simulate_path(system, state, stay_away(100), Orders(STROKE.rows[:100]))
+    assert float(state.row(0)[spike]) < before - 5e-3
+    *_, state = simulate_path(system, state, stay_away(60), Orders(STROKE.rows[100:]))
+    # The shape display goes on with its own shape elsewhere.
+    near = np.hypot(system.grid.x, system.grid.y) < RADIUS
+    assert method == "shape_display" or not (state.mode() == Mode.BLISTER)[near].any()
+    if method in KEEP_HEIGHTS:
+        smoothed = state.row(0)
+        *_, state = simulate_path(system, state, stay_away(100))
+        assert np.abs(state.row(0) - smoothed).max() <= 2.0 * BAND
+
+
+def test_pins_that_a_stroke_leaves_in_motion_are_driven_home_by_the_method() -> None:
+    system = bed()
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    *_, state = simulate_path(system, state, stay_away(5), make_orders(5, 0.0, 0.0, 0.0, RADIUS, 0))
+    target = state.row(system.rows.target)
+    assert np.abs(state.row(0) - target).max() > 1e-3
+    *_, state = simulate_path(system, state, stay_away(300))
+    # Method I comes to a height like 1/t.
+    assert np.abs(state.row(0) - target).max() < 0.2e-3
+
+
+def test_periods_without_an_order_are_those_of_the_method_alone() -> None:
+    system, ends = bed(), []
+    for orders in (None, Orders(np.zeros((60, 5)))):
+        path = stay_away(60)
+        path[:, 0, 2] = np.linspace(44e-3, 36e-3, 61)
+        *_, state = simulate_path(system, heighten(system, np.zeros(system.grid.count)), path, orders)
+        ends.append(snapshot.dump(system, state))
+    assert ends[0] == ends[1]
+
+
+def bumpy(system: System, lowest: float = -8e-3, highest: float = 8e-3) -> Floats:
+    """Return random heights for the pins of a disc about the middle, NaN elsewhere, (n,), m."""
+    grid, rest = system.grid, system.cell.actuator.rest_height
+    heights = rest + np.random.default_rng(1).uniform(lowest, highest, grid.count)
+    return np.where(np.hypot(grid.x, grid.y) < 12e-3, heights, np.nan)
+
+
+def place_until_arrived(system: System, state: State, surface: Floats, patience: float = 2.0) -> State:
+    """Return the state after pins were placed, until all have arrived; `patience` in s."""
+    count = round(patience / system.period)
+    for after in simulate_path(system, state, stay_away(count), place(count, surface)):
+        if has_arrived(after):
+            return after
+    raise AssertionError("pins have not arrived")
+
+
+@pytest.mark.parametrize("method", [*METHODS, "absent"])
+def test_pins_are_placed_within_a_micrometer_and_stay_there_whatever_the_method(method: str) -> None:
+    system = bed(method=method)
+    surface = bumpy(system)
+    driven, state = ~np.isnan(surface), begin(system)
+    state = place_until_arrived(system, state, surface)
+    assert np.abs(state.row(0) - surface)[driven].max() < 1e-6
+    if method not in ("viscous", "shape_display"):
+        assert np.abs(state.row(0) - system.cell.actuator.rest_height)[~driven].max() == 0.0
+    if method in (*KEEP_HEIGHTS, "absent"):
+        *_, state = simulate_path(system, state, stay_away(60))
+        assert np.abs(state.row(0) - surface)[driven].max() < 1e-6
+        assert set(np.unique(state.mode()[driven])) <= {Mode.REST, Mode.HOLD}
+
+
+@pytest.mark.parametrize(
+    ("table", "longest", "error", "swing"),
+    [
+        pytest.param({}, 0.4, 1e-6, 0.1e-6, id="paper"),
+        pytest.param({"preset": "fast"}, 0.25, 1e-6, 0.2e-6, id="fast"),
+        pytest.param(STIFF, 0.15, 1e-6, 0.5e-6, id="pins four times as fast"),
+        pytest.param({"simulation": {"control_period": 20e-3}}, 0.6, 1e-6, 0.5e-6, id="slow control"),
+        pytest.param({"simulation": {"control_period": 1e-3}}, 0.4, 1e-6, 0.5e-6, id="fast control"),
+        pytest.param({"delay": {"dead_time": 20e-3}}, 0.6, 1e-6, 0.5e-6, id="dead time"),
+        pytest.param({"valve_lag": {"time_constant": 50e-3}}, 1.1, 1e-6, 4e-6, id="slow valve"),
+        pytest.param({"valve_lag": "absent", "delay": "absent"}, 0.4, 1e-6, 0.5e-6, id="ideal valve"),
+        pytest.param({"sensors": {"delay": 4}}, 0.6, 1e-6, 0.5e-6, id="late readings"),
+        pytest.param({"sensors": {"height_noise": 5e-6}}, 0.4, 25e-6, 5e-6, id="noisy readings"),
+    ],
+)
+def test_placed_pins_come_fast_and_do_not_swing_behind_any_valve(table, longest, error, swing):
+    system = assemble(resolve({"layout": {"rows": 13, "columns": 13}, **table}))
+    surface, state = bumpy(system), begin(system)
+    driven = ~np.isnan(surface)
+    way, beyond = np.sign(surface - state.row(0))[driven], 0.0
+    count = round(longest / system.period)
+    for after in simulate_path(system, state, stay_away(count), place(count, surface)):
+        beyond = max(beyond, float(((after.row(0) - surface)[driven] * way).max()))
+    assert has_arrived(after)
+    assert np.abs(after.row(0) - surface)[driven].max() < error
+    assert beyond < swing
+
+
+def test_a_pin_under_a_finger_that_is_too_strong_is_waited_for_and_holds_up_no_other() -> None:
+    system = bed()
+    surface, path = bumpy(system, 4e-3, 8e-3), stay_away(200)
+    path[:, 0, 2] = 36e-3
+    *_, state = simulate_path(system, begin(system), path, place(200, surface))
+    moving = state.mode() == Mode.BLISTER
+    assert moving.any()
+    arrived = ~np.isnan(surface) & ~moving
+    assert np.abs(state.row(0) - surface)[arrived].max() < 1e-6
+    assert arrived.sum() > 10
+
+
+def test_erased_pins_go_back_to_rest_in_the_middle_and_partly_towards_the_rim() -> None:
+    system = bed()
+    rest = system.cell.actuator.rest_height
+    state = heighten(system, np.full(system.grid.count, 6e-3))
+    rows = [repeat_order(40, Verb.ERASE, 0.0, 0.0, 12e-3, 1.0), repeat_order(60, Verb.ERASE, radius=12e-3)]
+    *_, state = simulate_path(system, state, stay_away(100), Orders(np.concatenate(rows)))
+    assert has_arrived(state)
+    off, distance = state.row(0) - rest, np.hypot(system.grid.x, system.grid.y)
+    assert np.abs(off[distance < 6e-3]).max() < 1e-6
+    assert (state.mode()[distance < 6e-3] == Mode.REST).all()
+    assert (off[distance >= 12e-3] == (rest + 6e-3) - rest).all()
+    assert np.diff(off[np.argsort(distance)]).min() > -1e-6
+    assert ((off > 0.1e-3) & (off < 5.9e-3)).any()
+
+
+def lock(verb: Verb, x: float = 0.0, radius: float = 7e-3) -> Orders:
+    """Return the order of one control period that locks or unlocks a disc, m."""
+    return Orders(repeat_order(1, verb, x, 0.0, radius))
+
+
+@pytest.mark.parametrize("shape", [False, True])
+@pytest.mark.parametrize("method", [*METHODS, "absent"])
+def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method: str, shape: bool) -> None:
+    system = bed(method=method, shape=shape)
+    path = stay_away(160)
+    path[:, 0, 2] = np.concatenate([np.linspace(46e-3, 36e-3, 81), np.linspace(36e-3, 60e-3, 80)])
+    path[40:, 0, 0] = np.linspace(-9e-3, 9e-3, 121)
+    *_, state = simulate_path(system, begin(system), stay_away(1), lock(Verb.LOCK))
+    locked = np.hypot(system.grid.x, system.grid.y) <= 7e-3
+    np.testing.assert_array_equal(state.mode() == Mode.LOCKED, locked)
+    before = state.row(0)
+    everywhere = np.full(system.grid.count, 45e-3)
+    orders = Orders(
+        np.concatenate([
+            repeat_order(80, Verb.SMOOTH, radius=20e-3, strength=1.0),
+            repeat_order(40, Verb.ERASE, radius=20e-3, strength=1.0),
+            repeat_order(40, Verb.PLACE),
+        ]),
+        (everywhere,),
+    )  # fmt: skip
+    for part in (None, orders):
+        *_, state = simulate_path(system, state, path, part)
+        np.testing.assert_array_equal(state.row(0)[locked], before[locked])
+        np.testing.assert_array_equal(state.mode() == Mode.LOCKED, locked)
+    *_, state = simulate_path(system, state, stay_away(1), lock(Verb.UNLOCK))
+    assert not (state.mode() == Mode.LOCKED).any()
+    assert np.abs(place_until_arrived(system, state, everywhere).row(0) - 45e-3).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("given", "left"),
+    [
+        ([lock(Verb.LOCK)], (True, False)),
+        ([lock(Verb.LOCK), lock(Verb.UNLOCK, 12e-3)], (True, False)),
+        ([lock(Verb.LOCK, radius=1.0), lock(Verb.UNLOCK)], (False, True)),
+        ([lock(Verb.LOCK), lock(Verb.INVERT, radius=1.0)], (False, True)),
+        ([lock(Verb.INVERT, radius=1.0)], (True, True)),
+        ([lock(Verb.LOCK, radius=1.0), lock(Verb.UNLOCK, radius=1.0)], (False, False)),
+    ],
+)
+def test_discs_are_locked_unlocked_and_inverted(given: list[Orders], left: tuple[bool, bool]) -> None:
+    system = bed()
+    state = begin(system)
+    for orders in given:
+        *_, state = simulate_path(system, state, stay_away(1), orders)
+    places = system.grid.at(np.array([0.0, 15e-3]), np.zeros(2))
+    np.testing.assert_array_equal(state.mode()[places] == Mode.LOCKED, left)
+    again = snapshot.load(system, snapshot.dump(system, state))
+    np.testing.assert_array_equal(again.mode(), state.mode())
+
+
+def test_a_pin_locked_on_its_way_stops_there_and_stays_there_when_it_is_unlocked() -> None:
+    system = bed()
+    surface = np.full(system.grid.count, 48e-3)
+    *_, state = simulate_path(system, begin(system), stay_away(12), place(12, surface))
+    *_, state = simulate_path(system, state, stay_away(10), lock_for(10))
+    stopped = state.row(0)
+    middle = int(system.grid.at(np.zeros(1), np.zeros(1))[0])
+    assert 40.1e-3 < stopped[middle] < 47e-3
+    *_, state = simulate_path(system, state, stay_away(1), lock(Verb.UNLOCK))
+    *_, state = simulate_path(system, state, stay_away(200))
+    assert abs(state.row(0)[middle] - stopped[middle]) <= BAND
+    assert abs(state.row(0)[0] - 48e-3) < 0.2e-3
+
+
+def lock_for(periods: int) -> Orders:
+    """Return the orders that lock a disc for so long."""
+    return Orders(repeat_order(periods, Verb.LOCK, radius=7e-3))
+
+
+def test_locks_that_are_gone_leave_the_bits_of_a_session_without() -> None:
+    system, ends = bed(), []
+    path = stay_away(120)
+    path[:, 0, 2] = np.linspace(46e-3, 36e-3, 121)
+    for locked in (False, True):
+        state = begin(system)
+        if locked:
+            *_, state = simulate_path(system, state, stay_away(1), lock(Verb.LOCK))
+            *_, state = simulate_path(system, state, stay_away(1), lock(Verb.UNLOCK))
+        else:
+            *_, state = simulate_path(system, state, stay_away(2), None)
+        *_, state = simulate_path(system, state._replace(period=64), path, None)
+        ends.append((state.row(0), state.mode()))
+    np.testing.assert_array_equal(ends[0][0], ends[1][0])
+    np.testing.assert_array_equal(ends[0][1], ends[1][1])
+
+
+#: Pins of the beds that orders are checked for, and their stroke, m.
+PINS, HIGH = 9, 80e-3
+FLAT = np.full(PINS, 40e-3)
+
+
+@pytest.mark.parametrize(
+    ("order", "sound"),
+    [((np.nan, 0.0, 1e-2, 1.0, 0.0), False), ((0.0, np.inf, 1e-2, 1.0, 0.0), False),
+     ((0.0, 0.0, -1e-2, 1.0, 0.0), False), ((0.0, 0.0, 1e-9, 1.0, 0.0), False),
+     ((0.0, 0.0, 1e9, 1.0, 0.0), False), ((0.0, 0.0, 1e-2, 101.0, 0.0), False),
+     ((0.0, 0.0, 1e-2, -0.1, 0.0), False), ((0.0, 0.0, 1e-2, 1.0, 0.5), False),
+     ((0.0, 0.0, 1e-2, 1.0, 7.0), False), ((0.0, 0.0, 1e-2, 1.0, -1.0), False),
+     ((1.0, 0.0, 0.0, 0.0, Verb.PLACE), False), ((-1.0, 0.0, 0.0, 0.0, Verb.PLACE), False),
+     ((0.5, 0.0, 0.0, 0.0, Verb.PLACE), False), ((np.nan, 0.0, 0.0, 0.0, Verb.PLACE), False),
+     ((0.0, 0.0, 0.0, 0.0, Verb.PLACE), True), ((0.0, 0.0, 1e-6, 0.0, 0.0), True),
+     ((1e3, -1e3, 1e3, 100.0, Verb.INVERT), True), ((0.0, 0.0, 0.0, 0.0, 0.0), True)],
+)  # fmt: skip
+def test_an_order_out_of_its_range_and_orders_of_another_shape_are_found(order, sound):
+    rows = np.zeros((3, 5))
+    rows[1] = order
+    found = find_fault(Orders(rows, (FLAT,)), 3, PINS, HIGH)
+    assert found == "" if sound else found.startswith("row 1 is [")
+    for shape in ((0, 5), (2, 5), (3, 4), (15,)):
+        words = f"an array of the shape {shape} of float64"
+        assert find_fault(Orders(np.zeros(shape)), 3, PINS, HIGH) == words
+
+
+@pytest.mark.parametrize(
+    ("surface", "said"),
+    [(FLAT, ""), (FLAT * np.nan, ""), (np.zeros(PINS), ""), (FLAT[1:], "is an array of the shape (8,)"),
+     (FLAT.astype(np.float32), "of float32"), (FLAT * np.inf, "has the height inf m"),
+     (FLAT * 2.1, "has the height 0.084 m"), (FLAT - 0.05, "has the height -0.01 m")],
+)  # fmt: skip
+def test_surfaces_that_no_pins_of_the_bed_reach_are_found(surface, said):
+    fault = find_fault(Orders(np.zeros((3, 5)), (FLAT, surface)), 3, PINS, HIGH)
+    assert fault == said if not said else fault.startswith("surface 1 ") and said in fault
+
+
+@pytest.mark.parametrize("ridge", [0.0, 6e-3])
+@pytest.mark.parametrize(
+    ("pitch", "radius", "wave"),
+    [
+        pytest.param(3e-3, 8e-3, 0.0, id="paper, random"),
+        pytest.param(3e-3, 8e-3, 6e-3, id="paper, 6 mm"),
+        pytest.param(1.5e-3, 4e-3, 0.0, id="design, random"),
+        pytest.param(1.5e-3, 4e-3, 3e-3, id="design, 3 mm"),
+        pytest.param(1e-3, 8e-3 / 3.0, 0.0, id="fine, random"),
+    ],
+)
+def test_one_quick_pass_of_smooth_halves_what_varies_on_flat_ground_and_on_a_ridge(
+    pitch: float, radius: float, wave: float, ridge: float
+) -> None:
+    layout = {"rows": 17, "columns": 41, "pitch": pitch}
+    bore = {"bore": min(2e-3, pitch)}
+    system = assemble(resolve({"layout": layout, "control": "absent", "actuator": bore}))
+    x, y = system.grid.x, system.grid.y
+    varied = np.random.default_rng(1).uniform(-1e-3, 1e-3, x.size)
+    if wave:
+        varied = 1e-3 * np.sin(2.0 * np.pi * x / wave + 0.7)
+    end, count = 18.0 * pitch, round(36.0 * pitch / (0.1 * system.period))
+    state = heighten(system, varied + ridge * np.exp(-((y / (0.75 * radius)) ** 2)))
+    line = (np.abs(y) < 0.5 * pitch) & (np.abs(x) < 12.0 * pitch)
+    before = float(state.row(0)[line].std())
+    orders = make_orders(count, -end, end, 0.0, radius, verb=Verb.SMOOTH)
+    *_, state = simulate_path(system, state, stay_away(len(orders)), orders)
+    assert float(state.row(0)[line].std()) < 0.5 * before
