@@ -190,7 +190,7 @@ def draw_circles(rows: int, columns: int, pitch: float, bore: float, ticks: int)
 
     def move(count: int) -> None:
         x, y = place(count)
-        drawn = partial(draw, time=(count + 1) / RATE, x=x, y=y, depth=DEPTH)
+        drawn = partial(draw, x=x, y=y, depth=DEPTH)
         running.put(change_stroke(_find_session(bed), number, drawn))
 
     layout = {"rows": rows, "columns": columns, "pitch": pitch}

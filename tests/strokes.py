@@ -16,8 +16,6 @@ from tests import hand
 from tests.hand import heights, let_go
 
 Places = list[tuple[float, float]]
-#: Within how long a stroke is drawn, s: the finger is late, and goes as fast as it may.
-DURATION = 0.5
 
 
 def begin_bed(name: str, rows: int, columns: int) -> Running:
@@ -36,8 +34,7 @@ def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, sha
     for part in np.arange(1, 31) / 30:
         at = tuple(np.interp(part * way[-1], way, places[:, axis]) for axis in (0, 1))
         session = change_stroke(
-            session, number,
-            lambda stroke, at=at, t=part * DURATION: draw(stroke, t, *at, depth * 1e-3, share),
+            session, number, lambda stroke, at=at: draw(stroke, *at, depth * 1e-3, share)
         )  # fmt: skip
     return let_go(session, number)
 

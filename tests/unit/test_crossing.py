@@ -13,7 +13,6 @@ from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.strokes.stroke import Brush
-from digiclay.strokes.sweep import LIMIT, measure_excess_heights
 
 from tests.hand import TICK, heights
 from tests.strokes import Places, begin_bed, form, measure_spikes, relief
@@ -22,8 +21,8 @@ pytestmark = pytest.mark.usefixtures("quick_machine")
 
 #: Pins in a row and column of a bed, half the length of a stroke, height of a ridge, depth of a groove, mm.
 SIZES = {"paper": (25, 24.0, 10.0, 4.0), "design": (34, 16.0, 6.0, 3.0)}
-#: A pin may be off all those around it by so much, mm; measured: 0.57 mm at most.
-BOUND = 0.6
+#: A pin may be off all those around it by so much, mm.
+BOUND = 0.2
 #: The ridge lies beside the rows of pins by so much, mm: where it lay on them, spikes were smaller.
 BESIDE = {"paper": 1.0, "design": 0.5}
 
@@ -51,15 +50,15 @@ def crossed(bed: str, degrees: float, brush: Brush) -> tuple[Running, Running]:
     return ridged(bed), form(session, turned(bed, degrees), brush, amount)
 
 
-@pytest.mark.parametrize(("bed", "degrees"), [("paper", 45.0), ("design", 90.0)])
+@pytest.mark.parametrize("degrees", [30.0, 45.0, 90.0])
+@pytest.mark.parametrize("bed", SIZES)
 def test_a_ridge_across_a_ridge_cuts_nothing_off_and_leaves_no_spikes(bed: str, degrees: float) -> None:
     before, after = crossed(bed, degrees, Brush.RAISE)
-    formed = relief(after)
-    assert measure_spikes(formed) < BOUND
-    # Where the finger comes down behind the crossing, its flat top takes some of the old flank down.
-    height = SIZES[bed][2]
-    assert (relief(before) - formed).max() < 0.35 * height
-    assert formed[len(formed) // 2, len(formed) // 2] == pytest.approx(2.0 * height, abs=1.5)
+    formed, (_, _, height, _) = relief(after), SIZES[bed]
+    # Where the flat tops end, a crest may stand out by what the corners of the sections do.
+    assert measure_spikes(formed) < measure_spikes(relief(before)) + BOUND
+    assert (relief(before) - formed).max() < 0.01
+    assert formed[len(formed) // 2, len(formed) // 2] == pytest.approx(2.0 * height, abs=0.3 * height)
 
 
 @pytest.mark.parametrize("bed", SIZES)
@@ -68,36 +67,24 @@ def test_a_groove_across_a_ridge_goes_through_it_and_piles_nothing_up(bed: str) 
     before, session = crossed(bed, 90.0, Brush.LOWER)
     after = relief(session)
     assert measure_spikes(after) < BOUND
-    # Behind a finger that climbs the flank: 5 to 6 mm by a blister that raises there, now 0.1 and 2.5 mm.
-    assert (after - relief(before)).max() < 3.0
-    # Through the ridge, and as deep beyond it as a finger's pulp leaves it: 1 mm less than the finger went.
+    assert (after - relief(before)).max() < 0.01
+    # Through the ridge, and as deep beyond it as the stroke says.
     column = after[:, len(after) // 2]
-    assert column[len(after) // 2] < height - 1.0
-    assert column.min() == pytest.approx(1.0 - depth, abs=1.0)
+    assert column[len(after) // 2] == pytest.approx(
+        height - depth, abs=0.25 * height
+    )  # below the mean of the crest
+    assert column.min() == pytest.approx(-depth, abs=0.2)
     # Beside the groove the ridge stands.
     assert after[len(after) // 2, len(after) // 4] > height - 1.0
 
 
-def test_after_a_groove_at_an_angle_what_settles_moves_clay_and_is_replayed_bit_for_bit() -> None:
+def test_the_finish_of_a_stroke_is_replayed_bit_for_bit() -> None:
     session = crossed("design", 30.0, Brush.LOWER)[1]
     take = read_recording(session)
     assert take is not None
     assert take.orders is not None
-    targets = [state.row(session.system.rows.target).copy() for state in replay(take)]
-    np.testing.assert_array_equal(targets[-1], session.state.row(session.system.rows.target))
-    first = int(np.flatnonzero(take.orders.rows[:, 2])[0])
-    before, after = targets[first - 1], targets[-1]
-    assert after.sum() == pytest.approx(before.sum(), abs=1e-9)
-    # Only pins about a spike move: within two pins of one, four where it takes long.
-    x, y = session.system.grid.x, session.system.grid.y
-    orders = take.orders.rows[first:][take.orders.rows[first:, 3] > 0.0]
-    far = np.ones(x.size, np.bool_)
-    for order in orders:
-        far &= (x - order[0]) ** 2 + (y - order[1]) ** 2 > order[2] ** 2
-    np.testing.assert_array_equal(after[far], before[far])
-    assert not far.all()
-    excess = np.abs(measure_excess_heights(session.system.grid, heights(session))).max()
-    assert excess <= LIMIT * session.scene.layout.pitch + 0.05e-3
+    *_, last = replay(take)
+    np.testing.assert_array_equal(last.row(0), heights(session))
 
 
 # A finger that a hand takes away from its blister, faster than pins rise

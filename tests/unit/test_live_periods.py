@@ -351,20 +351,15 @@ def test_a_move_between_two_ticks_changes_the_commands_of_the_next() -> None:
 def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next() -> None:
     session, number = queue_stroke(hand.started(), 0.0, 0.0, 4e-3)
     now = 0.0
-    while session.strokes[0].reached == 0 and now < 3.0:
+    while session.strokes[0].reached < 5 and now < 3.0:
         now += hand.TICK
-        # The hand goes along x; Blender has told all of it by each tick.
-        drawn = partial(draw, time=now, x=0.01 * now, y=0.0, depth=4e-3)
-        session = change_stroke(session, number, drawn)
-        session = change_stroke(session, number, partial(replace, known=now))
+        session = change_stroke(session, number, partial(draw, x=0.02 * now, y=0.0, depth=4e-3))
         session = sculpting.advance(session, hand.pose(), now, 100)
     assert session.strokes[0].reached
     now += hand.TICK
     ways = []
     for y in (0.0, 4e-3):
-        drawn = partial(draw, time=now, x=0.01 * now, y=y, depth=4e-3)
-        other = change_stroke(forked(session), number, drawn)
-        other = change_stroke(other, number, partial(replace, known=now))
+        other = change_stroke(forked(session), number, partial(draw, x=0.02 * now, y=y, depth=4e-3))
         ways.append(sculpting.advance(other, hand.pose(), now, 100))
     straight, aside = ways
     assert aside.pose[1] > straight.pose[1] == 0.0

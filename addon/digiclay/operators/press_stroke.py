@@ -1,6 +1,5 @@
 """Strokes of the Press tool, queued for the session: drawn by the mouse, lines and rings."""
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,7 @@ from ..press.pointer import begin_button, read_event
 from ..sessions import running
 from ..sessions.sculpting import change_stroke, find_stroke, last_place, queue_stroke
 from ..settings.declared import choice, flag, number, title
-from ..strokes.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw, lay_line, lay_path, lay_ring, pull
+from ..strokes.stroke import DEEPEST, Brush, deepen, draw, lay_line, lay_path, lay_ring, make_images, pull
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
 from .action import Drawing, Polled, clear_status, millimeters, show_status
@@ -61,6 +60,10 @@ class PressSettings:
     symmetry: choice(
         "Symmetry", "Mirror images of a stroke about the middle of the bed. The device has one finger: "
         "it forms them one after the other, as one undo step", items=brush.SYMMETRY_ITEMS, default="NONE",
+    )  # fmt: skip
+    accumulate: flag(
+        "Accumulate", "Where a stroke comes back to what it has formed, it counts from there once more",
+        default=False,
     )  # fmt: skip
     path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
     stabilizer: millimeters(
@@ -105,15 +108,22 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             return {"CANCELLED"}
         # The hand draws on the surface it has seen when it began, not on pins that give way under it.
         self.uid, self.grid, self.surface = session.uid, target.grid, target.height.copy()
-        self.region, self.began = context.region, time.perf_counter()
+        self.region = context.region
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
-        self.pressure, self.lean, self.ticked = 1.0, (0.0, 0.0), 0.0
+        self.pressure, self.lean = 1.0, (0.0, 0.0)
         self.button = begin_button(event.value, (event.type_prev, event.value_prev))
         self._feel(context, target.bed, event)
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         session, self.number = queue_stroke(
-            session, *place, depth, SYMMETRIES[self.symmetry], self.kind, share, self.lean
+            session,
+            *place,
+            depth,
+            make_images(self.symmetry),
+            self.kind,
+            share,
+            self.lean,
+            accumulate=self.accumulate,
         )
         running.put(session)
         self.timer = loop.time_window(context)
@@ -147,10 +157,6 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             again = {"PASS_THROUGH"} if event.value == "PRESS" else set()
             return self._end({"FINISHED"} | again)
         else:
-            if event.type == "TIMER":
-                # Blender may hand a timer over before moves that were made earlier; not so the one before.
-                self._change(lambda stroke: replace(stroke, known=self.ticked))
-                self.ticked = self._time()
             return {"PASS_THROUGH"}
         self._show(context)
         return {"RUNNING_MODAL"}
@@ -170,12 +176,12 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             string = 1e-3 * self.stabilizer if event.type != "LEFTMOUSE" else 0.0
             x, y = self.lagged = pull(self.lagged, (float(point[0]), float(point[1])), string)
             depth, share = self._amount()
-            self._change(partial(draw, time=self._time(), x=x, y=y, depth=depth, share=share, lean=self.lean))
+            self._change(partial(draw, x=x, y=y, depth=depth, share=share, lean=self.lean))
 
     def _deepen(self, context: Any, by: float) -> None:
         """Change depth or height, m, from here on; the tool shows it beside the cursor and in the header."""
         self.full = min(max(self.full + by, 0.0), DEEPEST)
-        self._change(partial(deepen, time=self._time(), by=by * self.strength * self.pressure))
+        self._change(partial(deepen, by=by * self.strength * self.pressure))
         self._keep_amount(context)
 
     def _amount(self) -> tuple[float, float]:
@@ -188,10 +194,6 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         session = running.find(brush.find_bed(bpy.context, self.uid))
         if session is not None:
             running.put(change_stroke(session, self.number, change))
-
-    def _time(self) -> float:
-        """Return the time since the mouse went down, s."""
-        return time.perf_counter() - self.began
 
     def _feel(self, context: Any, bed: Any, event: Any) -> None:
         """Take a pen's pressure and tilt."""
@@ -331,8 +333,8 @@ class PressShape(Drawing, bpy.types.Operator):
         if bed is None or settings is None or context.area != area:
             return
         lines = []
-        for mirror in SYMMETRIES[settings.symmetry]:
-            path = self._path() * mirror
+        for image in make_images(settings.symmetry):
+            path = np.array([image.place(*place) for place in self._path()])
             heights = self.height[self.grid.at(path[:, 0], path[:, 1])]
             lines += [np.column_stack([path, heights])] if len(path) > 1 else []
         at = bridge.project(context, bed, np.array([[*self.to, float(self.height.max())]]))[0]
@@ -368,6 +370,8 @@ def _queue_path(operator: Any, context: Any, bed: Any, path: Any, kind: Brush) -
         return {"CANCELLED"}
     share, (x, y) = float(settings.strength), path[0]
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
-    session, number = queue_stroke(session, x, y, depth, SYMMETRIES[settings.symmetry], kind, share)
+    session, number = queue_stroke(
+        session, x, y, depth, make_images(settings.symmetry), kind, share, accumulate=settings.accumulate
+    )
     running.put(change_stroke(session, number, partial(lay_path, points=path)))
     return {"FINISHED"}

@@ -40,6 +40,7 @@ def stroke_options(column: Any, settings: Any) -> None:
     row.enabled = settings.path == "FREE"
     row.prop(settings, "stabilizer")
     column.prop(settings, "symmetry")
+    column.prop(settings, "accumulate")
 
 
 @popover("DIGICLAY_PT_press_pen", "Pen")

@@ -20,7 +20,7 @@ from ..overlay.picture import Color, Line, Words
 from ..roles import fingertip_of
 from ..sessions import running
 from ..settings import devices
-from ..strokes.stroke import SYMMETRIES, Brush
+from ..strokes.stroke import Brush, make_images
 from ..strokes.sweep import find_radius
 from ..ui_text import localize
 from . import aim
@@ -148,8 +148,15 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     settings = tool.operator_properties(OPERATOR)
     depth, kind = 1e-3 * settings.depth, _shown_brush(target.bed, settings)
     rims = [
-        touch_outline(target.bed, target.grid, target.height, target.point * [*mirror, 1.0], depth, kind)
-        for mirror in SYMMETRIES[settings.symmetry]
+        touch_outline(
+            target.bed,
+            target.grid,
+            target.height,
+            np.array([*image.place(*target.point[:2]), target.point[2]]),
+            depth,
+            kind,
+        )
+        for image in make_images(settings.symmetry)
     ]
     amount = 1e-3 * getattr(settings, amount_name(kind))
     text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)

@@ -1,8 +1,7 @@
 """Recorded strokes of the Press tool: their file, and their replay in a live session. No Blender.
 
 A file has the bed's name and a table a stroke: what the header of the tool was set to, and the times and
-places of the pointer. The replay hands each move to the session when its time has come, as the tool does,
-and waits until the fingertip has finished a stroke before the next one begins.
+places of the pointer. What is formed follows from the places; the times say how quick the hand was.
 """
 
 from __future__ import annotations
@@ -30,24 +29,23 @@ from ..strokes.stroke import (
     SHALLOWEST,
     SYMMETRIES,
     Brush,
-    Stroke,
-    draw,
     lay_line,
     lay_path,
     lay_ring,
+    make_images,
     pull,
 )
 from ..strokes.tracking import find_tracking
 
 #: Ticks a second of the replay.
 RATE = 60.0
-#: How long the hand rests when the fingertip has finished a stroke, s: the pins come to rest meanwhile.
-REST = 0.3
-#: Longest that the fingertip may need for a stroke beyond the hand's time, s.
+#: Longest that the fingertip may need for a stroke, s.
 PATIENCE = 300.0
 #: Keys of a file beside its strokes.
 TEXTS = ("name", "description", "bed")
 Move = tuple[float, float, float]
+#: Paths between two places.
+LAYS = {"line": lay_line, "ring": lay_ring}
 
 
 @dataclass(frozen=True)
@@ -63,6 +61,7 @@ class PointerStroke(Parameters):
     strength: float = quantity(1.0, "share of depth, height or way to the level", above=0.0, at_most=1.0)
     path: str = quantity("free", "path between the moves", choices=("free", "line", "ring"))
     symmetry: str = quantity("none", "mirror images", choices=tuple(name.lower() for name in SYMMETRIES))
+    accumulate: bool = quantity(False, "whether a path that comes back counts from what it has left there")
     stabilizer: float = quantity(0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3)
     length: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
     width: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
@@ -156,39 +155,25 @@ def _take_finger(running: Running, usual: Scene, finger: Fingertip) -> Running:
 
 
 def _play(running: Running, stroke: PointerStroke, number: int) -> Running:
-    """Draw a stroke, and continue the session until the fingertip has finished it and the pins rest."""
-    (_, x, y), last = stroke.moves[0], stroke.moves[-1][0]
-    running = replace(running, clock=running.clock.stopped())
+    """Draw a stroke, and continue the session until it is formed."""
+    places = [(x, y) for _, x, y in stroke.moves]
     running, queued = queue_stroke(
-        running, x, y, stroke.amount, SYMMETRIES[stroke.symmetry.upper()], stroke.kind, stroke.strength
-    )
-    drawn, place, time = 1, (x, y), 0.0
-    if stroke.path != "free":
-        lay = lay_line if stroke.path == "line" else lay_ring
-        points = lay(place, stroke.moves[-1][1:])
-        running = change_stroke(running, queued, partial(lay_path, points=points))
-        drawn = len(stroke.moves)
+        running, *places[0], stroke.amount, make_images(stroke.symmetry.upper()), stroke.kind,
+        stroke.strength, accumulate=stroke.accumulate,
+    )  # fmt: skip
+    lagged = places[:1]
+    for place in places[1:]:
+        # Released, the stroke ends at the pointer.
+        string = stroke.stabilizer if len(lagged) + 1 < len(places) else 0.0
+        lagged.append(pull(lagged[-1], place, string))
+    path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
+    running = change_stroke(running, queued, partial(lay_path, points=path))
+    first = running.state.period
     while find_stroke(running, queued) is not None:
-        time += 1.0 / RATE
-        while drawn < len(stroke.moves) and stroke.moves[drawn][0] <= time:
-            moved, x, y = stroke.moves[drawn]
-            drawn += 1
-            # Released, the stroke ends at the pointer.
-            string = stroke.stabilizer if drawn < len(stroke.moves) else 0.0
-            place = pull(place, (x, y), string)
-            running = change_stroke(running, queued, partial(_draw, time=moved, place=place, stroke=stroke))
-        held = drawn < len(stroke.moves)
-        running = _tick(change_stroke(running, queued, partial(replace, held=held, known=time)))
-        if time > last + PATIENCE:
-            raise StateError(f"The fingertip has not finished stroke {number} after {PATIENCE:g} s.")
-    for _ in range(round(REST * RATE)):
         running = _tick(running)
+        if (running.state.period - first) * running.system.period > PATIENCE:
+            raise StateError(f"The fingertip has not finished stroke {number} after {PATIENCE:g} s.")
     return running
-
-
-def _draw(drawn: Stroke, time: float, place: tuple[float, float], stroke: PointerStroke) -> Stroke:
-    """Return a stroke drawn on by a move of the pointer."""
-    return draw(drawn, time, *place, stroke.amount, stroke.strength)
 
 
 def _tick(running: Running) -> Running:

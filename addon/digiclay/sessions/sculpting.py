@@ -10,8 +10,7 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.base.errors import StateError
-from ..core.base.modes import Mode
-from ..core.control.orders import Orders, add_verbs
+from ..core.control.orders import Orders
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
 from ..core.engine.system import System
@@ -21,9 +20,11 @@ from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..strokes.motion import DRAG, follow
-from ..strokes.stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
-from ..strokes.sweep import begin_settling, find_radius, settle, sweep
-from ..strokes.tracking import find_tracking
+from ..strokes.motion import begin as begin_stroke
+from ..strokes.nominal import Device
+from ..strokes.stroke import ALONE, FINISHING, Brush, Image, Stroke, start
+from ..strokes.sweep import SWEEPS, finish, sweep
+from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
 from .running import Running
 
@@ -131,8 +132,8 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
 
 def _follow_stroke(running: Running, count: int) -> Running:
     """Simulate at most so many control periods of the first stroke; none where it waits for the hand."""
-    running, path, smoothing = take_path(running, count)
-    return _follow(running, path, smoothing, PAUSE) if len(path) > 1 else running
+    running, path, orders = take_path(running, count)
+    return _follow(running, path, orders, PAUSE) if len(path) > 1 else running
 
 
 def estimate_time(running: Running) -> float:
@@ -147,7 +148,7 @@ def _pack(running: Running) -> Running:
     return replace(running, snapshot=snapshot.dump(running.system, running.state))
 
 
-def _follow(running: Running, path: Floats, smoothing: Floats | None, pause: int) -> Running:
+def _follow(running: Running, path: Floats, orders: Orders | None, pause: int) -> Running:
     """Simulate the control periods of a path (k + 1, 7); `pause` of them are between two error estimates."""
     system, monitor = running.system, running.monitor
     rows, first, trace, paths = [], running.state.period + 1, running.trace, wrap_one(path)
@@ -161,7 +162,6 @@ def _follow(running: Running, path: Floats, smoothing: Floats | None, pause: int
         if state.period % trace.every == 0:
             rows.append(recent_trace.sample(system, state, running.scene.set_point, trace.pins))
 
-    orders = None if smoothing is None else Orders(add_verbs(smoothing))
     gone, errors = live_session.follow_path(running, path, orders, running.tick, watch), None
     if monitor:
         monitor, errors = accuracy.catch_up(monitor, gone.state, len(path) - 1)
@@ -170,7 +170,7 @@ def _follow(running: Running, path: Floats, smoothing: Floats | None, pause: int
         gone, clock=clock, monitor=monitor, errors=errors or running.errors,
         trace=recent_trace.extend(trace, rows),
     )  # fmt: skip
-    return _count_gesture(gone, smoothed=orders is not None and orders.given)
+    return _count_gesture(gone, ordered=orders is not None and orders.given)
 
 
 def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
@@ -184,9 +184,9 @@ def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
-def _count_gesture(running: Running, *, smoothed: bool) -> Running:
-    """Count a gesture that has touched, or smoothed, among the last ones."""
-    touched = smoothed or recent_trace.measure_total_force(running.system, running.state) > 0.0
+def _count_gesture(running: Running, *, ordered: bool) -> Running:
+    """Count a gesture that has touched, or has been one of the valves, among the last ones."""
+    touched = ordered or recent_trace.measure_total_force(running.system, running.state) > 0.0
     if running.next_gesture is None or not touched:
         return running
     room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
@@ -274,14 +274,14 @@ def reset(running: Running) -> Running:
 
 
 def queue_stroke(
-    running: Running, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
+    running: Running, x: float, y: float, depth: float, images: tuple[Image, ...] = ALONE,
     brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
+    *, accumulate: bool = False,
 ) -> tuple[Running, int]:  # fmt: skip
     """Queue the stroke of a mouse that goes down at a place; return its number as well; see `Sample`."""
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
-    return replace(
-        running, strokes=(*running.strokes, start(number, x, y, depth, mirrors, brush, share, lean))
-    ), number
+    begun = start(number, x, y, depth, images, brush, share, lean, accumulate=accumulate)
+    return replace(running, strokes=(*running.strokes, begun)), number
 
 
 def find_stroke(running: Running, number: int) -> Stroke | None:
@@ -310,13 +310,15 @@ def drop_strokes(running: Running) -> Running:
     return replace(running, strokes=(), stroke_start=None, pose=pose)
 
 
-def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | None]:
-    """Return the session, and path (k + 1, 7) and smoothing orders (k, 4) of its first stroke, k <= count."""
-    first = running.strokes[0]
-    if first.height is None:
+def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | None]:
+    """Return the session, and path (k + 1, 7), k <= count, and orders of its first stroke.
+
+    The path ends where the stroke waits for the hand: there the clay stands still.
+    """
+    if running.strokes[0].height is None:
         begun = live_session.Moment(running.state.period, running.snapshot, running.pose)
         running = replace(running, next_gesture=begun, stroke_start=begun)
-    stroke, path, smoothing = _advance(running, first, count)
+    stroke, path, orders = _advance(running, running.strokes[0], count)
     left = (stroke, *running.strokes[1:])
     running = replace(running, strokes=left)
     if stroke.done:
@@ -325,24 +327,25 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | N
             running, strokes=left[1:], stroke_start=None, finished_strokes=running.finished_strokes + 1,
             last_place=(end.x, end.y),
         )  # fmt: skip
-    return running, path, smoothing
+    return running, path, orders
 
 
-def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Floats | None]:
-    """Advance the fingertip along a stroke; return it, the path, and the smoothing orders."""
-    system, pose = running.system, running.pose
-    finger, height = find_ellipsoid(running.scene), running.state.row(0)
-    now, period = running.clock.seen or stroke.began, system.period
-    arrived = not bool((running.state.mode() == Mode.BLISTER).any())
-    if stroke.phase == SETTLING:
-        target, blister = running.state.row(system.rows.target), running.scene.blister
-        assert blister is not None  # a stroke that is tracked has one
-        return settle(stroke, system.grid, target, finger, blister, pose, count, period, arrived=arrived)
-    if stroke.brush is Brush.SMOOTH:
-        radius = find_radius(finger, system.grid.layout)
-        arrived = arrived and stroke.phase == LEAVING
-        height = np.maximum(height, running.state.row(system.rows.target))
-        return sweep(stroke, height, radius, pose, count, period, now, arrived=arrived)
-    tracking = find_tracking(running.scene, system) if stroke.height is None else stroke.tracking
-    stroke, path = follow(stroke, system.grid, height, finger, pose, count, period, now, tracking)
-    return begin_settling(stroke) if stroke.done else stroke, path, None
+def find_device(running: Running) -> Device:
+    """Return what forms the strokes of a session."""
+    scene, system = running.scene, running.system
+    return Device(system.grid, find_ellipsoid(scene), find_blister(scene), system.cell.actuator.stroke)
+
+
+def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
+    """Advance the fingertip along a stroke; return it, the path, and the orders."""
+    state, pose, period, device = running.state, running.pose, running.system.period, find_device(running)
+    swept = stroke.brush in SWEEPS
+    if stroke.height is None:
+        tracking = None if swept else find_tracking(running.scene, running.system)
+        stroke = begin_stroke(stroke, state.row(0), pose[3:], tracking)
+    arrived = live_session.has_arrived(state)
+    if swept:
+        return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
+    if stroke.phase == FINISHING:
+        return finish(stroke, device, state.row(0), pose, count, period, arrived=arrived)
+    return *follow(stroke, device, pose, count, period), None

@@ -1,4 +1,8 @@
-"""Press stroke: the path that the hand draws, and how far the fingertip has come along it. No Blender."""
+"""Press stroke: the path that the hand draws, and how far the fingertip has come along it. No Blender.
+
+What a stroke forms follows from its path alone, not from the times at which the hand was where: the session
+waits for the hand, and the clay with it.
+"""
 
 from __future__ import annotations
 
@@ -6,31 +10,75 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core.base.arrays import Floats
 from .tracking import Tracking
 
-#: Factors of x and y of a path and of its mirror images about the middle of the bed.
-Mirror = tuple[float, float]
+Place = tuple[float, float]
 
 #: What the fingertip does: it waits for its turn, goes above the path's first place, presses there, rises
-#: with the blister (if its brush has one), goes along the path, leaves it, waits above until what it has left
-#: has settled; and the end.
-WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, SETTLING, DONE = range(8)
-#: Paths of a stroke, by its symmetry. There is one finger: it goes along them one after the other.
-SYMMETRIES: dict[str, tuple[Mirror, ...]] = {
-    "NONE": ((1.0, 1.0),),
-    "X": ((1.0, 1.0), (-1.0, 1.0)),
-    "Y": ((1.0, 1.0), (1.0, -1.0)),
-    "XY": ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)),
-}
+#: with the blister (if its brush has one), goes along the path, leaves it, waits above until the valves have
+#: driven the pins to what the stroke is to leave; and the end.
+WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, FINISHING, DONE = range(8)
 #: Deepest press, and least one, m; also the greatest and the least height of a raise.
 DEEPEST, SHALLOWEST = 30e-3, 0.1e-3
-#: Moves that come within this time of each other have waited together while Blender drew, s: their times are
-#: spread over the time since the one before, of which no more than this is taken for drawing, s.
-BURST, DRAWING = 4e-3, 1.0
+
+
+class Image(NamedTuple):
+    """Plane isometry, (x, y) -> (xx x + xy y + x0, yx x + yy y + y0), m: the path itself, or its image."""
+
+    xx: float = 1.0
+    xy: float = 0.0
+    yx: float = 0.0
+    yy: float = 1.0
+    x0: float = 0.0
+    y0: float = 0.0
+
+    def place(self, x: float, y: float) -> Place:
+        """Return where a place comes to, m."""
+        return self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether it turns left into right."""
+        return self.xx * self.yy - self.xy * self.yx < 0.0
+
+
+#: The path alone.
+ALONE = (Image(),)
+#: Symmetries of strokes; of RADIAL, how many images there may be, the path itself among them.
+SYMMETRIES = ("NONE", "X", "Y", "XY", "RADIAL")
+FEWEST, MOST = 2, 24
+
+
+def make_images(
+    symmetry: str, count: int = FEWEST, center: Place = (0.0, 0.0), angle: float = 0.0
+) -> tuple[Image, ...]:
+    """Return a stroke's path and its images by a symmetry about a center, m.
+
+    X mirrors along x, which `angle`, rad, turns, Y across it; RADIAL turns the path `count` times.
+    """
+    if symmetry == "NONE":
+        return ALONE
+    if symmetry == "RADIAL":
+        angles = 2.0 * math.pi * np.arange(count) / count
+        turns = [(math.cos(turn), math.sin(turn), 1.0) for turn in angles.tolist()]
+    else:
+        # A mirror image across the line at an angle a is (cos 2a, sin 2a; sin 2a, -cos 2a).
+        cos, sin = math.cos(2.0 * angle), math.sin(2.0 * angle)
+        kinds = {"X": (-cos, -sin, -1.0), "Y": (cos, sin, -1.0), "XY": (-1.0, 0.0, 1.0)}
+        names = {"X": "X", "Y": "Y", "XY": ("X", "XY", "Y")}[symmetry]
+        turns = [(1.0, 0.0, 1.0), *(kinds[name] for name in names)]
+    return tuple(_about(center, cos, sin, side) for cos, sin, side in turns)
+
+
+def _about(center: Place, cos: float, sin: float, side: float) -> Image:
+    """Return a turn (`side` 1) or a mirror image (-1) about a center, m."""
+    (x, y), xy = center, -sin * side
+    return Image(cos, xy, sin, cos * side, x - cos * x - xy * y, y - sin * x - cos * side * y)
 
 
 class Brush(Enum):
@@ -61,8 +109,6 @@ class Brush(Enum):
 class Sample:
     """Point of a press stroke."""
 
-    #: Since the mouse went down, s.
-    time: float
     #: Place on the bed, m.
     x: float
     y: float
@@ -80,39 +126,36 @@ class Stroke:
 
     #: Tells the strokes of a session apart.
     number: int
-    #: The path, at least one place, in the order of time.
+    #: The path, at least one place.
     samples: tuple[Sample, ...]
+    brush: Brush = Brush.LOWER
+    #: The path itself, then its images. There is one finger: it goes along them one after the other.
+    images: tuple[Image, ...] = ALONE
+    #: Whether a path that comes back to where it was counts from what it has left there.
+    accumulate: bool = False
     #: Whether the hand still draws.
     held: bool = True
     #: What the fingertip does.
     phase: int = WAITING
-    #: Index of the sample the fingertip is at, or past.
-    reached: int = 0
-    #: Time since the fingertip came above the path's first place, s: simulated, or by the wall less `LATE`.
-    clock: float = 0.0
-    #: When it came there, by the wall, s.
-    began: float = 0.0
-    #: (n,), heights of the pins when the fingertip began, m; None before.
-    height: Floats | None = None
-    #: Factors of x and y: the path itself, then its mirror images.
-    mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
-    #: Index of the one that the fingertip is at.
+    #: Index of the image that the fingertip is at, and of the sample it is at, or past.
     image: int = 0
-    #: Up to when every move has come, s; what was drawn since may still wait in Blender's queue.
-    known: float = 0.0
-    #: When the last sample came, s.
-    heard: float = 0.0
-    #: Index of the first sample that came together with the last one.
-    burst: int = 0
-    brush: Brush = Brush.LOWER
-    #: How the blister follows, of a brush that needs one; found when the fingertip begins.
+    reached: int = 0
+    #: (n,), heights of the pins when the fingertip began, and those that its depth counts from where it is,
+    #: m; None before.
+    height: Floats | None = None
+    ground: Floats | None = None
+    #: First sample of the present pass of a path that accumulates.
+    first: int = 0
+    #: How the blister follows, of a device that has one; found when the fingertip begins.
     tracking: Tracking | None = None
     #: How fast the fingertip rises with the blister, m/s.
     climb: float = 0.0
-    #: When a fingertip that smooths, or waits, came to the end of the path, s of `clock`.
-    left: float = 0.0
     #: (4,), orientation of the fingertip when it began, which it has again when it is done; None before.
     turn: Floats | None = None
+    #: (n,), heights to which the valves drive pins after the fingertip has left, m, NaN: not driven.
+    finish: Floats | None = None
+    #: Control periods since the fingertip waits for its pins.
+    waited: int = 0
 
     @property
     def done(self) -> bool:
@@ -122,58 +165,55 @@ class Stroke:
     @property
     def ahead(self) -> tuple[Floats, ...]:
         """Places the fingertip has yet to come to, (k, 2), m: of the path it is at, and of those after it."""
-        path = np.array([(sample.x, sample.y) for sample in self.samples])
-        later = tuple(path * mirror for mirror in self.mirrors[self.image + 1 :])
-        return (path[self.reached :] * self.mirrors[self.image], *later)
+        path = [(sample.x, sample.y) for sample in self.samples]
+        left = [path[self.reached :], *([path] * (len(self.images) - self.image - 1))]
+        images = self.images[self.image :]
+        return tuple(
+            np.array([image.place(*place) for place in places])
+            for image, places in zip(images, left, strict=True)
+        )
 
-    def place(self, index: int) -> tuple[float, float]:
+    @property
+    def drawn(self) -> bool:
+        """Whether the fingertip has come to the end of the path, and the hand draws no more."""
+        return not self.held and self.reached == len(self.samples) - 1
+
+    def place(self, index: int) -> Place:
         """Return where a sample is on the path the fingertip is at, m."""
-        (along, across), sample = self.mirrors[self.image], self.samples[index]
-        return along * sample.x, across * sample.y
+        sample = self.samples[index]
+        return self.images[self.image].place(sample.x, sample.y)
 
 
 def start(
-    number: int, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
+    number: int, x: float, y: float, depth: float, images: tuple[Image, ...] = ALONE,
     brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
+    *, accumulate: bool = False,
 ) -> Stroke:  # fmt: skip
     """Return the stroke of a mouse that goes down at a place, m; see `Sample`."""
-    first = Sample(0.0, x, y, _limit_depth(depth), share, lean)
-    return Stroke(number, (first,), mirrors=mirrors, brush=brush)
+    first = Sample(x, y, _limit_depth(depth), share, lean)
+    return Stroke(number, (first,), brush, images, accumulate)
 
 
 def draw(
-    stroke: Stroke, time: float, x: float, y: float, depth: float, share: float = 1.0,
+    stroke: Stroke, x: float, y: float, depth: float, share: float = 1.0,
     lean: tuple[float, float] = (0.0, 0.0),
 ) -> Stroke:  # fmt: skip
-    """Return the stroke drawn on to a place at a time of the hand, s; a released one stays as it is."""
+    """Return the stroke drawn on to a place; a released one stays as it is."""
     if not stroke.held:
         return stroke
-    samples = (*stroke.samples, Sample(time, x, y, _limit_depth(depth), share, lean))
-    together = time - stroke.heard < BURST and stroke.burst > 0
-    first = stroke.burst if together else len(samples) - 1
-    start = max(samples[first - 1].time, time - DRAWING)
-    count = len(samples) - first
-    spread = (
-        replace(sample, time=start + (time - start) * (index + 1) / count)
-        for index, sample in enumerate(samples[first:])
-    )
-    return replace(stroke, samples=(*samples[:first], *spread), heard=time, burst=first)
+    return replace(stroke, samples=(*stroke.samples, Sample(x, y, _limit_depth(depth), share, lean)))
 
 
-def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
+def deepen(stroke: Stroke, by: float) -> Stroke:
     """Return the stroke with its depth changed where it is, m, within the limits."""
     last = stroke.samples[-1]
-    return draw(stroke, time, last.x, last.y, last.depth + by, last.share, last.lean)
+    return draw(stroke, last.x, last.y, last.depth + by, last.share, last.lean)
 
 
 def _limit_depth(depth: float) -> float:
     return min(max(depth, SHALLOWEST), DEEPEST)
 
 
-Place = tuple[float, float]
-
-#: How fast a path is gone along that no hand has drawn, m/s: half of the fastest drag.
-EVEN_SPEED = 0.05
 #: Longest side of the polygon that stands for a ring, m, and least radius of one.
 SIDE, SMALLEST_RING = 1e-3, 0.5e-3
 
@@ -204,13 +244,7 @@ def lay_ring(center: Place, rim: Place) -> Floats:
 
 
 def lay_path(stroke: Stroke, points: Sequence[Place] | Floats) -> Stroke:
-    """Return a stroke with the whole path (k, 2), m, drawn evenly, and released."""
-    places = np.asarray(points, np.float64).reshape(-1, 2)
-    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    times = np.concatenate([[0.0], np.cumsum(steps)]) / EVEN_SPEED
-    first = stroke.samples[0]
-    samples = (
-        replace(first, time=float(time), x=float(x), y=float(y))
-        for time, (x, y) in zip(times, places, strict=True)
-    )
-    return replace(stroke, samples=tuple(samples), held=False)
+    """Return a stroke with the whole path (k, 2), m, drawn and released."""
+    places = np.asarray(points, np.float64).reshape(-1, 2).tolist()
+    samples = tuple(replace(stroke.samples[0], x=x, y=y) for x, y in places)
+    return replace(stroke, samples=samples, held=False)

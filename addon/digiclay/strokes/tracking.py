@@ -68,9 +68,15 @@ class Tracking:
         return min(self.push if pressed else self.drag, self.speed / (self.slope * max(change, NEAREST)))
 
 
+def find_blister(scene: Scene) -> Blister | None:
+    """Return the blister that follows the fingertip of a scene; None where its method has none."""
+    follows = isinstance(scene.control, VirtualMaster | CellStates | Hybrid)
+    return scene.blister if follows and all(finger.fingertip for finger in scene.fingers) else None
+
+
 def find_tracking(scene: Scene, system: System) -> Tracking | None:
     """Return how the blister of a scene follows a fingertip; None where its method has no blister."""
-    control, touch, blister = scene.control, system.cell.touch, scene.blister
+    control, touch, blister = scene.control, system.cell.touch, find_blister(scene)
     if not isinstance(control, VirtualMaster | CellStates | Hybrid) or touch is None or blister is None:
         return None
     asked = control.force_setpoint

@@ -1,0 +1,197 @@
+"""Nominal surface of press strokes: the heights that they are to leave, without simulation. No Blender.
+
+A pin's height follows from its distance to the path: below or above it the pin comes to the depth or height
+of the stroke, beside it to the section of the device's blister, or of the fingertip where there is none. Of
+several places of the path the one counts that takes the pin farthest; so neither a crossing counts twice, nor
+the seam of a ring, nor where mirror images meet. It is what the view shows of a stroke at once, and
+what the valves drive the pins to after the fingertip has left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..core.base.arrays import Cells, Flags, Floats
+from ..core.control.blister import Blister
+from ..core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
+from ..core.model.layout import Grid
+from ..core.surface.pointing import find_ground_height
+from .pose import lean_finger, turn_image
+from .stroke import Brush, Image, Place, Sample, Stroke
+
+#: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new pass.
+RETURN = 2.0
+#: How far down and up a brush may take pins, m.
+LIMITS = {Brush.LOWER: (-math.inf, 0.0), Brush.RAISE: (0.0, math.inf), Brush.LEVEL: (-math.inf, math.inf)}
+
+
+@dataclass(frozen=True, eq=False)
+class Device:
+    """What forms a stroke: pins, fingertip, and the blister that follows it; None: there is none."""
+
+    grid: Grid
+    finger: Fingertip
+    blister: Blister | None
+    #: Highest place of a pin's top, m.
+    highest: float
+
+    @property
+    def reach(self) -> float:
+        """How far from the path pins are formed, m."""
+        finger = max(self.finger.length, self.finger.width, self.finger.height)
+        return self.blister.radius if self.blister else finger
+
+    def find_surface(self, height: Floats, x: float, y: float) -> float:
+        """Return the height of a surface (n,), m, under the middle of the fingertip at a place, m."""
+        return find_ground_height(self.grid, height, x, y, self.finger.width / 2)
+
+    def find_top(
+        self, stroke: Stroke, sample: Sample, at: Place, ground: Floats, level: float | None = None
+    ) -> float:
+        """Return the height, m, to which a sample of a stroke brings the pins at a place, m.
+
+        It counts from a ground (n,), m; `level`, m: that of a brush that levels, see `find_level`.
+        """
+        surface = self.find_surface(ground, *at)
+        if stroke.brush is Brush.LOWER:
+            return max(0.0, surface - sample.depth)
+        if stroke.brush is Brush.RAISE:
+            return min(surface + sample.depth, self.highest)
+        return surface if level is None else surface + sample.share * (level - surface)
+
+    def find_level(self, stroke: Stroke, image: Image, before: Floats) -> float | None:
+        """Return the height, m, that a stroke levels to: of pins (n,), m, at its first place; else None."""
+        first = stroke.samples[0]
+        levels = stroke.brush is Brush.LEVEL
+        return self.find_surface(before, *image.place(first.x, first.y)) if levels else None
+
+
+@dataclass(frozen=True, eq=False)
+class Nominal:
+    """Nominal surface of a stroke, as far as its path is drawn."""
+
+    #: (n,), before the stroke; from which the depth of its present pass counts; that it leaves, m.
+    before: Floats
+    ground: Floats
+    height: Floats
+    #: (n,), pins about the path.
+    near: Flags
+    #: How many samples of the path are in it, and the first one of the present pass.
+    count: int = 0
+    first: int = 0
+
+
+def find_nominal(stroke: Stroke, device: Device, before: Floats, count: int | None = None) -> Nominal:
+    """Return the nominal surface of a stroke, or of its first samples, on pins at heights (n,), m."""
+    near = np.zeros(before.size, np.bool_)
+    return extend(Nominal(before, before, before, near), stroke, device, count)
+
+
+def extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None = None) -> Nominal:
+    """Return a nominal surface with all samples of its stroke, or its first ones, for all images."""
+    end = len(stroke.samples) if count is None else count
+    if device.blister is None and stroke.brush.needs_blister:
+        return replace(nominal, count=end)
+    height, near = nominal.height.copy(), nominal.near.copy()
+    nominal = replace(nominal, height=height, near=near)
+    for index in range(nominal.count, end):
+        if returns(stroke, nominal.first, index, device.finger.width):
+            nominal = replace(nominal, ground=height.copy(), first=index)
+        for image in stroke.images:
+            _mark(nominal, stroke, device, image, index)
+    return replace(nominal, count=end)
+
+
+def returns(stroke: Stroke, first: int, index: int, width: float) -> bool:
+    """Tell whether a path that accumulates comes back at a sample to where its pass, from `first` on, was.
+
+    `width`: of half the fingertip, m.
+    """
+    if not stroke.accumulate:
+        return False
+    path = np.array([(sample.x, sample.y) for sample in stroke.samples[first : index + 1]])
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    far = gone[-1] - gone > RETURN * 2.0 * width
+    return bool((np.hypot(*(path - path[-1]).T)[far] < width).any())
+
+
+def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index: int) -> None:
+    """Bring pins about the path from a sample to the next one, `index`, to their heights, in place."""
+    last, sample = stroke.samples[max(index - 1, 0)], stroke.samples[index]
+    length = math.hypot(sample.x - last.x, sample.y - last.y)
+    parts = max(1, math.ceil(length / device.grid.layout.pitch))
+    row = [_between(last, sample, part / parts) for part in range(parts + 1)]
+    places = [image.place(one.x, one.y) for one in row]
+    level = device.find_level(stroke, image, nominal.before)
+    tops = [
+        device.find_top(stroke, one, place, nominal.ground, level)
+        for one, place in zip(row, places, strict=True)
+    ]
+    reach = device.reach + 0.5 * length / parts
+    for part, (start, end) in enumerate(pairwise(places)):
+        cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
+        own, now = nominal.ground[cells], nominal.height[cells]
+        if device.blister is None:
+            under = _find_undersides(device, stroke, image, row[part + 1], tops[part + 1], cells)
+            change = under - own
+        else:
+            distance, share = _measure(device.grid, cells, start, end)
+            section = device.blister.evaluate_profile(distance).clip(0.0, 1.0)
+            section[distance > device.reach] = 0.0
+            if level is None:
+                way = tops[part] + share * (tops[part + 1] - tops[part]) - own
+            else:
+                one, other = row[part].share, row[part + 1].share
+                way = (one + share * (other - one)) * (level - own)
+            change = section * way
+        low, high = LIMITS[stroke.brush]
+        change = change.clip(low, high)
+        nominal.near[cells] = True
+        nominal.height[cells] = np.where(np.abs(change) > np.abs(now - own), own + change, now)
+
+
+def _between(one: Sample, other: Sample, part: float) -> Sample:
+    """Return the sample at a part of the way between two."""
+    mix = [a + part * (b - a) for a, b in zip(_flatten(one), _flatten(other), strict=True)]
+    return Sample(*mix[:4], (mix[4], mix[5]))
+
+
+def _flatten(sample: Sample) -> tuple[float, ...]:
+    """Return the numbers of a sample."""
+    return sample.x, sample.y, sample.depth, sample.share, *sample.lean
+
+
+def _measure(grid: Grid, cells: Cells, start: Place, end: Place) -> tuple[Floats, Floats]:
+    """Return how far cells are from a straight way, (m,), m, and at which part of it they are nearest."""
+    x, y = grid.x[cells] - start[0], grid.y[cells] - start[1]
+    way_x, way_y = end[0] - start[0], end[1] - start[1]
+    square = max(way_x * way_x + way_y * way_y, np.finfo(float).tiny)
+    part = np.clip((x * way_x + y * way_y) / square, 0.0, 1.0)
+    return np.hypot(x - part * way_x, y - part * way_y), part
+
+
+def _find_undersides(
+    device: Device, stroke: Stroke, image: Image, sample: Sample, lowest: float, cells: Cells
+) -> Floats:
+    """Return the fingertip's underside over cells, (m,), m, at a sample and a height of its lowest point."""
+    turn = np.array(LEVEL) if stroke.turn is None else stroke.turn
+    turn = turn_image(lean_finger(turn, sample.lean), image)
+    pose = np.array([[*image.place(sample.x, sample.y), lowest, *turn]])
+    forms = compute_forms(device.finger.outline(pose))
+    under: Floats = compute_underside(*forms, device.grid.compute_basis(cells))[0]
+    return under
+
+
+def list_ghosts(strokes: tuple[Stroke, ...], device: Device, height: Floats) -> Iterator[Nominal]:
+    """Yield the nominal surface of each of a queue's strokes that has one, on pins at heights (n,), m."""
+    for stroke in strokes:
+        if stroke.brush in LIMITS:
+            nominal = find_nominal(stroke, device, height if stroke.height is None else stroke.height)
+            height = nominal.height
+            yield nominal

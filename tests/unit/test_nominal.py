@@ -1,0 +1,155 @@
+"""Nominal surface of press strokes: sections by the distance to the path, passes, images, limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay.core.base.arrays import Floats
+from digiclay.core.control.blister import Blister
+from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.strokes.nominal import Device, Nominal, extend, find_nominal, list_ghosts
+from digiclay.strokes.stroke import Brush, Stroke, deepen, lay_path, lay_ring, make_images, start
+
+BED = make_grid(Layout(60, 60, pitch=1.5e-3))
+REST = 40e-3
+FLAT = np.full(BED.count, REST)
+BLISTER = Blister(radius=7.5e-3, edge_radius=9e-3, flat_radius=3e-3)
+DEVICE = Device(BED, Fingertip(5e-3, 4e-3, 4e-3), BLISTER, 60e-3)
+#: Without a blister.
+PRESSED = replace(DEVICE, blister=None)
+
+ANGLE = np.radians(17.0)
+LINE = np.outer([-1.0, 1.0], [np.cos(ANGLE), np.sin(ANGLE)]) * 30e-3 + [2e-3, -1e-3]
+WAVE = np.column_stack([np.linspace(-30e-3, 30e-3, 200), 12e-3 * np.sin(np.linspace(-3.0, 4.0, 200))])
+TURN = np.linspace(-1.5, 4.7, 300)
+PATHS = {
+    "a place": LINE[:1],
+    "a line at 17 degrees": LINE,
+    "a ring beside the middle": lay_ring((3e-3, -2e-3), (3e-3, 16e-3)),
+    "a free stroke": WAVE,
+    "a figure eight": np.column_stack([18e-3 * np.sin(TURN), 15e-3 * np.sin(2.0 * TURN)]),
+}
+
+
+def stroke(path: Floats, brush: Brush = Brush.RAISE, amount: float = 4e-3, **more: object) -> Stroke:
+    """Return a stroke along a path (k, 2), m."""
+    return lay_path(start(1, *path[0], amount, brush=brush, **more), path)
+
+
+def measure_distance(path: Floats) -> Floats:
+    """Return the distances of all pins from a path, (n,), m, by its points some 20 µm apart."""
+    steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    fine = np.linspace(0.0, steps[-1], 1 + int(steps[-1] / 20e-6))
+    points = np.column_stack([np.interp(fine, steps, path[:, axis]) for axis in (0, 1)])
+    near = np.full(BED.count, np.inf)
+    for part in np.array_split(points, 1 + len(points) // 200):
+        near = np.minimum(near, np.hypot(BED.x[:, None] - part[:, 0], BED.y[:, None] - part[:, 1]).min(1))
+    return near
+
+
+@pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER])
+@pytest.mark.parametrize("name", PATHS)
+def test_the_height_follows_from_the_distance_to_the_path_alone(name: str, brush: Brush) -> None:
+    found = find_nominal(stroke(PATHS[name], brush), DEVICE, FLAT).height - REST
+    distance = measure_distance(PATHS[name])
+    section = np.where(distance <= 7.5e-3, np.clip((7.5e-3 - distance) / 4.5e-3, 0.0, 1.0), 0.0)
+    sign = 1.0 if brush is Brush.RAISE else -1.0
+    # The flank goes 0.9 mm up a mm, and the points cut the path's corners by up to 0.5 µm.
+    np.testing.assert_allclose(found, sign * 4e-3 * section, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_where_no_blister_is_the_fingertip_leaves_its_underside(name: str) -> None:
+    path = np.vstack([PATHS[name], PATHS[name][-1:]])
+    found = find_nominal(
+        stroke(path, Brush.LOWER, 2e-3), replace(PRESSED, finger=Fingertip(4e-3, 4e-3, 4e-3)), FLAT
+    )
+    gap = 4e-3 - np.sqrt(np.maximum(16e-6 - measure_distance(path) ** 2, 0.0))
+    # Of a ball 1.5 mm from one place of the path to the next: 0.07 mm between two.
+    np.testing.assert_allclose(found.height - REST, np.minimum(gap - 2e-3, 0.0), rtol=0, atol=0.15e-3)
+
+
+@pytest.mark.parametrize(("accumulate", "height"), [(False, 4e-3), (True, 8e-3)])
+def test_a_crossing_counts_once_or_twice_where_it_accumulates(accumulate: bool, height: float) -> None:
+    eight = PATHS["a figure eight"]
+    found = find_nominal(stroke(eight, accumulate=accumulate), DEVICE, FLAT).height.reshape(60, 60) - REST
+    assert found[29:31, 29:31].max() == pytest.approx(height, abs=0.8e-3)
+    # Elsewhere it is as high as ever.
+    assert found[:, 38:].max() == pytest.approx(4e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER, Brush.LEVEL])
+@pytest.mark.parametrize("symmetry", ["X", "Y", "XY"])
+def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry: str, brush: Brush) -> None:
+    hill = FLAT + 2e-3 * np.cos(90.0 * BED.x) * np.cos(60.0 * BED.y)
+    path = np.array([8e-3, 5e-3]) + WAVE
+    found = find_nominal(stroke(path, brush, images=make_images(symmetry)), DEVICE, hill).height.reshape(
+        60, 60
+    )
+    for axis in (0, 1):
+        if "YX"[axis] in symmetry:
+            np.testing.assert_allclose(found, np.flip(found, axis), rtol=0, atol=1e-12)
+    assert np.ptp(found) > 2e-3
+
+
+@pytest.mark.parametrize("count", [3, 4, 24])
+def test_images_about_a_center_are_alike_at_every_turn(count: int) -> None:
+    images = make_images("RADIAL", count, (2e-3, 1e-3))
+    found = find_nominal(stroke(LINE * 0.4 + [9e-3, 0.0], images=images), DEVICE, FLAT).height
+    single = [
+        find_nominal(stroke(np.array([image.place(*at) for at in LINE * 0.4 + [9e-3, 0.0]])), DEVICE, FLAT)
+        for image in images
+    ]
+    np.testing.assert_allclose(found, np.max([one.height for one in single], axis=0), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("accumulate", [False, True])
+def test_a_surface_that_is_extended_is_that_of_the_whole_path(accumulate: bool) -> None:
+    whole = stroke(PATHS["a figure eight"], accumulate=accumulate, images=make_images("X"))
+    part: Nominal | None = None
+    for count in (1, 2, 50, 51, len(whole.samples)):
+        shown = replace(whole, samples=whole.samples[:count])
+        part = find_nominal(shown, DEVICE, FLAT) if part is None else extend(part, shown, DEVICE)
+    np.testing.assert_array_equal(part.height, find_nominal(whole, DEVICE, FLAT).height)
+
+
+CLIFF = FLAT + np.where(BED.x > 0.0, 5e-3, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("brush", "amount", "share", "lowest", "highest"),
+    [
+        pytest.param(Brush.RAISE, 30e-3, 1.0, 40e-3, 60e-3, id="as far as the pins' stroke"),
+        pytest.param(Brush.LEVEL, 4e-3, 1.0, 40e-3, 40e-3, id="to the height below the first place"),
+        pytest.param(Brush.LEVEL, 4e-3, 0.5, 40e-3, 42.5e-3, id="half of the way"),
+    ],
+)
+def test_pins_come_to_the_height_of_the_brush(brush, amount, share, lowest, highest):
+    line = np.array([[-25e-3, 0.0], [25e-3, 0.0]])
+    found = find_nominal(stroke(line, brush, amount, share=share), DEVICE, CLIFF).height
+    below = found[(np.abs(BED.y) < 2.9e-3) & (np.abs(np.abs(BED.x) - 15e-3) < 5e-3)]
+    assert (below.min(), below.max()) == (
+        pytest.approx(lowest, abs=20e-3 * (brush is Brush.RAISE) + 1e-9),
+        pytest.approx(highest, abs=1e-9),
+    )
+
+
+def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_there_on() -> None:
+    low = find_nominal(stroke(LINE, Brush.LOWER, 30e-3), DEVICE, FLAT - 30e-3).height
+    assert low.min() == 0.0
+    deeper = deepen(start(1, -20e-3, 0.0, 2e-3), 3e-3)
+    deeper = replace(deeper, samples=(*deeper.samples, replace(deeper.samples[-1], x=20e-3)))
+    found = find_nominal(deeper, DEVICE, FLAT).height
+    assert found.min() == pytest.approx(REST - 5e-3, abs=1e-12)
+
+
+def test_queued_strokes_count_from_what_those_before_them_leave() -> None:
+    level = stroke(np.array([[25e-3, 0.0], [-25e-3, 0.0]]), Brush.LEVEL)
+    swept = replace(stroke(LINE), brush=Brush.SMOOTH)
+    first, second = list_ghosts((stroke(np.array([[0.0, -25e-3], [0.0, 25e-3]])), swept, level), DEVICE, FLAT)
+    middle = BED.at(np.array([0.0]), np.array([0.0]))
+    assert first.height[middle] == pytest.approx(REST + 4e-3, abs=1e-9)
+    assert second.height[middle] == pytest.approx(REST, abs=1e-9)
