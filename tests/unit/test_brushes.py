@@ -14,13 +14,14 @@ from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import live_session, snapshot
+from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
-from digiclay.sessions.sculpting import change_stroke, queue_stroke
+from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
+from digiclay.strokes.nominal import find_nominal
 from digiclay.strokes.stroke import Brush, draw, make_images
 from digiclay.strokes.sweep import find_radius
 from digiclay.strokes.tracking import find_tracking
@@ -56,47 +57,54 @@ def trace(way: Places) -> Floats:
     return np.concatenate([np.linspace(*ends, 20) for ends in pairwise(places)])
 
 
-@pytest.fixture(scope="module")
-def ridge() -> Running:
-    """A ridge raised with the defaults in one stroke along a line."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(live_session, "SHARE", 1e9)
-        return form(begin(), ALONG, Brush.RAISE)
+#: A line at 17 degrees, mm, that ends on the bed, and half of its breadth that is level.
+SLANTING: Places = [(-19.0, -5.0), (17.0, 6.0)]
+CASES = {
+    "2 mm deep": (Brush.LOWER, 2.0, {}),
+    "4 mm deep": (Brush.LOWER, 4.0, {}),
+    "8 mm deep": (Brush.LOWER, 8.0, {}),
+    "15 mm deep": (Brush.LOWER, 15.0, {}),
+    "15 mm high": (Brush.RAISE, 15.0, {}),
+    "by slow valves": (Brush.RAISE, 15.0, {"preset": "viscous"}),
+    "by Method II": (Brush.RAISE, 15.0, {"control": {"method": "cell_states"}}),
+    "by Method III": (Brush.RAISE, 15.0, {"control": {"method": "hybrid"}}),
+    "pressed by Method III": (Brush.LOWER, 8.0, {"control": {"method": "hybrid"}}),
+    "off the edge": (Brush.LOWER, 4.0, {"layout": {"rows": 13, "columns": 13}}),
+}
 
 
-def test_a_line_is_raised_by_15_mm_with_the_section_of_the_blister_and_no_harder_than_a_press(ridge):
-    np.testing.assert_allclose(along(ridge), 15.0, rtol=0, atol=1.0)
-    assert ridge.trace.force.max() < 2.0
-    blister = ridge.scene.blister
-    assert blister is not None
-    across = relief(ridge)[:, 12]
-    # 3 mm apart: the finger's path makes the flat top no wider than a pin's pitch.
-    wanted = 15.0 * blister.evaluate_profile(np.abs(np.arange(-12, 13)) * 3e-3).clip(0.0)
-    np.testing.assert_allclose(across, wanted, rtol=0, atol=1.0)
+@pytest.mark.parametrize("name", CASES)
+def test_a_stroke_leaves_its_nominal_surface_and_presses_no_harder_than_a_finger(name: str) -> None:
+    brush, amount, tables = CASES[name]
+    session = begin(**tables)
+    queued = queue(session, SLANTING, brush, amount)
+    nominal = find_nominal(queued.strokes[0], find_device(queued), heights(queued)).height
+    formed = finish(queued)
+    # A pin has arrived within half a micrometer of its height; what its valve still lets through until it
+    # is shut is as much again.
+    np.testing.assert_allclose(heights(formed), nominal, rtol=0, atol=1e-6)
+    sign = 1.0 if brush is Brush.RAISE else -1.0
+    assert (sign * relief(formed)).max() == pytest.approx(amount, abs=0.2)
+    assert formed.trace.force.max() < 2.0
 
 
-@pytest.mark.parametrize(
-    ("tables", "bound"),
-    [
-        ({"preset": "viscous"}, 1.5),
-        ({"control": {"method": "cell_states"}}, 2.0),
-        ({"control": {"method": "hybrid"}}, 1.0),
-        ({"sensors": {"force_noise": "2 mN", "height_noise": "20 um"}}, 2.0),
-    ],
-    ids=str,
-)
-def test_other_devices_and_methods_raise_as_high(tables: dict[str, object], bound: float) -> None:
-    np.testing.assert_allclose(along(form(begin(**tables), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=bound)
+def test_noisy_sensors_leave_their_noise_in_the_form() -> None:
+    session = begin(sensors={"force_noise": "2 mN", "height_noise": "20 um"})
+    # Five standard deviations.
+    np.testing.assert_allclose(along(form(session, ALONG, Brush.RAISE)), 15.0, rtol=0, atol=0.1)
 
 
-@pytest.mark.parametrize(("name", "height"), [("design", 5.0), ("fine", 15.0)])
-def test_a_finer_bed_raises_as_high_and_leaves_no_pin_standing(name: str, height: float) -> None:
-    session = form(begin_bed(name, 25, 60), [(-15.0, 0.0), (15.0, 0.0)], Brush.RAISE, height)
-    formed, half = relief(session), round(15e-3 / BEDS[name].pitch)
-    np.testing.assert_allclose(formed[12, 30 - half : 30 + half], height, rtol=0, atol=1.0)
-    # The finger's sink is known to some tenths of a millimeter; the blister's flat top is no higher.
-    assert formed.max() < height + 1.0
-    assert formed.min() > -0.1
+@pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER, Brush.LEVEL])
+@pytest.mark.parametrize("symmetry", ["X", "Y", "XY"])
+def test_mirror_images_agree_to_a_micrometer(symmetry: str, brush: Brush) -> None:
+    session = queue(begin(), [(-30.0, 2.0), (3.0, 14.0)], brush, 6.0)
+    (stroke,) = session.strokes
+    session = replace(session, strokes=(replace(stroke, images=make_images(symmetry)),))
+    formed = relief(finish(session))
+    for axis in (0, 1):
+        if "YX"[axis] in symmetry:
+            np.testing.assert_allclose(formed, np.flip(formed, axis), rtol=0, atol=1e-3)
+    assert brush is Brush.LEVEL or np.ptp(formed) > 5.0
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -109,30 +117,30 @@ def test_every_method_goes_with_every_size_of_bed(method: str) -> None:
 def test_ridges_drawn_in_quick_succession_both_form_and_along_the_edge_too() -> None:
     session = queue(begin(), [(-9.0, -12.0), (9.0, -12.0)], Brush.RAISE)
     done = finish(queue(session, [(-36.0, 36.0), (36.0, 36.0)], Brush.RAISE))
-    np.testing.assert_allclose(relief(done)[8, 9:16], 15.0, rtol=0, atol=1.0)
-    np.testing.assert_allclose(relief(done)[-1], 15.0, rtol=0, atol=1.0)
+    np.testing.assert_allclose(relief(done)[8, 9:16], 15.0, rtol=0, atol=0.01)
+    np.testing.assert_allclose(relief(done)[-1], 15.0, rtol=0, atol=0.01)
     assert len(done.gestures) == 2
 
 
 def test_at_the_end_of_the_stroke_pins_are_raised_as_far_as_they_go() -> None:
     session = begin(actuator={"stroke": "50 mm"})
     formed = along(form(session, ALONG, Brush.RAISE, 30.0))
-    np.testing.assert_allclose(formed, 10.0, rtol=0, atol=0.7)
+    np.testing.assert_allclose(formed, 10.0, rtol=0, atol=0.01)
 
 
 def test_level_lowers_a_hill_and_raises_a_hollow() -> None:
     session = form(begin(), [(12.0, -9.0), (12.0, 9.0)], Brush.RAISE, 6.0)
     session = form(session, [(-12.0, -9.0), (-12.0, 9.0)], Brush.LOWER, 8.0)
     before = along(session)
-    assert (before.max(), before.min()) == (pytest.approx(6.0, abs=1.0), pytest.approx(-8.0, abs=2.5))
+    assert (before.max(), before.min()) == (pytest.approx(6.0, abs=0.2), pytest.approx(-8.0, abs=0.2))
     level = form(session, [(-34.0, 0.0), (34.0, 0.0)], Brush.LEVEL)
-    np.testing.assert_allclose(along(level), 0.0, rtol=0, atol=1.0)
+    np.testing.assert_allclose(along(level), 0.0, rtol=0, atol=0.01)
 
 
 def test_half_the_strength_levels_half_the_way() -> None:
     session = form(begin(), [(0.0, -24.0), (0.0, 24.0)], Brush.RAISE, 10.0)
     half = form(session, ALONG, Brush.LEVEL, share=0.5)
-    assert along(half)[len(along(half)) // 2] == pytest.approx(5.0, abs=1.5)
+    assert along(half)[len(along(half)) // 2] == pytest.approx(5.0, abs=0.2)
 
 
 def test_a_method_without_a_blister_is_told_from_those_that_raise() -> None:
@@ -155,8 +163,8 @@ def test_level_fills_a_valley_that_it_crosses_by_a_bend() -> None:
     leveled = relief(form(valley, way, Brush.LEVEL, 4.0))
     bed = valley.system.grid
     apart = np.min([np.hypot(1e3 * bed.x - x, 1e3 * bed.y - y) for x, y in trace(way)], axis=0)
-    # Within the flat top of the blister, 6 mm. Measured: 0.9 mm; 2.1 mm where what it has raised falls back.
-    assert np.abs(leveled.ravel()[apart < 6.0]).max() < 1.5
+    # Within the flat top of the blister, 6 mm.
+    assert np.abs(leveled.ravel()[apart < 6.0]).max() < 0.01
 
 
 # Smooth
