@@ -158,13 +158,14 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
 
 def _between(one: Sample, other: Sample, part: float) -> Sample:
     """Return the sample at a part of the way between two."""
-    mix = [a + part * (b - a) for a, b in zip(_flatten(one), _flatten(other), strict=True)]
-    return Sample(*mix[:4], (mix[4], mix[5]))
 
+    def mix(a: float, b: float) -> float:
+        return a + part * (b - a)
 
-def _flatten(sample: Sample) -> tuple[float, ...]:
-    """Return the numbers of a sample."""
-    return sample.x, sample.y, sample.depth, sample.share, *sample.lean
+    lean = mix(one.lean[0], other.lean[0]), mix(one.lean[1], other.lean[1])
+    place, other_place = (one.x, one.y, one.depth, one.share), (other.x, other.y, other.depth, other.share)
+    x, y, depth, share = map(mix, place, other_place)
+    return Sample(x, y, depth, share, lean)
 
 
 def _measure(grid: Grid, cells: Cells, start: Place, end: Place) -> tuple[Floats, Floats]:

@@ -41,14 +41,15 @@ def sweep(
     """Advance the fingertip over a stroke of the valves; return path (k + 1, 7), k <= count, and orders."""
     radius = find_radius(device.finger, device.grid.layout)
     if stroke.phase == FINISHING:
-        order = Orders(repeat_order(1, verb, *pose[:2].tolist(), radius))
-        return _wait(stroke, pose, count, period, order, arrived=arrived)
+        x, y = pose[:2].tolist()
+        rest = Orders(repeat_order(1, verb, x, y, radius))
+        return _wait(stroke, pose, count, period, rest, arrived=arrived)
     safe, path, rows = find_safe(stroke, device), [pose], []
     # So long a pin below the path is in the disc before its middle, and after it; at both ends as well.
     dwell = math.ceil(radius / (DRAG * period))
     while len(path) <= count and stroke.phase != FINISHING:
         x, y, z = path[-1][:3].tolist()
-        order = (0.0,) * ORDER
+        order: tuple[float, ...] = (0.0,) * ORDER
         if stroke.phase == ABOVE:
             stroke, (x, y, z) = cross(replace(stroke, waited=0), (x, y, z), safe, period)
         else:
