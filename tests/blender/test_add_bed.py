@@ -107,6 +107,16 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name: str) -> None:
     # Properties hold 32 bits; what was written exactly is read exactly.
     assert [size / of_paper for size, of_paper in sizes] == pytest.approx([wanted.share] * 2, rel=1e-9)
     assert scene.actuator.bore <= scene.layout.pitch
+    assert (scene.preset, scene.method) == (wanted.preset, wanted.method)
+
+
+def test_beds_for_a_person_are_made_for_hands_and_one_that_a_script_does_not_name_is_the_paper_s() -> None:
+    made = [properties.scene_of(add(**named)) for named in ({}, {"bed": "design"}, {"bed": "fine"})]
+    assert [(scene.preset, scene.method) for scene in made] == [
+        ("paper", "virtual_master"), ("design", "hybrid"), ("design", "hybrid"),
+    ]  # fmt: skip
+    plain = properties.scene_of(add(bed="design", method="elastic", preset="fast"))
+    assert (plain.preset, plain.method) == ("fast", "elastic")
 
 
 def test_a_bed_of_a_kind_may_have_another_plan() -> None:

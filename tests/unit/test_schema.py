@@ -103,7 +103,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"name": 3}, "name must be a text (got 3)."),
     ({"valve": {"stroke": "3 s"}}, "valve.stroke must be in m or a multiple of it (got '3 s')."),
     ({"simulation": {"stepper": "leapfrog"}}, "simulation.stepper must be one of bernoulli, richardson, ada"),
-    ({"preset": "quick"}, "preset must be one of paper, fast, viscous (got 'quick')."),
+    ({"preset": "quick"}, "preset must be one of paper, fast, viscous, design (got 'quick')."),
     ({"control": {"method": "hand"}}, "control.method must be one of virtual_master, cell_states, elastic"),
     ({"blister": {"radius": 0.038, "edge_radius": 0.041}}, "blister.radius must be at most half the bed's l"),
     ({"blister": {"edge_radius": 0.014}}, "blister.edge_radius must be above the radius, 0.015 m (got 0.014"),

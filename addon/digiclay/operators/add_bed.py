@@ -48,10 +48,17 @@ def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
     return OFFERED
 
 
+def plan(name: str) -> dict[str, Any]:
+    """Return what a bed of `BEDS` sets in the operator: its plan, and what it is made with."""
+    bed = BEDS[name]
+    size = {"rows": bed.rows, "columns": bed.columns, "pitch": bed.pitch * 1e3}
+    return {**size, "method": bed.method, "preset": bed.preset}
+
+
 def take_bed(operator: Any, context: Any) -> None:
     """Set the plan of the chosen bed."""
-    bed = BEDS[operator.bed]
-    operator.rows, operator.columns, operator.pitch = bed.rows, bed.columns, bed.pitch * 1e3
+    for name, value in plan(operator.bed).items():
+        setattr(operator, name, value)
 
 
 class Placed:
@@ -118,16 +125,20 @@ class AddBed(Placed, Action, bpy.types.Operator):
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Add the bed to design on unless another is chosen, and show all of it."""
         if not self.properties.is_property_set("bed"):
+            own = self.properties.is_property_set
+            given = {name: getattr(self, name) for name in plan(FIRST) if own(name)}
             self.bed = FIRST
+            for name, value in given.items():
+                setattr(self, name, value)
         done = self.execute(context)
         if done == {"FINISHED"}:
             frame(context, bed_of(context))
         return done
 
     def perform(self, context: Any) -> None:
-        for name in ("rows", "columns", "pitch"):
+        for name, value in plan(self.bed).items():
             if not self.properties.is_property_set(name):  # called by a script
-                setattr(self, name, getattr(BEDS[self.bed], name) * (1e3 if name == "pitch" else 1))
+                setattr(self, name, value)
         layout = Layout(
             rows=self.rows, columns=self.columns, pitch=to_si(self.pitch, 3), arrangement=self.arrangement
         )

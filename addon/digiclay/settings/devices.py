@@ -33,6 +33,9 @@ class Bed:
     #: Size of fingertip and blister, as a share of the paper's.
     share: float
     use: str
+    #: What it is made with unless something else is chosen.
+    preset: str = "paper"
+    method: str = "virtual_master"
 
 
 PAPER = Layout()
@@ -44,10 +47,12 @@ BEDS = {
     "design": Bed(
         100, 100, 1.5e-3, 0.5,
         "10,000 pins, fingertip and blister half as large: letters and leaves can be formed",
+        "design", "hybrid",
     ),
     "fine": Bed(
         150, 150, 1e-3, 1 / 3,
         "22,500 pins, fingertip and blister a third as large: for details, on a fast computer",
+        "design", "hybrid",
     ),
 }  # fmt: skip
 #: Bed that Add makes by hand unless another is chosen: a letter can be read on it (docs/gallery.md).
@@ -124,11 +129,12 @@ def _scale_control(control: ControlParameters, share: float) -> ControlParameter
     # The pins' areas go with the square of the size: so do all forces, and the pins' speeds with its inverse.
     # The flow goes with the square of the opening, which is the gain times the force. So a gain that goes
     # with the inverse of the size leaves the fingertip's speed at a given share of the set point what it was.
-    # Heights are those of the clay, and stay.
+    # Heights are those of the clay, and stay. The skirt is made for drags faster by as much as the pins.
     factors = {"N": share**2, "N/m": share**2, "N s/m": share**2, "1/N": 1.0 / share, "m2/s": share**2}
     quantities = list_quantities(control)
     change = {name: factors[kind.unit] for name, kind in quantities.items() if kind.unit in factors}
     change |= {name: share for name in ("radius", "travel", "jump") if name in quantities}
+    change |= {"skirt_speed": share**-2} if "skirt_speed" in quantities else {}
     return replace(control, **{name: getattr(control, name) * factor for name, factor in change.items()})
 
 

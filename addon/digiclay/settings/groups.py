@@ -78,6 +78,7 @@ PRESET_WORDS = {
     "paper": "The device of the paper",
     "fast": "A wider orifice: pins move faster",
     "viscous": "A wider orifice and a silicone oil twice as viscous",
+    "design": "For hands: a wider orifice and a quicker valve",
 }
 
 

@@ -15,7 +15,6 @@ from ..core.base.arrays import Floats
 from ..core.control.blister import Blister
 from ..core.control.cell_states import CellStates
 from ..core.control.hybrid import Hybrid
-from ..core.control.methods import find_method
 from ..core.control.virtual_master import VirtualMaster
 from ..core.engine.system import System
 from ..core.model.fingertip import Fingertip
@@ -29,10 +28,10 @@ from ..device.instant import find_ellipsoid
 CONTACT_TIME = 0.3
 #: How far beyond the depth that starts a blister the first press goes, m.
 MARGIN = 0.5e-3
-#: Fastest drag on any device, m/s. On the paper's a valley is as even at 100 mm/s as at 20 mm/s; at 200 mm/s
-#: the master is left behind, and its depth grows from 4 to 11 mm along 60 mm.
-DRAG = 0.1
-#: Heights nearer than this are no change, m.
+#: Fastest press, as a share of the speed of pins without load, and greatest acceleration of a fingertip up
+#: and down, m/s²: at 5 m/s² pins of the bed "design" lose it where a press ends.
+PRESS, SUDDEN = 0.8, 2.0
+#: Changes of height less than this share of the blister's radius are none.
 NEAREST = 1e-9
 #: Samples across a fingertip, and halvings, in the search for its sink.
 SAMPLES, HALVINGS = 41, 40
@@ -48,7 +47,8 @@ class Tracking:
     press: float
     #: Speed at which pins rise without load, m/s.
     speed: float
-    #: Speed at which a fingertip can rise with the blister under it, m/s, and its acceleration upwards, m/s².
+    #: Speed at which a fingertip can rise with the blister under it, m/s, and how fast it may gain speed
+    #: upwards, or lose it at the end of a press, m/s².
     lift: float
     gain: float
     #: Fastest press, m/s.
@@ -62,10 +62,13 @@ class Tracking:
     radius: float
     #: Highest place of a pin's top, m.
     highest: float
+    #: Whether pins ahead stand so that they come to any height in time.
+    ready: bool = False
 
     def limit_drag(self, change: float, *, pressed: bool) -> float:
         """Return the fastest drag, m/s, where pins ahead are to come to heights `change` away, m."""
-        return min(self.push if pressed else self.drag, self.speed / (self.slope * max(change, NEAREST)))
+        fastest = self.push if pressed else self.drag
+        return fastest if self.ready else min(fastest, self.speed / max(self.slope * change, NEAREST))
 
 
 def find_blister(scene: Scene) -> Blister | None:
@@ -91,13 +94,12 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
     press = sink + spring + MARGIN
     # A valve that feels no force opens by gain times set point; the flow goes with the square of that.
     opening = 1.0 if isinstance(control, Hybrid) else min(1.0, control.force_gain * asked)
-    speed, pace = float(system.fastest), find_method(scene.method).pace
-    lift = pace.lift * speed * opening**2
-    return Tracking(
-        sink, press, speed, lift, lift / pace.gain, pace.sink * speed, min(DRAG, pace.drag * blister.radius),
-        min(DRAG, pace.push * blister.radius), _find_slope(blister), blister.radius,
-        system.cell.actuator.stroke,
-    )  # fmt: skip
+    speed, pace = float(system.fastest), control.pace
+    lift, slope = pace.lift * speed * opening**2, _find_slope(blister)
+    drag, push = (min(pace.fastest, radii * blister.radius) for radii in (pace.drag, pace.push))
+    gain, down = min(lift / pace.gain, SUDDEN), min(pace.press, PRESS * speed)
+    radius, highest = blister.radius, system.cell.actuator.stroke
+    return Tracking(sink, press, speed, lift, gain, down, drag, push, slope, radius, highest, pace.ready)
 
 
 def _find_slope(blister: Blister) -> float:

@@ -31,7 +31,7 @@ from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Estimate, FingerFilter, Spread
 from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import Follower, LeadProfile, LedBlister, Region
-from .methods import ControlParameters
+from .methods import ControlParameters, Pace
 from .pulp_estimate import PulpEstimate, Reach, find_top, lead_heights
 from .servo import declare_again, mark_formed
 from .travel import Heading, update_heading
@@ -94,7 +94,16 @@ class Hybrid(ControlParameters):
         """Set point of all cells together."""
         return SetPoint(self.force_setpoint)
 
+    @property
+    def pace(self) -> Pace:
+        """How fast a fingertip may lead it: that goes with the skirt, which is there when a drag begins."""
+        if not self.skirt_speed:
+            return Pace()
+        return Pace(RADII, RADII, SKIRT * self.skirt_speed, ready=True, press=0.1, lift=0.7, gain=0.1)
 
+
+#: Fastest drag, in radii of the blister a second, and as a share of the skirt's speed.
+RADII, SKIRT = 14.0, 0.6
 #: Rows of a cell but for its filters and commanded speeds.
 OWN_ROWS = 6
 

@@ -17,6 +17,26 @@ from ..model.control_interface import SetPoint
 
 
 @dataclass(frozen=True)
+class Pace:
+    """How fast a method can be led by a fingertip; the default suits any (``python -m benchmarks pace``)."""
+
+    drag: float = 2.0
+    """Fastest drag of a blister raised or leveled, in its radii a second."""
+    push: float = 20.0 / 3.0
+    """Fastest drag of a fingertip that presses a valley, in radii of the blister a second."""
+    fastest: float = 0.1
+    """Fastest drag whatever the blister, m/s."""
+    ready: bool = False
+    """Whether pins ahead stand so that they come to any height in time at that speed."""
+    press: float = 20e-3
+    """Fastest press, m/s: a faster one runs into pins whose valves have not opened yet."""
+    lift: float = 0.7
+    """Fastest rise, as a share of the speed of a pin without load."""
+    gain: float = 1.0
+    """Time to gain that speed, s: at once, it leaves the pins behind, whose valves have not opened yet."""
+
+
+@dataclass(frozen=True)
 class ControlParameters(Parameters):
     """Base of the parameters of all control methods."""
 
@@ -25,25 +45,10 @@ class ControlParameters(Parameters):
         """Set point; None for a method without one."""
         return None
 
-
-@dataclass(frozen=True)
-class Pace:
-    """How fast a method can be led by a fingertip; the default suits any.
-
-    In radii of the blister and shares of the speed of a pin without load, so that it holds for all sizes
-    and valves.
-    """
-
-    drag: float = 2.0
-    """Fastest drag of a blister raised or leveled, radii/s."""
-    push: float = 20.0 / 3.0
-    """Fastest drag of a fingertip that presses a valley, radii/s."""
-    lift: float = 0.7
-    """Fastest rise, as a share of the speed of a pin without load."""
-    gain: float = 1.0
-    """Time to gain that speed, s: at once, it leaves the pins behind, whose valves have not opened yet."""
-    sink: float = 0.8
-    """Fastest press, as a share of the speed of a pin without load."""
+    @property
+    def pace(self) -> Pace:
+        """How fast a fingertip may lead the method."""
+        return Pace()
 
 
 @dataclass(frozen=True)
@@ -60,8 +65,6 @@ class Method:
     """Whether its cells go back to the height they had at rest."""
     by_set: bool = False
     """Whether its orders for a cell depend on which other cells are active; see `System.by_set`."""
-    pace: Pace = field(default=Pace())
-    """How fast a fingertip may lead its blister."""
     digest: str = ""
     """Identifies the code of a method that is no part of this package; empty: it is."""
 
@@ -97,7 +100,7 @@ METHODS: dict[str, Method] = {
     "push_pull": Method("control.push_pull", "PushPull", by_set=True),
     "force_display": Method("control.displays", "ForceDisplay", recovers=True),
     "shape_display": Method("control.displays", "ShapeDisplay"),
-    "hybrid": Method("control.hybrid", "Hybrid", {}, pace=Pace(drag=8.0, gain=0.3)),
+    "hybrid": Method("control.hybrid", "Hybrid", {}),
 }
 
 #: What has been added to this process, see `add_method`; a .blend keeps the names of these.
