@@ -11,6 +11,11 @@ from .settings.declared import choice, flag, integer, text, title
 
 #: Corners of a 3D view for the overlay.
 CORNERS = ("top_left", "top_right", "bottom_left", "bottom_right")
+#: Those that are drawn first, in their order.
+SHOWN = (
+    "redraw_rate", "most_periods", "palette", "take_press_tool", "light_relief", "show_cursor_text",
+    "overlay_corner",
+)  # fmt: skip
 
 
 def take_palette(preferences: Any, context: Any) -> None:
@@ -65,6 +70,13 @@ class Preferences(bpy.types.AddonPreferences):
     take_press_tool: flag(
         "Take the Press Tool", "The start of a session takes the Press tool in hand", default=True
     )
+    light_relief: flag(
+        "Light for Sculpting", "Adding a bed and the start of a session light a 3D view with a matcap and "
+        "cavity, once a workspace, unless its shading was changed", default=True,
+    )  # fmt: skip
+    show_cursor_text: flag(
+        "Text at the Cursor", "The Press tool writes size, brush and amount beside the cursor", default=True
+    )
     overlay_corner: choice(
         "Overlay Corner", "Corner of the 3D view with the overlay of a session",
         items=[(name, title(name), "") for name in CORNERS], default="top_left", update=redraw_views,
@@ -82,7 +94,7 @@ class Preferences(bpy.types.AddonPreferences):
         """Draw the preferences."""
         column = self.layout.column()
         column.use_property_split = True
-        for name in ("redraw_rate", "most_periods", "palette", "take_press_tool", "overlay_corner"):
+        for name in SHOWN:
             column.prop(self, name)
         column.separator()
         row = column.row(align=True)

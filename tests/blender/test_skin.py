@@ -12,11 +12,14 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
-from digiclay.device import detail, view
+from digiclay.core.base.modes import Mode
+from digiclay.device import detail, palettes, view
 from digiclay.device.detail import choose_far, measure_pitch
 from digiclay.device.instant import Instant
 from digiclay.device.node_tree import FAR
+from digiclay.device.palettes import PLAIN
 from digiclay.device.skin_lattice import KINDS, choose_parts, make_lattice
+from digiclay.operators.ready_view import SPACE, place_eye
 from digiclay.roles import ROLE, fingertip_of, is_bed
 from digiclay.settings import properties
 from mathutils import Matrix, Vector
@@ -56,6 +59,23 @@ def drawn(bed: Any) -> tuple[np.ndarray, int]:
             continue
         points = np.array([vertex.co for vertex in item.object.data.vertices]) / bridge.SCALE
     return points, pins
+
+
+def drawn_skin(bed: Any) -> Any:
+    """Return the mesh of the skin that is drawn."""
+    named = (item.object.data for item in instances(bed))
+    return next(mesh for mesh in named if any(each and each.get(ROLE) == "skin" for each in mesh.materials))
+
+
+def drawn_tints(bed: Any) -> list[str]:
+    """Return the role of the material of every face of the skin that is drawn."""
+    mesh = drawn_skin(bed)
+    return [mesh.materials[face.material_index][ROLE] for face in mesh.polygons]
+
+
+def drawn_middles(bed: Any) -> np.ndarray:
+    """Return the middles of the faces of the skin that is drawn, in plan, m."""
+    return np.array([face.center[:2] for face in drawn_skin(bed).polygons]) / bridge.SCALE
 
 
 def baked_heights(bed: Any) -> np.ndarray:
@@ -106,6 +126,61 @@ def test_what_is_not_to_be_seen_is_not_drawn(bed: Any, shown: str, far: bool, pi
     points, count = drawn(bed)
     assert count == pins
     assert bool(len(points)) == view.is_skin_shown(bed) == skin
+
+
+def test_the_tint_is_by_the_nearest_pin_of_the_nearest_row_and_can_be_off(bed: Any) -> None:
+    cells, display = bridge.read_cells(bed.data), bed.digiclay_display
+    modes = np.arange(72, dtype=np.int8) % len(Mode)
+    bridge.write_cells(bed.data, cells["position"], cells["height"], mode=modes)
+    display.form = "skin"
+    worn = drawn_tints(bed)
+    plain = {"skin"} | {f"skin_{mode.name.lower()}" for mode in Mode if mode not in PLAIN}
+    assert set(worn) == plain
+    middles = drawn_middles(bed)
+    ours = [("skin" if Mode(mode) in PLAIN else f"skin_{Mode(mode).name.lower()}") for mode in modes]
+    across, along = np.moveaxis(np.abs(middles[:, None] - cells["position"][:, :2]), -1, 0)
+    for face, role in enumerate(worn):
+        # A face in the middle between two rows, or two pins, may take either of them.
+        row = along[face] < along[face].min() + 1e-6
+        near = row & (across[face] < across[face][row].min() + 1e-6)
+        assert role in {ours[pin] for pin in np.flatnonzero(near)}
+    display.tint = False
+    assert set(drawn_tints(bed)) == {"skin"}
+
+
+def test_a_palette_recolors_the_tints_as_thinly(bed: Any) -> None:
+    tint = next(each for each in bpy.data.materials if each.get(ROLE) == "skin_frozen")
+    palettes.set_palette("tol_muted")
+    color = np.array(bridge.srgb(tint.diffuse_color))
+    away = np.array(palettes.PALETTES["tol_muted"][Mode.FROZEN]) - palettes.CLAY
+    np.testing.assert_allclose(color - palettes.CLAY, palettes.SHARE * away, atol=1e-6)
+
+
+def test_a_session_shows_the_skin_of_an_automatic_bed_and_leaves_what_was_chosen(bed: Any) -> None:
+    bed.scale = (50.0,) * 3  # large in the factory file's view
+    bpy.context.view_layer.update()
+    for chosen, shown in (("automatic", "skin"), ("pins", "pins"), ("both", "both")):
+        bed.digiclay_display.form = chosen
+        view.show_form(bed)
+        assert bed.digiclay_display.form == shown
+    bed.digiclay_display.form = "automatic"
+    view.show_form(bed)
+    bpy.ops.digiclay.skin_toggle()
+    assert bed.digiclay_display.form == "automatic"
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_the_nearest_eye_sees_all_points_in_the_room_and_touches_two_of_its_sides(parallel: bool) -> None:
+    points = np.random.default_rng(4).uniform(-1.0, 1.0, (40, 3)) * [0.8, 0.7, 0.2] + [3.0, -2.0, 1.0]
+    lens, room = np.array([1.4, 2.1]), np.array([[-0.9, -1.0], [0.3, 0.6]])
+    x, y, z = place_eye(points, lens, room, parallel)
+    seen = lens * (points[:, :2] - [x, y]) / (z if parallel else z - points[:, 2:])
+    low, high = room + SPACE * (room[1] - room[0]) * [[1.0], [-1.0]]
+    assert (low - 1e-9 <= seen).all()
+    assert (seen <= high + 1e-9).all()
+    both = np.isclose(seen.min(axis=0), low) & np.isclose(seen.max(axis=0), high)
+    assert both.any()
+    assert np.allclose(seen.min(axis=0) - low, high - seen.max(axis=0)) or not parallel
 
 
 def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Path) -> None:
@@ -222,7 +297,7 @@ def test_a_form_of_a_bed_without_a_skin_is_refused(bed: Any) -> None:
 @pytest.mark.parametrize(
     ("pitch", "before", "after"),
     [
-        (2.9, False, True), (3.1, False, False), (3.9, True, True), (4.1, True, False), (0.0, True, False),
+        (7.9, False, True), (8.1, False, False), (9.9, True, True), (10.1, True, False), (0.0, True, False),
         (math.nan, True, False), (math.inf, True, False),
     ],
 )  # fmt: skip

@@ -14,14 +14,86 @@ from tests.window.hand_strokes import act, add_bed, done, finish, focus_window, 
 
 def count_orange(name: str, blender: Any) -> int:
     """Return how many pixels of the 3D view in a picture have the color of a selection's outline."""
+    red, green, blue = np.moveaxis(read_shot(name, blender), -1, 0)
+    return int(((red > 0.85) & (green > 0.45) & (green < 0.75) & (blue < 0.35)).sum())
+
+
+def read_shot(name: str, blender: Any) -> np.ndarray:
+    """Return the 3D view in a picture, rows from below by columns by sRGB."""
     _, region = blender.view()
     image = bpy.data.images.load(str(blender.OUT / f"{name}.png"))
     width, height = image.size
     pixels = np.array(image.pixels[:], np.float32).reshape(height, width, -1)
     bpy.data.images.remove(image)
-    shown = pixels[region.y : region.y + region.height, region.x : region.x + region.width, :3]
-    red, green, blue = np.moveaxis(shown, -1, 0)
-    return int(((red > 0.85) & (green > 0.45) & (green < 0.75) & (blue < 0.35)).sum())
+    return pixels[region.y : region.y + region.height, region.x : region.x + region.width, :3]
+
+
+def add_by_hand(blender: Any, name: str) -> None:
+    """Add a bed as its menu entry does, beside or on what the factory file has; note how it is seen."""
+    area, region = blender.view()
+    for thing in [blender.beds()[0], blender.fingertip()] if blender.beds() else []:
+        bpy.data.objects.remove(thing)
+    blender.call(bpy.ops.mesh.digital_clay_add, "INVOKE_DEFAULT")
+    room = blender.part("overlay.views").find_free_room(area, region)
+    blender.SEEN[name] = {"bed": rectangle_of_the_bed(blender), "room": room}
+
+
+def see_at_once(blender: Any) -> Iterator[float | None]:
+    """Add beds from the default perspective and from above, with the sidebar closed and open; press lines."""
+    area, _ = blender.view()
+    looking = area.spaces.active.region_3d
+    before = {name: getattr(looking, name) for name in ("view_perspective", "view_distance")}
+    turned = looking.view_rotation.copy()
+    for side in ("USER", "TOP"):
+        if side == "TOP":
+            blender.call(bpy.ops.view3d.view_axis, type=side)
+        for is_open in (False, True):
+            area.spaces.active.show_region_ui = is_open
+            yield from blender.rounds(20)
+            add_by_hand(blender, f"{side} {is_open}")
+    note(blender, "added by hand")
+    draw_lines(blender, 10, 3.0)
+    blender.shot("ten lines")
+    blender.SEEN["lit"] = measure_lines(blender, 10, "ten lines")
+    shading, display = area.spaces.active.shading, blender.beds()[0].digiclay_display
+    blender.SEEN["shading"] = [shading.light, shading.show_cavity]
+    shading.light, shading.show_cavity, display.form = "STUDIO", False, "pins"
+    blender.shot("ten lines as pins")
+    blender.SEEN["as pins"] = measure_lines(blender, 10, "ten lines as pins")
+    blender.part("operators.ready_view").light(bpy.context)
+    blender.SEEN["the user's"] = shading.light
+    area.spaces.active.show_region_ui = False
+    looking.view_rotation = turned
+    for name, value in before.items():
+        setattr(looking, name, value)
+
+
+def draw_lines(blender: Any, count: int, depth: float) -> None:
+    """Put the pins where a fingertip of 8 mm would leave them after lines of 100 mm, of a depth in mm."""
+    bed, bridge = blender.beds()[0], blender.part("bridge")
+    place = bridge.read_cells(bed.data)["position"]
+    x, y = 1e3 * place.T
+    aside = np.abs(y[:, None] - lines_at(count)).min(axis=1)
+    away = np.hypot(np.maximum(np.abs(x) - 50.0, 0.0), aside)
+    under = np.minimum(4.0 - depth - np.sqrt(np.maximum(16.0 - away**2, 0.0)), 0.0)
+    height = np.where(away < 4.0, 40.0 + under, 40.0)
+    bridge.write_cells(bed.data, place, 1e-3 * height, mode=np.where(height < 40.0, 1, 0).astype(np.int8))
+
+
+def lines_at(count: int) -> np.ndarray:
+    """Return where lines run, mm."""
+    return 12.0 * (np.arange(count) - (count - 1) / 2)
+
+
+def measure_lines(blender: Any, count: int, name: str) -> list[float]:
+    """Return by how much the luminance differs about each line, as the mean along it over a pitch."""
+    shown, (_, region) = read_shot(name, blender) @ [0.2126, 0.7152, 0.0722], blender.view()
+    left, right = (blender.on_the_bed(x, 0.0)[0] - region.x for x in (-40.0, -10.0))
+    rows = [blender.on_the_bed(0.0, y)[1] - region.y for y in (-1.0, 0.5)]
+    profile = np.convolve(shown[:, left:right].mean(axis=1), np.ones(rows[1] - rows[0]), "same")
+    profile /= rows[1] - rows[0]
+    ends = [[blender.on_the_bed(0.0, y + d)[1] - region.y for d in (-6.0, 6.0)] for y in lines_at(count)]
+    return [float(np.ptp(profile[low:high])) for low, high in ends]
 
 
 def rectangle_of_the_bed(blender: Any) -> list[float]:
@@ -63,15 +135,15 @@ def watch_overlay(blender: Any) -> None:
 
 def script(blender: Any) -> Iterator[float | None]:
     """Look."""
+    yield from see_at_once(blender)
     add_bed(blender)
     watch_overlay(blender)
     yield from focus_window()
-    note(blender, "added")
     blender.select(blender.beds()[0])
     note(blender, "selected")
     middle = on_the_screen(blender, 0.0, 0.0)
     yield from levels_of_detail(blender)
-    for name in ("alt s", "alt s again", "alt s once more"):
+    for name in ("alt s", "alt s again"):
         yield from done(blender, hand(to(middle), "key alt+s"))
         note(blender, name)
     blender.call(bpy.ops.digiclay.session)
@@ -99,8 +171,8 @@ def levels_of_detail(blender: Any) -> Iterator[float | None]:
     distance = looking.view_distance
     steps = {"near": 1.0, "between": 0.0, "far": 14.0, "between again": 0.0, "back": 1.0}
     for name, times in steps.items():
-        # Between the limits: 3.5 pixels a pitch.
-        looking.view_distance = distance * (times or pitch_in_pixels(blender, distance) / 3.5)
+        # Between the limits: 9 pixels a pitch.
+        looking.view_distance = distance * (times or pitch_in_pixels(blender, distance) / 9.0)
         area.tag_redraw()
         yield from blender.rounds(20)  # the pitch is measured in a drawing, and acted upon by a timer
         note(blender, name)

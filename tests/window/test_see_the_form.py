@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.window.blender_window import Seen
 
 PLAYED = {"script": "see_the_form.py", "by_hand": True}
@@ -9,18 +11,40 @@ PLAYED = {"script": "see_the_form.py", "by_hand": True}
 FEW = 150
 
 
-def test_alt_s_shows_the_skin_which_can_be_pressed_and_the_pins_again(seen: Seen) -> None:
-    shown = [
-        seen[name]["form"] for name in ("alt s", "alt s again", "alt s once more", "pressed on the skin")
-    ]
-    assert shown == ["skin", "automatic", "skin", "skin"]
+def test_ten_valleys_of_3_mm_are_read_from_above_as_a_bed_is_seen_at_once(seen: Seen) -> None:
+    # A tenth is seen at a glance. As pins in the light of the factory file they differ by color alone.
+    assert len(seen["lit"]) == 10
+    assert min(seen["lit"]) > 0.35
+    assert min(seen["lit"]) > 2.0 * max(seen["as pins"])
+
+
+def test_a_view_is_lit_once_and_what_the_user_does_then_remains(seen: Seen) -> None:
+    assert (seen["shading"], seen["the user's"]) == (["MATCAP", True], "STUDIO")
+
+
+@pytest.mark.parametrize("side", ["USER", "TOP"])
+@pytest.mark.parametrize("sidebar", [False, True])
+def test_a_bed_that_is_added_is_seen_whole_beside_the_sidebar(seen: Seen, side: str, sidebar: bool) -> None:
+    (x0, y0, x1, y1), (left, bottom, right, top) = (seen[f"{side} {sidebar}"][key] for key in ("bed", "room"))
+    assert left <= x0 < x1 <= right
+    assert bottom <= y0 < y1 <= top
+    # It takes most of that; as much when the sidebar is opened later.
+    assert max((x1 - x0) / (right - left), (y1 - y0) / (top - bottom)) > 0.6
+
+
+def test_alt_s_shows_the_skin_and_the_pins_again_and_a_session_the_skin(seen: Seen) -> None:
+    shown = [seen[name]["form"] for name in ("alt s", "alt s again", "pressed on the skin")]
+    assert shown == ["skin", "automatic", "skin"]
     assert seen["pressed on the skin"]["lowest"] < seen["selected"]["lowest"] - 1e-3
 
 
-def test_a_bed_has_no_outline_while_it_is_new_and_in_a_session_and_is_selected_after_it(seen: Seen) -> None:
-    assert max(seen[name]["orange"] for name in ("added", "pins smooth")) < FEW
-    assert seen["selected"]["orange"] > 10 * FEW  # what a selected bed has: the count can fail
-    assert (seen["pins smooth"]["selected"], seen["stopped"]["selected"]) == ([], ["Digital Clay"])
+def test_no_pin_has_an_outline_unless_pins_are_chosen_and_selected(seen: Seen) -> None:
+    assert max(seen[name]["orange"] for name in ("added by hand", "pins smooth")) < FEW
+    assert seen["selected"]["orange"] > 10 * FEW  # what selected pins have: the count can fail
+    assert seen["alt s"]["orange"] < seen["selected"]["orange"] / 2  # the skin has one
+    selected = [seen[name]["selected"] for name in ("selected", "pins smooth", "stopped")]
+    assert selected == [selected[0], [], selected[0]]
+    assert len(selected[0]) == 1
 
 
 def test_the_overlay_does_not_cover_the_bed(seen: Seen) -> None:

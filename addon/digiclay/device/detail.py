@@ -1,7 +1,7 @@
 """Level of detail: whether the pins of a bed are too small in the 3D views to be drawn one by one.
 
-Below a few pixels a pitch the rows of pins make moire. A bed shown as "automatic" is then drawn as a skin,
-until its pins are clearly larger again in any view.
+Below some pixels a pitch pins hide the form, and their rows make moire. A bed shown as "automatic" is then
+drawn as a skin, until its pins are clearly larger again in any view.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from . import view
 from .node_tree import FAR
 
 #: Pitch below which the skin is drawn, and above which pins are drawn again, pixels at a UI scale of 1.
-SMALL, LARGE = 3.0, 4.0
+SMALL, LARGE = 8.0, 10.0
 #: The draw handler that looks for changed views; without a window there is none.
 _handle: Any = None
 

@@ -12,7 +12,7 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.modes import Mode
 from . import heat
-from .parts import FOLLOWING, HIGH, LOW, PAIR, PREVIOUS, VALUE, WEIGHTS, Sources
+from .parts import FOLLOWING, HIGH, LOW, NEAREST, PAIR, PREVIOUS, VALUE, WEIGHTS, Sources
 from .skin_lattice import KINDS
 
 #: Names of the nodes that have the housing and the collection of all that is drawn.
@@ -23,9 +23,9 @@ LEAST_STRETCH = 0.02
 #: Names of the settings: colors by force, and arrows.
 COLOR_BY_FORCE, TOP_FORCE = "Color by Force", "Top Color at (N)"
 ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
-#: Names of the settings: what is seen (0 automatic, 1 pins, 2 skin, 3 both), which skin, and whether the pins
-#: are too small in the views for "automatic" to draw them.
-FORM, MEMBRANE, FAR = "Form", "Membrane", "Far"
+#: Names of the settings: what is seen (0 automatic, 1 pins, 2 skin, 3 both), which skin, whether the pins
+#: are too small in the views for "automatic" to draw them, and whether the skin is tinted by their modes.
+FORM, MEMBRANE, FAR, TINT = "Form", "Membrane", "Far", "Tint"
 #: How long an arrow is drawn by default, mm for each N.
 LENGTH = 150.0
 #: Smaller forces get no arrow, N: a millinewton is what the pulp of a fingertip just feels.
@@ -164,6 +164,7 @@ SETTINGS = (
     (ARROW_LENGTH, "Float", LENGTH, "Length of the arrow of 1 N, in mm of the device"),
     (FORM, "Int", 0, "0: pins, a skin where they are too small; 1: pins; 2: skin; 3: both"),
     (MEMBRANE, "Bool", False, "Stretch the skin over the flat ends of the pins"),
+    (TINT, "Bool", True, "Tint the skin by the modes of the pins under it"),
     (FAR, "Bool", False, "Pins are too small in the views; set by the extension"),
 )
 
@@ -191,7 +192,13 @@ def _skin(tree: Any, sources: Sources, settings: Any, both: Any, row: float) -> 
         for step, name in enumerate(KINDS)
     )
     kind = switch(tree, "STRING", -2, row, settings.outputs[MEMBRANE], smooth, membrane)
-    skin = skin_nodes(tree, sources.skin, settings.outputs["Geometry"], kind, row)
+    pins = settings.outputs["Geometry"]
+    skin = skin_nodes(tree, sources.skin, pins, kind, row)
+    nearest = attribute(tree, NEAREST, "INT", 16, row - 2)
+    mode = sample(tree, pins, attribute(tree, "mode", "INT", 16, row - 3), "INT", nearest, 17, row - 2)
+    worn = {"Geometry": skin, "Material Index": mode}
+    tinted = node(tree, "GeometryNodeSetMaterialIndex", 18, row - 2, worn).outputs["Geometry"]
+    skin = switch(tree, "GEOMETRY", 18.5, row - 1, settings.outputs[TINT], skin, tinted)
     look = {"Geometry": skin, "Material": sources.clear}
     clear = node(tree, "GeometryNodeSetMaterial", 19, row, look).outputs["Geometry"]
     chosen = switch(tree, "GEOMETRY", 20, row, both, skin, clear)

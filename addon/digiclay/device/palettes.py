@@ -21,6 +21,12 @@ def _palette(*codes: str) -> dict[Mode, Color]:
     return {mode: _hex(code) for mode, code in zip(Mode, codes, strict=True)}
 
 
+#: sRGB of the skin; and the share of a mode's color in its tint.
+CLAY, SHARE = (0.76, 0.70, 0.63), 0.25
+#: Modes over which the skin is plain clay: nothing moves these pins.
+PLAIN = (Mode.REST, Mode.HOLD)
+#: Beginning of the roles of the skin's materials over pins of the other modes.
+TINTED = "skin_"
 DEFAULT = "okabe_ito"
 #: sRGB of each mode.
 PALETTES: dict[str, dict[Mode, Color]] = {
@@ -50,19 +56,29 @@ def color_of(mode: Mode) -> Color:
     return COLORS[mode] if material is None else srgb(material.diffuse_color)
 
 
+def mix_tint(color: Color) -> Color:
+    """Return the color of the skin with a tint of another."""
+    red, green, blue = (clay + SHARE * (other - clay) for clay, other in zip(CLAY, color, strict=True))
+    return red, green, blue
+
+
 def set_palette(name: str) -> None:
-    """Give the materials of the modes in the open file the colors of a palette."""
+    """Give the materials of the modes, and of the skin, in the open file the colors of a palette."""
     for mode, color in PALETTES[name].items():
-        material = _material(mode)
-        if material is None:
-            continue
+        _recolor(_material(mode), color)
+        _recolor(_material(mode, TINTED), mix_tint(color))
+
+
+def _recolor(material: bpy.types.Material | None, color: Color) -> None:
+    """Give a material, where there is one, a color."""
+    if material is not None:
         material.diffuse_color = linear(color)
         for node in shader_nodes(material).nodes:
             if node.type == "BSDF_PRINCIPLED":
                 node.inputs["Base Color"].default_value = linear(color)
 
 
-def _material(mode: Mode) -> bpy.types.Material | None:
-    """Return the material of a mode, when the file has one of its own."""
-    role = mode.name.lower()
+def _material(mode: Mode, of: str = "") -> bpy.types.Material | None:
+    """Return the material of a mode, or of the skin over it, when the file has one of its own."""
+    role = of + mode.name.lower()
     return next((item for item in bpy.data.materials if item.get(ROLE) == role and not item.library), None)

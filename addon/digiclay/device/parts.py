@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,13 +14,13 @@ from ..core.base.modes import COLORS, Mode
 from ..roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 from . import heat, primitives
 from .instant import Instant
+from .palettes import CLAY, PLAIN, TINTED, mix_tint
 from .skin_lattice import Pass, SkinLattice, choose_parts, make_lattice
 
 #: sRGB of what is no pin.
 SKIN = (0.91, 0.60, 0.47)
 CASE = (0.13, 0.14, 0.16)
 ARROW = (0.80, 0.05, 0.05)
-CLAY = (0.76, 0.70, 0.63)
 #: How much of the fingertip is left when one looks through it for the arrows, and of the skin for the pins.
 CLEAR, CLEAR_CLAY = 0.25, 0.6
 #: Space between the outermost pins and the wall, and the wall's thickness, in pitches.
@@ -30,6 +31,8 @@ MANY = 4000
 HEAD = 0.36
 #: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on the way.
 PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = "previous", "following", "low", "high", "value", "pair"
+#: Attribute of the faces of the skin: the nearest pin.
+NEAREST = "pin"
 #: Attributes of the weights: their first half; the other is the name of the skin.
 WEIGHTS = ("weight low ", "weight high ")
 
@@ -97,14 +100,22 @@ def make_sources(instant: Instant, length: float, deck: float, rim: float) -> So
         pin.material_slots[0].material = material(look, color, roughness=0.45)
     arrow = marked(_arrow(instant.pitch), f"{len(looks)} force arrow", PIN, collection)
     case = marked(_housing(instant, deck, rim), f"{len(looks) + 1} housing", PIN, collection)
-    clay = material("skin", CLAY, roughness=0.6)
-    meshes = make_meshes(make_lattice(instant, choose_parts(len(instant.height))), deck, clay)
+    meshes = make_meshes(make_lattice(instant, choose_parts(len(instant.height))), deck, _clays())
     skin = [
         marked(mesh, f"{code} {mesh.name}", PIN, collection)
         for code, mesh in enumerate(meshes, len(looks) + 2)
     ]
     clear = material("skin_clear", CLAY, roughness=0.6, alpha=CLEAR_CLAY)
     return Sources(collection, arrow, case, SkinMeshes(*skin), clear)
+
+
+def _clays() -> list[Any]:
+    """Return the material of the skin over pins of each mode."""
+    clay = material("skin", CLAY, roughness=0.6)
+    return [
+        clay if mode in PLAIN else material(TINTED + mode.name.lower(), mix_tint(COLORS[mode]), 0.6)
+        for mode in Mode
+    ]
 
 
 def _arrow(pitch: float) -> Any:
@@ -126,8 +137,8 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
     return mesh
 
 
-def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
-    """Make the meshes of a skin."""
+def make_meshes(lattice: SkinLattice, deck: float, materials: Sequence[Any]) -> SkinMeshes:
+    """Make the meshes of a skin; a material for each mode."""
     pins = _points("Digital Clay Skin Pins", lattice.along.previous.size)
     _write_neighbors(pins, lattice.along)
     rows = _points("Digital Clay Skin Rows", lattice.across.previous.size)
@@ -143,7 +154,9 @@ def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
     skin.polygons.foreach_set("loop_start", np.arange(0, lattice.faces.size, 4, dtype=np.int32))
     skin.update(calc_edges=True)
     _write_weights(skin, lattice.across)
-    skin.materials.append(material)
+    skin.attributes.new(NEAREST, "INT", "FACE").data.foreach_set("value", lattice.pin)
+    for each in materials:
+        skin.materials.append(each)
     return SkinMeshes(pins, rows, skin)
 
 

@@ -66,6 +66,8 @@ class SkinLattice(NamedTuple):
     sunk: NDArray[np.bool_]
     #: (f, 4), counter-clockwise from outside.
     faces: Indices
+    #: (f,), the pin nearest to the middle of each face, of the nearest row.
+    pin: Indices
 
 
 def choose_parts(count: int) -> int:
@@ -105,7 +107,11 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
         {name: _drop(pair, sunk) for name, pair in _weigh(spread, cap / spacing).items()},
     )
     place = np.stack(np.meshgrid(fine_x, fine_y), axis=-1).reshape(-1, 2)[of]
-    return SkinLattice(along, across, place, sunk, _join(surface, edge.size))
+    faces = _join(surface, edge.size)
+    middle = place[faces].mean(axis=1)
+    row = np.rint((middle[:, 1] - y[0]) / spacing).clip(0, rows - 1).astype(np.int32)
+    column = np.rint((middle[:, 0] - starts[row]) / instant.pitch).clip(0, columns - 1).astype(np.int32)
+    return SkinLattice(along, across, place, sunk, faces, row * columns + column)
 
 
 def _divide(first: float, last: float, step: float, parts: int) -> Floats:

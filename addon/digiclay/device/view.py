@@ -188,6 +188,13 @@ def set_form(bed: Any, form: str) -> None:
     bed.pop(BEFORE, None)
 
 
+def show_form(bed: Any) -> None:
+    """Show a bed that is shown as "automatic" as a skin: the form is what a sculptor looks at."""
+    if read_form(bed) == "automatic":
+        set_form(bed, "skin")
+        bed[BEFORE] = "automatic"
+
+
 def is_far(bed: Any) -> bool:
     """Return whether the pins of a bed are too small in the views to be drawn one by one."""
     return bool(read_setting(bed, FAR, False))

@@ -23,7 +23,7 @@ from ..live import beds
 from ..panels.base import menu
 from ..press.aim import find_free_place
 from ..recorded import takes
-from ..roles import BALL, HOUSING, ROLE, bed_of, fingertip_of
+from ..roles import HOUSING, ROLE, bed_of, fingertip_of
 from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import choice, flag, integer, number, title
@@ -33,6 +33,7 @@ from ..settings.shown_units import to_si
 from ..ui_text import localize
 from .action import Action, FileAction, action, file_of, millimeters
 from .poll_messages import baked, edited, inside_edit, no_bed, session_runs
+from .ready_view import find_view, frame, light
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
@@ -133,6 +134,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
         done = self.execute(context)
         if done == {"FINISHED"}:
             frame(context, bed_of(context))
+            light(context)
         return done
 
     def perform(self, context: Any) -> None:
@@ -180,29 +182,6 @@ def select_only(context: Any, bed: Any) -> None:
         other.select_set(False)
     bed.select_set(True)
     context.view_layer.objects.active = bed
-
-
-def find_view(context: Any) -> tuple[Any, Any] | None:
-    """Return area and region of the 3D view in use: the context's, or the first of its window."""
-    window = None if bpy.app.background else context.window
-    areas = [context.area, *(window.screen.areas if window is not None else ())]
-    area = next((area for area in areas if area is not None and area.type == "VIEW_3D"), None)
-    return area and (area, next(region for region in area.regions if region.type == "WINDOW"))
-
-
-def frame(context: Any, bed: Any) -> None:
-    """Turn to a bed and its fingertip with the 3D view, which shows all of them then."""
-    shown = find_view(context)
-    if shown is None:
-        return
-    tip = fingertip_of(bed)
-    parts = [part for part in (bed, tip, tip and tip[BALL]) if part is not None]
-    for part in parts:
-        part.select_set(True)
-    with context.temp_override(window=context.window, area=shown[0], region=shown[1]):
-        bpy.ops.view3d.view_selected()
-    for part in parts:
-        part.select_set(False)
 
 
 def rebuild(bed: Any) -> Scene:

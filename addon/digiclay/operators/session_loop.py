@@ -28,6 +28,7 @@ from ..settings.declared import flag, text
 from ..ui_text import localize
 from . import poll_messages as poll
 from .action import Action, Polled, action
+from .ready_view import light
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
@@ -276,6 +277,8 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         if preferences.get(context).take_press_tool:
             tool.take_up(context)
         beds.deselect(bed)
+        view.show_form(bed)
+        light(context)
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
         if loop.is_running():

@@ -7,7 +7,9 @@ nothing. `follow` is called after each start and end of a session.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -125,16 +127,21 @@ def _choose_bed(context: Any) -> Any | None:
     return active or (beds[0] if beds else None)
 
 
-def _room(area: Any, region: Any) -> Room:
-    """Return the part of a view that toolbar, sidebar and headers leave free."""
+def find_free_room(area: Any, region: Any, closed: Mapping[str, float] = MappingProxyType({})) -> Room:
+    """Return the part of a view, pixels, that toolbar, sidebar and headers leave free.
+
+    `closed`: how wide or high regions are to be taken that are closed, by their types.
+    """
     sides = {"TOOLS": "LEFT", "UI": "RIGHT", "HEADER": "TOP", "TOOL_HEADER": "TOP", "ASSET_SHELF": "BOTTOM"}
     covered = []
     for other in area.regions:
         lies_over = other.x < region.x + region.width and other.x + other.width > region.x
         lies_over &= other.y < region.y + region.height and other.y + other.height > region.y
-        if other.type in sides and lies_over and min(other.width, other.height) > 1:
+        if other.type in sides and lies_over:
             side = other.alignment if other.alignment in sides.values() else sides[other.type]
-            covered.append((side, other.width if side in ("LEFT", "RIGHT") else other.height))
+            depth = other.width if side in ("LEFT", "RIGHT") else other.height
+            shut = min(other.width, other.height) <= 1
+            covered.append((side, closed.get(other.type, 0.0) if shut else depth))
     return find_room(region.width, region.height, covered)
 
 
@@ -155,7 +162,7 @@ def _draw() -> None:
     picture = Picture()
     if context.region_data == context.space_data.region_3d:
         content = FULL if bed.digiclay_display.overlay_full else COMPACT
-        room, corner = _room(context.area, context.region), preferences.get(context).overlay_corner
+        room, corner = find_free_room(context.area, context.region), preferences.get(context).overlay_corner
         picture = lay_out(read_session(bed, session, colors), chosen, room, scale, content, corner)
     picture.dots += _marks(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)

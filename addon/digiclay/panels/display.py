@@ -14,7 +14,7 @@ from ..core.scene.assembly import assemble
 from ..core.session import snapshot
 from ..core.session.recent_trace import PICKED, SPAN
 from ..device import heat, view
-from ..device.node_tree import ARROW_LENGTH, ARROWS, COLOR_BY_FORCE, FORM, LENGTH, MEMBRANE, TOP_FORCE
+from ..device.node_tree import ARROW_LENGTH, ARROWS, COLOR_BY_FORCE, FORM, LENGTH, MEMBRANE, TINT, TOP_FORCE
 from ..live import beds
 from ..overlay import views
 from ..roles import bed_of, is_edited
@@ -29,7 +29,7 @@ COLORINGS = (
     ("force", "Force", "Color the pins by the force on them"),
 )
 FORMS = (
-    ("automatic", "Automatic", "Pins, and the skin instead where they are smaller than about 3 pixels"),
+    ("automatic", "Automatic", "Pins, and the skin instead where they are smaller than about 8 pixels"),
     ("pins", "Pins", "Pins alone"),
     ("skin", "Skin", "The surface of the pins as a skin, without the pins"),
     ("both", "Both", "Pins under a clear skin"),
@@ -94,6 +94,10 @@ class Display(bpy.types.PropertyGroup):
             MEMBRANE, 0, lambda bed, code: view.write_setting(bed, MEMBRANE, bool(code))
         ),
     )  # fmt: skip
+    tint: flag(
+        "Mode Tint", "Tint the skin by what the pins do: those that rest or hold are plain clay",
+        **_in_nodes(TINT, False),
+    )  # fmt: skip
     color: choice(
         "Color", "Quantity shown by the color of a pin", items=COLORINGS,
         **_in_nodes(COLOR_BY_FORCE, 0, _color),
@@ -137,10 +141,11 @@ def show(sidebar: Any, context: Any) -> None:
     layout.enabled = not is_edited(context)
     if not view.is_drawn(bed):
         layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
-    row = layout.row()
-    row.enabled = view.can_show_skin(bed)
-    row.prop(bed.digiclay_display, "form", text="")
-    layout.prop(bed.digiclay_display, "overlay")
+    column, shown = layout.column(), bed.digiclay_display
+    column.enabled = view.can_show_skin(bed)
+    column.prop(shown, "form", text="")
+    draw_property(column, shown, "tint", shown.form != "pins")
+    layout.prop(shown, "overlay")
 
 
 @panel("DIGICLAY_PT_display", "View Details", 0, parent=LABORATORY)

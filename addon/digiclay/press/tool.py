@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import bridge
+from .. import bridge, preferences
 from ..compat import bpy
 from ..core.base.arrays import Floats
 from ..core.base.modes import COLORS, Mode
@@ -160,6 +160,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     ]
     amount = 1e-3 * getattr(settings, amount_name(kind))
     text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)
+    text = text if preferences.get(context).show_cursor_text else ""
     color = SMOOTHING if kind is Brush.SMOOTH else LIGHT
     paths = [*map(close, rims), *_trail(target)]
     draw_on_bed(context, target.bed, paths, text, xy, color, (region.x, region.y))
