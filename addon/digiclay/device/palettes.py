@@ -35,11 +35,11 @@ PALETTES: dict[str, dict[Mode, Color]] = {
         "dddddd", "332288", "ddcc77", "88ccee", "cc6677", "882255", "aa4499", "117733", "222222"
     ),
     "brightness": _palette(
-        "ffffff", "252525", "d7d7d7", "aeaeae", "888888", "000000", "656565", "454545", "151515"
+        "ffffff", "3b3b3b", "dbdbdb", "b9b9b9", "979797", "000000", "777777", "585858", "212121"
     ),
 }
 WORDS = {
-    "okabe_ito": ("Okabe and Ito", "Eight clear colors, told apart with any kind of color vision"),
+    "okabe_ito": ("Okabe and Ito", "Clear colors, told apart with any kind of color vision"),
     "tol_muted": ("Tol, muted", "Paul Tol's quieter set, told apart with any kind of color vision"),
     "brightness": ("Brightness", "Shades of gray, for vision or print without colors"),
 }
