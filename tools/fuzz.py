@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.control.methods import METHODS
+from digiclay.core.control.orders import Orders, Verb, place, repeat_order
 from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
 from digiclay.core.engine.system import System
 from digiclay.core.files.tables import parse_tables
@@ -239,7 +240,10 @@ def recorded() -> tuple[Result, Take]:
     bed = resolve(small)
     rest, poses = begin(assemble(bed)), np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (4, 1, 1))
     start = snapshot.dump(assemble(bed), rest)
-    return run(bed), Take(bed, start, poses, start, np.tile([0.0, 0.0, 5e-3, 0.5], (3, 1)))
+    surface = np.where(np.arange(66) % 3, 0.041, np.nan)
+    smooth = repeat_order(2, Verb.SMOOTH, 0.0, 0.0, 5e-3, 0.5)
+    orders = Orders(np.vstack([smooth, place(1, surface).rows]), (surface,))
+    return run(bed), Take(bed, start, poses, start, orders)
 
 
 def take(chance: np.random.Generator) -> None:
