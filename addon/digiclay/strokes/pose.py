@@ -22,6 +22,8 @@ def lean_finger(turn: Floats, lean: tuple[float, float]) -> Floats:
 
 def turn_image(turn: Floats, image: Image) -> Floats:
     """Return the orientation (4,) of an ellipsoid's image, the one of two that is nearer to its own."""
+    if image == Image():
+        return turn
     if image.mirrors:
         # M R M for M = diag(1, -1, 1): the axis of a rotation is mirrored the other way round.
         turn = np.asarray(turn * [1.0, -1.0, 1.0, -1.0])
