@@ -21,9 +21,8 @@ from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
-from digiclay.strokes.nominal import find_nominal
+from digiclay.strokes.nominal import find_nominal, find_radius
 from digiclay.strokes.stroke import Brush, draw, make_images
-from digiclay.strokes.sweep import find_radius
 from digiclay.strokes.tracking import find_tracking
 
 from tests.assemble import replayed

@@ -115,7 +115,7 @@ def find_press(context: Any, event: Any) -> tuple[int, int]:
 
 def amount_name(brush: Brush) -> str:
     """Return which of the tool's settings says how far a brush goes: depth or height."""
-    return "height" if brush is Brush.RAISE else "depth"
+    return "height" if brush.rises else "depth"
 
 
 def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: float = 1.0) -> str:

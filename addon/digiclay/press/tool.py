@@ -20,8 +20,8 @@ from ..overlay.picture import Color, Line, Words
 from ..roles import fingertip_of
 from ..sessions import running
 from ..settings import devices
+from ..strokes.nominal import find_radius
 from ..strokes.stroke import Brush, make_images
-from ..strokes.sweep import find_radius
 from ..ui_text import localize
 from . import aim
 from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, bed_in_use, describe_brush, find_kind

@@ -24,11 +24,16 @@ from ..device.instant import find_ellipsoid
 from ..sessions.running import Running
 from ..sessions.sculpting import change_scene, change_stroke, find_stroke, follow_finger, queue_stroke
 from ..settings.devices import BEDS, change_finger
+from ..strokes.stamps import load_stamp
 from ..strokes.stroke import (
     DEEPEST,
+    FEWEST,
+    MOST,
     SHALLOWEST,
+    STAMPS,
     SYMMETRIES,
     Brush,
+    Image,
     lay_line,
     lay_path,
     lay_ring,
@@ -61,6 +66,11 @@ class PointerStroke(Parameters):
     strength: float = quantity(1.0, "share of depth, height or way to the level", above=0.0, at_most=1.0)
     path: str = quantity("free", "path between the moves", choices=("free", "line", "ring"))
     symmetry: str = quantity("none", "mirror images", choices=tuple(name.lower() for name in SYMMETRIES))
+    radial: int = quantity(6, "number of images of a radial symmetry", at_least=FEWEST, at_most=MOST)
+    center_x: float = quantity(0.0, "center of the symmetry", unit="m", at_least=-1.0, at_most=1.0)
+    center_y: float = quantity(0.0, "center of the symmetry", unit="m", at_least=-1.0, at_most=1.0)
+    axis: float = quantity(0.0, "turn of the mirrors' axes, in degrees", at_least=-360.0, at_most=360.0)
+    stamp: str = quantity("dome", "what is stamped: a sample shape's name, or a file")
     accumulate: bool = quantity(False, "whether a path that comes back counts from what it has left there")
     stabilizer: float = quantity(0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3)
     length: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
@@ -89,7 +99,13 @@ class PointerStroke(Parameters):
     @property
     def amount(self) -> float:
         """Depth or height with its strength, m."""
-        return self.strength * (self.height if self.kind is Brush.RAISE else self.depth)
+        return self.strength * (self.height if self.kind.rises else self.depth)
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """The path and its images."""
+        center = self.center_x, self.center_y
+        return make_images(self.symmetry.upper(), self.radial, center, math.radians(self.axis))
 
     def size_finger(self, usual: Fingertip) -> Fingertip:
         """Return the fingertip of the stroke; what it leaves open is that of the bed."""
@@ -158,8 +174,8 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Running:
     """Draw a stroke, and continue the session until it is formed."""
     places = [(x, y) for _, x, y in stroke.moves]
     running, queued = queue_stroke(
-        running, *places[0], stroke.amount, make_images(stroke.symmetry.upper()), stroke.kind,
-        stroke.strength, accumulate=stroke.accumulate,
+        running, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength,
+        accumulate=stroke.accumulate, stamp=load_stamp(stroke.stamp) if stroke.kind in STAMPS else None,
     )  # fmt: skip
     lagged = places[:1]
     for place in places[1:]:

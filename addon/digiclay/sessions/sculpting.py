@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.base.errors import StateError
+from ..core.base.modes import Mode
 from ..core.control.orders import Orders
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
@@ -18,12 +19,13 @@ from ..core.model.fingertip import wrap_one
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
+from ..core.shapes.heightmap import HeightMap
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..strokes.motion import DRAG, follow
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.nominal import Device
 from ..strokes.stroke import ALONE, FINISHING, Brush, Image, Stroke, start
-from ..strokes.sweep import SWEEPS, finish, sweep
+from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
 from .running import Running
@@ -276,11 +278,11 @@ def reset(running: Running) -> Running:
 def queue_stroke(
     running: Running, x: float, y: float, depth: float, images: tuple[Image, ...] = ALONE,
     brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
-    *, accumulate: bool = False,
+    *, accumulate: bool = False, stamp: HeightMap | None = None,
 ) -> tuple[Running, int]:  # fmt: skip
     """Queue the stroke of a mouse that goes down at a place; return its number as well; see `Sample`."""
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
-    begun = start(number, x, y, depth, images, brush, share, lean, accumulate=accumulate)
+    begun = start(number, x, y, depth, images, brush, share, lean, accumulate=accumulate, stamp=stamp)
     return replace(running, strokes=(*running.strokes, begun)), number
 
 
@@ -333,13 +335,17 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
 def find_device(running: Running) -> Device:
     """Return what forms the strokes of a session."""
     scene, system = running.scene, running.system
-    return Device(system.grid, find_ellipsoid(scene), find_blister(scene), system.cell.actuator.stroke)
+    locked = running.state.mode() == Mode.LOCKED
+    parts = system.grid, find_ellipsoid(scene), find_blister(scene), system.cell.actuator.stroke
+    return Device(*parts, locked if locked.any() else None)
 
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
     """Advance the fingertip along a stroke; return it, the path, and the orders."""
     state, pose, period, device = running.state, running.pose, running.system.period, find_device(running)
     swept = stroke.brush in SWEEPS
+    if stroke.brush in WHOLE:
+        return order_all(stroke, pose)
     if stroke.height is None:
         tracking = None if swept else find_tracking(running.scene, running.system)
         stroke = begin_stroke(stroke, state.row(0), pose[3:], tracking)

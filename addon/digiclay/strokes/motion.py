@@ -18,9 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.base.arrays import Floats
-from .nominal import Device, find_nominal, returns
+from ..core.model.fingertip import Fingertip
+from .nominal import Device, find_nominal, find_undersides, returns
 from .pose import lean_finger, turn_image, turn_toward
-from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, RISING, Brush, Stroke
+from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, RISING, STAMPS, Brush, Stroke
 from .tracking import Tracking
 
 #: Lowest point of the fingertip, m.
@@ -35,6 +36,8 @@ APPROACH, CLEARANCE = 0.1, 4e-3
 NEAR = 1e-9
 #: How far the fingertip may be off its height while it goes on along the path, m.
 SLACK = 0.5e-3
+#: How much wider than it is the fingertip is taken to be beside pins that are locked.
+WIDER = 1.2
 #: How fast the fingertip turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt read in
 #: coarse steps does not jerk it.
 TURN = 3.0
@@ -64,13 +67,28 @@ class Way:
         surface = self.device.find_surface(stroke.ground, x, y)
         return max(surface, float((stroke.ground[cells] - gap).max(initial=0.0)))
 
+    def pass_over_locked(self, stroke: Stroke, x: float, y: float, z: float) -> float:
+        """Return a height of the fingertip, m, at which it presses into no locked pin."""
+        locked, tip = self.device.locked, self.device.finger
+        if locked is None:
+            return z
+        assert stroke.height is not None
+        # A wider one comes up before its side is at a pin that is higher than its middle.
+        wide = Fingertip(WIDER * tip.length, WIDER * tip.width, tip.height)
+        cells = self.device.grid.disc(x, y, max(wide.length, wide.width))
+        cells = cells[locked[cells]]
+        sample, image = stroke.samples[stroke.reached], stroke.images[stroke.image]
+        under = find_undersides(replace(self.device, finger=wide), stroke, image, sample.lean, (x, y), cells)
+        return max(z, float((stroke.height[cells] - under).max(initial=z)))
+
     def find_lowest(self, stroke: Stroke, x: float, y: float) -> float:
         """Return how low the fingertip is to be at a place of its path, m."""
         assert stroke.ground is not None
         assert stroke.height is not None
         level = self.device.find_level(stroke, stroke.images[stroke.image], stroke.height)
         top = self.device.find_top(stroke, stroke.samples[stroke.reached], (x, y), stroke.ground, level)
-        return max(0.0, top - stroke.tracking.sink) if stroke.tracking else top
+        lowest = max(0.0, top - stroke.tracking.sink) if stroke.tracking else top
+        return self.pass_over_locked(stroke, x, y, lowest)
 
 
 def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | None) -> Stroke:
@@ -107,7 +125,7 @@ def find_safe(stroke: Stroke, device: Device) -> float:
     assert stroke.height is not None
     highest = float(stroke.height.max())
     # Before the fingertip is down for the first time nothing is raised, and not all of the path is known.
-    if stroke.brush is Brush.RAISE and (stroke.phase != ABOVE or stroke.image):
+    if stroke.brush.rises and (stroke.phase != ABOVE or stroke.image):
         raised = max(sample.depth for sample in stroke.samples)
         highest = device.highest if stroke.accumulate else min(highest + raised, device.highest)
     return highest + CLEARANCE
@@ -165,6 +183,8 @@ def _step(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None
         lift = max(DESCEND, OUTRUN * stroke.tracking.speed) if stroke.tracking else DESCEND
         z = min(way.safe, z + lift * way.period)
         return (finish_image(stroke) if z >= way.safe - NEAR else stroke), (x, y, z)
+    if stroke.brush in STAMPS:
+        return _wait_for_stamp(stroke, way, place)
     if stroke.phase == PRESSING:
         return _press(stroke, way, place)
     if stroke.phase == RISING:
@@ -172,6 +192,16 @@ def _step(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None
         stroke, z = _climb(stroke, z, lowest, way.period)
         return replace(stroke, phase=DRAGGING if abs(z - lowest) < NEAR else RISING), (x, y, z)
     return _drag_on(stroke, way, place)
+
+
+def _wait_for_stamp(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None:
+    """Wait above the pins until the hand has drawn how large the stamp is; the valves form all its images."""
+    x, y, z = place
+    if stroke.held:
+        return None
+    if z < way.safe - NEAR:
+        return stroke, (x, y, min(way.safe, z + DESCEND * way.period))
+    return replace(stroke, phase=FINISHING, image=len(stroke.images) - 1), place
 
 
 def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
@@ -183,7 +213,8 @@ def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
         if stroke.brush is not Brush.LOWER:
             assert stroke.ground is not None
             surface = way.device.find_surface(stroke.ground, x, y)
-            lowest, after = max(0.0, surface - stroke.tracking.press), RISING
+            lowest = way.pass_over_locked(stroke, x, y, max(0.0, surface - stroke.tracking.press))
+            after = RISING
     touch = max(way.find_touch(stroke, x, y), lowest)
     # One limit after the other, the last that it comes to.
     for end, speed in ((touch + CLEARANCE, DESCEND), (touch, APPROACH), (lowest, fastest)):

@@ -19,15 +19,23 @@ import numpy as np
 from ..core.base.arrays import Cells, Flags, Floats
 from ..core.control.blister import Blister
 from ..core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
-from ..core.model.layout import Grid
+from ..core.model.layout import Grid, Layout
+from ..core.shapes.request import Placement
 from ..core.surface.pointing import find_ground_height
 from .pose import lean_finger, turn_image
-from .stroke import Brush, Image, Place, Sample, Stroke
+from .stroke import STAMPS, Brush, Image, Place, Sample, Stroke
 
 #: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new pass.
 RETURN = 2.0
 #: How far down and up a brush may take pins, m.
 LIMITS = {Brush.LOWER: (-math.inf, 0.0), Brush.RAISE: (0.0, math.inf), Brush.LEVEL: (-math.inf, math.inf)}
+#: Least radius of the ring, in pitches: below one a pin has no neighbor in it.
+LEAST = 2.0
+
+
+def find_radius(finger: Fingertip, layout: Layout) -> float:
+    """Return the radius of the ring in which valves work, m: half the fingertip's width, or a few pins."""
+    return max(finger.width, LEAST * layout.pitch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +47,8 @@ class Device:
     blister: Blister | None
     #: Highest place of a pin's top, m.
     highest: float
+    #: (n,), pins that nothing moves; None: none are locked.
+    locked: Flags | None = None
 
     @property
     def reach(self) -> float:
@@ -95,6 +105,8 @@ def find_nominal(stroke: Stroke, device: Device, before: Floats, count: int | No
 def extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None = None) -> Nominal:
     """Return a nominal surface with all samples of its stroke, or its first ones, for all images."""
     end = len(stroke.samples) if count is None else count
+    if stroke.brush in STAMPS:
+        return _stamp(nominal, stroke, device)
     if device.blister is None and stroke.brush.needs_blister:
         return replace(nominal, count=end)
     height, near = nominal.height.copy(), nominal.near.copy()
@@ -136,10 +148,12 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
     reach = device.reach + 0.5 * length / parts
     for part, (start, end) in enumerate(pairwise(places)):
         cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
+        if device.locked is not None:
+            cells = cells[~device.locked[cells]]
         own, now = nominal.ground[cells], nominal.height[cells]
         if device.blister is None:
-            under = _find_undersides(device, stroke, image, row[part + 1], tops[part + 1], cells)
-            change = under - own
+            under = find_undersides(device, stroke, image, row[part + 1].lean, end, cells)
+            change = tops[part + 1] + under - own
         else:
             distance, share = _measure(device.grid, cells, start, end)
             section = device.blister.evaluate_profile(distance).clip(0.0, 1.0)
@@ -154,6 +168,38 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         change = change.clip(low, high)
         nominal.near[cells] = True
         nominal.height[cells] = np.where(np.abs(change) > np.abs(now - own), own + change, now)
+
+
+def find_frame(stroke: Stroke, device: Device) -> tuple[float, float]:
+    """Return half the side of what a stroke stamps, m, and how far it is turned, rad.
+
+    Drawn from its middle it reaches to the place where its right side is; a click gives the ring's size.
+    """
+    first, last = stroke.samples[0], stroke.samples[-1]
+    x, y = last.x - first.x, last.y - first.y
+    if math.hypot(x, y) < device.grid.layout.pitch:
+        return find_radius(device.finger, device.grid.layout), 0.0
+    return math.hypot(x, y), math.atan2(y, x)
+
+
+def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
+    """Return what a stroke stamps, on the surface before it; where images meet, what goes farther."""
+    if stroke.stamp is None:
+        return nominal
+    (half, angle), first, last = find_frame(stroke, device), stroke.samples[0], stroke.samples[-1]
+    cos, sin = math.cos(angle), math.sin(angle)
+    scale = 2.0 * half / np.array(stroke.stamp.pixels)
+    rise, grid = np.zeros(nominal.before.size), device.grid
+    for image in stroke.images:
+        x, y = image.trace(grid.x, grid.y)
+        x, y = x - first.x, y - first.y
+        own = Grid(grid.layout, cos * x + sin * y, cos * y - sin * x)
+        rise = np.maximum(rise, stroke.stamp.tops(own, Placement(scale[1], scale[0], -half, -half)).value)
+    if device.locked is not None:
+        rise[device.locked] = 0.0
+    height = nominal.before + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
+    height = np.where(rise > 0.0, height.clip(0.0, device.highest), nominal.before)
+    return replace(nominal, height=height, near=rise > 0.0)
 
 
 def _between(one: Sample, other: Sample, part: float) -> Sample:
@@ -177,13 +223,12 @@ def _measure(grid: Grid, cells: Cells, start: Place, end: Place) -> tuple[Floats
     return np.hypot(x - part * way_x, y - part * way_y), part
 
 
-def _find_undersides(
-    device: Device, stroke: Stroke, image: Image, sample: Sample, lowest: float, cells: Cells
+def find_undersides(
+    device: Device, stroke: Stroke, image: Image, lean: Place, at: Place, cells: Cells
 ) -> Floats:
-    """Return the fingertip's underside over cells, (m,), m, at a sample and a height of its lowest point."""
+    """Return how far above its lowest point the fingertip's underside is over cells, (m,), m, at a place."""
     turn = np.array(LEVEL) if stroke.turn is None else stroke.turn
-    turn = turn_image(lean_finger(turn, sample.lean), image)
-    pose = np.array([[*image.place(sample.x, sample.y), lowest, *turn]])
+    pose = np.array([[*at, 0.0, *turn_image(lean_finger(turn, lean), image)]])
     forms = compute_forms(device.finger.outline(pose))
     under: Floats = compute_underside(*forms, device.grid.compute_basis(cells))[0]
     return under
@@ -192,7 +237,7 @@ def _find_undersides(
 def list_ghosts(strokes: tuple[Stroke, ...], device: Device, height: Floats) -> Iterator[Nominal]:
     """Yield the nominal surface of each of a queue's strokes that has one, on pins at heights (n,), m."""
     for stroke in strokes:
-        if stroke.brush in LIMITS:
+        if stroke.brush in LIMITS or stroke.brush in STAMPS:
             nominal = find_nominal(stroke, device, height if stroke.height is None else stroke.height)
             height = nominal.height
             yield nominal

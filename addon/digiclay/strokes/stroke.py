@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.base.arrays import Floats
+from ..core.shapes.heightmap import HeightMap
 from .tracking import Tracking
 
 Place = tuple[float, float]
@@ -40,6 +41,11 @@ class Image(NamedTuple):
     def place(self, x: float, y: float) -> Place:
         """Return where a place comes to, m."""
         return self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0
+
+    def trace(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Return where places (n,), m, have come from."""
+        x, y = x - self.x0, y - self.y0
+        return self.xx * x + self.yx * y, self.xy * x + self.yy * y
 
     @property
     def mirrors(self) -> bool:
@@ -88,21 +94,39 @@ class Brush(Enum):
     RAISE = "RAISE"
     LEVEL = "LEVEL"
     SMOOTH = "SMOOTH"
+    ERASE = "ERASE"
+    LOCK = "LOCK"
+    UNLOCK = "UNLOCK"
+    STAMP = "STAMP"
+    IMPRINT = "IMPRINT"
+    INVERT_LOCKS = "INVERT_LOCKS"
+    CLEAR_LOCKS = "CLEAR_LOCKS"
 
     @property
     def inverse(self) -> Brush:
         """What Ctrl makes of it."""
-        return {Brush.LOWER: Brush.RAISE, Brush.RAISE: Brush.LOWER}.get(self, self)
+        return INVERSES.get(self, self)
 
     @property
     def has_amount(self) -> bool:
         """Whether it has a depth or height, not a strength alone."""
-        return self in (Brush.LOWER, Brush.RAISE)
+        return self in (Brush.LOWER, Brush.RAISE, *STAMPS)
+
+    @property
+    def rises(self) -> bool:
+        """Whether that is a height, not a depth."""
+        return self in (Brush.RAISE, Brush.STAMP)
 
     @property
     def needs_blister(self) -> bool:
         """Whether the blister of the device has to follow the fingertip."""
         return self in (Brush.RAISE, Brush.LEVEL)
+
+
+#: Brushes that put a shape onto the surface, up or down.
+STAMPS = (Brush.STAMP, Brush.IMPRINT)
+INVERSES = {Brush.LOWER: Brush.RAISE, Brush.LOCK: Brush.UNLOCK, Brush.STAMP: Brush.IMPRINT}
+INVERSES |= {other: one for one, other in INVERSES.items()}
 
 
 @dataclass(frozen=True)
@@ -133,6 +157,8 @@ class Stroke:
     images: tuple[Image, ...] = ALONE
     #: Whether a path that comes back to where it was counts from what it has left there.
     accumulate: bool = False
+    #: What is stamped, with values from 0 to 1.
+    stamp: HeightMap | None = None
     #: Whether the hand still draws.
     held: bool = True
     #: What the fingertip does.
@@ -187,11 +213,11 @@ class Stroke:
 def start(
     number: int, x: float, y: float, depth: float, images: tuple[Image, ...] = ALONE,
     brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
-    *, accumulate: bool = False,
+    *, accumulate: bool = False, stamp: HeightMap | None = None,
 ) -> Stroke:  # fmt: skip
     """Return the stroke of a mouse that goes down at a place, m; see `Sample`."""
     first = Sample(x, y, _limit_depth(depth), share, lean)
-    return Stroke(number, (first,), brush, images, accumulate)
+    return Stroke(number, (first,), brush, images, accumulate, stamp)
 
 
 def draw(

@@ -12,27 +12,22 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.base.arrays import Floats
-from ..core.control.orders import ORDER, Orders, Verb, place, repeat_order
-from ..core.model.fingertip import Fingertip
-from ..core.model.layout import Layout
+from ..core.control.orders import FARTHEST, ORDER, Orders, Verb, place, repeat_order
 from .motion import DESCEND, DRAG, cross, drag, find_safe, finish_image
-from .nominal import Device, find_nominal
+from .nominal import Device, find_nominal, find_radius
 from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, Brush, Stroke
 
-#: Least radius of the disc that is smoothed, in pitches: below one a pin has no neighbor in it.
-LEAST = 2.0
 #: How long pins are waited for that do not come to their heights, s: noise may hide that they have; and how
 #: many control periods pass between two looks.
 PATIENCE, LOOK = 1.0, 4
 #: Brushes whose strokes the valves form, and what they tell them.
-SWEEPS = {Brush.SMOOTH: Verb.SMOOTH}
+SWEEPS = {
+    Brush.SMOOTH: Verb.SMOOTH, Brush.ERASE: Verb.ERASE, Brush.LOCK: Verb.LOCK, Brush.UNLOCK: Verb.UNLOCK,
+}  # fmt: skip
+#: Brushes that tell all pins something, at once.
+WHOLE = {Brush.INVERT_LOCKS: Verb.INVERT, Brush.CLEAR_LOCKS: Verb.UNLOCK}
 #: Least change of a pin that the valves are to make, m.
 LEAST_CHANGE = 1e-7
-
-
-def find_radius(finger: Fingertip, layout: Layout) -> float:
-    """Return the radius of the disc that a stroke smooths, m: half the fingertip's width, or a few pins."""
-    return max(finger.width, LEAST * layout.pitch)
 
 
 def sweep(
@@ -65,6 +60,12 @@ def sweep(
         path.append(np.array([x, y, z, *pose[3:]]))
         rows.append(order)
     return stroke, np.array(path), Orders(np.array(rows, np.float64).reshape(-1, ORDER))
+
+
+def order_all(stroke: Stroke, pose: Floats) -> tuple[Stroke, Floats, Orders]:
+    """Tell all pins of the bed what the brush of a stroke does, and end it; returns as `sweep`."""
+    order = repeat_order(1, WHOLE[stroke.brush], radius=FARTHEST)
+    return replace(stroke, phase=DONE), np.array([pose, pose]), Orders(order)
 
 
 def _dwell(stroke: Stroke, periods: int) -> Stroke:

@@ -47,7 +47,7 @@ from .travel import measure_square
 ORDER, VERBLESS = 5, 4
 #: How long strength 1 takes, s, to spread heights over the radius, SMOOTH and AVERAGE, and to erase all
 #: but 1/e. At 100 mm/s one pass of SMOOTH leaves 15 to 45 % of what varies on the beds of `settings.devices`.
-SPREADING, AVERAGING, ERASING = 0.25, 1.0, 10e-3
+SPREADING, AVERAGING, ERASING = 0.25, 1.0, 5e-3
 #: How far the neighbors of a cell are at most, in pitches or distances of rows: 1.12 where rows are shifted.
 MARGIN = 1.5
 #: Least radius of an order, m, the farthest number in one, m, and the largest strength.
