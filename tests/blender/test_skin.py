@@ -19,7 +19,6 @@ from digiclay.device.instant import Instant
 from digiclay.device.node_tree import FAR
 from digiclay.device.palettes import PLAIN
 from digiclay.device.skin_lattice import KINDS, choose_parts, make_lattice
-from digiclay.operators.ready_view import SPACE, place_eye
 from digiclay.roles import ROLE, fingertip_of, is_bed
 from digiclay.settings import properties
 from mathutils import Matrix, Vector
@@ -167,20 +166,6 @@ def test_a_session_shows_the_skin_of_an_automatic_bed_and_leaves_what_was_chosen
     view.show_form(bed)
     bpy.ops.digiclay.skin_toggle()
     assert bed.digiclay_display.form == "automatic"
-
-
-@pytest.mark.parametrize("parallel", [False, True])
-def test_the_nearest_eye_sees_all_points_in_the_room_and_touches_two_of_its_sides(parallel: bool) -> None:
-    points = np.random.default_rng(4).uniform(-1.0, 1.0, (40, 3)) * [0.8, 0.7, 0.2] + [3.0, -2.0, 1.0]
-    lens, room = np.array([1.4, 2.1]), np.array([[-0.9, -1.0], [0.3, 0.6]])
-    x, y, z = place_eye(points, lens, room, parallel)
-    seen = lens * (points[:, :2] - [x, y]) / (z if parallel else z - points[:, 2:])
-    low, high = room + SPACE * (room[1] - room[0]) * [[1.0], [-1.0]]
-    assert (low - 1e-9 <= seen).all()
-    assert (seen <= high + 1e-9).all()
-    both = np.isclose(seen.min(axis=0), low) & np.isclose(seen.max(axis=0), high)
-    assert both.any()
-    assert np.allclose(seen.min(axis=0) - low, high - seen.max(axis=0)) or not parallel
 
 
 def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def note(blender: Any, name: str) -> None:
 
 
 def watch_overlay(blender: Any) -> None:
-    """Write down the box of the overlay whenever it is drawn."""
+    """Write down the box of the overlay, and the text at the cursor, whenever they are drawn."""
     module = blender.part("overlay.draw")
     draw = module.draw
 
@@ -128,6 +128,8 @@ def watch_overlay(blender: Any) -> None:
         if picture.boxes:
             box = picture.boxes[0]
             blender.SEEN["overlay"] = [box.x, box.y, box.x + box.width, box.y + box.height]
+        elif picture.lines:
+            blender.SEEN["text"] = [words.text for words in picture.words]
         draw(picture, width, height)
 
     module.draw = noted
@@ -151,6 +153,12 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from finish(blender, line(blender, (-24.0, -12.0), (24.0, -12.0)))
     note(blender, "pressed on the skin")
     blender.SEEN["bed"] = rectangle_of_the_bed(blender)
+    preferences, texts = bpy.context.preferences.addons[blender.EXTENSION].preferences, []
+    for place, is_on in ((20.0, True), (16.0, False)):
+        preferences.show_cursor_text = is_on
+        yield from act(blender, to(on_the_screen(blender, place, -4.0), 0.3))
+        texts.append(blender.SEEN["text"])
+    preferences.show_cursor_text, blender.SEEN["texts"] = True, texts
     bed = blender.beds()[0]
     bed.digiclay_display.overlay_full = True
     yield from act(blender, to(on_the_screen(blender, 24.0, -8.0), 0.3))

@@ -54,6 +54,12 @@ def test_the_overlay_does_not_cover_the_bed(seen: Seen) -> None:
     assert right <= from_left or left >= to_right or top <= from_bottom or bottom >= to_top
 
 
+def test_the_text_at_the_cursor_can_be_off_while_its_ring_is_drawn(seen: Seen) -> None:
+    shown, off = seen["texts"]
+    assert any("Lower" in text for text in shown)
+    assert not any(off)
+
+
 def test_a_bed_far_away_is_a_skin_and_between_the_limits_what_it_was(seen: Seen) -> None:
     shown = [seen[name]["skin"] for name in ("near", "between", "far", "between again", "back")]
     assert shown == [False, False, True, True, False]
