@@ -55,8 +55,8 @@ def noted(fit: Fitted) -> dict[str, Any]:
         "allowed": fit.budget, "measured": fit.error, "departure": fit.departure,
         "own_error": fit.own_error,
     }  # fmt: skip
-    units = {**dict.fromkeys(lengths, "m"), "work": "1"}
-    return {**lengths, "work": fit.work, "left_out": fit.left_out, "units": units}
+    units = {**dict.fromkeys(lengths, "m"), "work": "1", "time": "1"}
+    return {**lengths, "work": fit.work, "time": fit.time, "left_out": fit.left_out, "units": units}
 
 
 def report(fit: Fitted) -> Iterator[str]:
@@ -66,18 +66,18 @@ def report(fit: Fitted) -> Iterator[str]:
         [
             trial.text,
             f"> {fit.budget * 1e6:g}" if math.isinf(trial.departure) else f"{trial.departure * 1e6:.3g}",
-            "" if math.isnan(trial.work) else f"{100 * trial.work:.0f} %",
+            "" if math.isnan(trial.time) else f"{100 * trial.time:.0f} %",
             "left out" if trial.kept else "",
         ]
         for trial in fit.tried
     ]
-    yield from table(("it would have", "off by, µm", "work left", ""), rows)
+    yield from table(("it would have", "off by, µm", "time left", ""), rows)
     omitted = "; ".join(fit.left_out) or "nothing: all of it is needed"
     yield f"Left out: {omitted}."
     yield (
         f"Measured then: {fit.error * 1e6:.3g} µm "
         f"({fit.departure * 1e6:.3g} µm from the full model, {fit.own_error * 1e6:.3g} of integration), "
-        f"for {100 * fit.work:.0f} % of its work."
+        f"in {100 * fit.time:.0f} % of its time as measured."
     )
 
 

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +59,10 @@ class Tried(NamedTuple):
     #: Largest difference of a height from the full scene, m; infinite when the trial was broken off
     #: because it left the budget.
     departure: float
-    #: Share of the full scene's work that is left; NaN when the trial was broken off.
+    #: Shares of the full scene's work, and of its measured time, that are left; NaN when the trial was broken
+    #: off.
     work: float
+    time: float
     #: Whether the scene does without it.
     kept: bool
 
@@ -75,8 +78,10 @@ class Fitted:
     budget: float
     departure: float
     own_error: float
-    #: Share of the full scene's work that is left: cells times steps times the parts of a cell.
+    #: Shares that are left of the full scene's work, cells times steps times the parts of a cell, by which
+    #: omissions are chosen, since it is the same in every run; and of its measured time.
     work: float
+    time: float
     tried: tuple[Tried, ...]
 
     @property
@@ -127,20 +132,20 @@ def find_omissions(
         alone.append((omission, trial))
     fits = [pair for pair in alone if pair[1].departure <= budget and pair[1].work < 1.0]
     fits.sort(key=lambda pair: -(1.0 - pair[1].work) / (pair[1].departure + 1e-3 * budget))
-    best = Fitted(scene, budget, 0.0, own, 1.0, tuple(tried for _, tried in alone))
+    best = Fitted(scene, budget, 0.0, own, 1.0, 1.0, tuple(tried for _, tried in alone))
     taken: list[Omission] = []
     for omission, _ in fits:
         if any(omission.kind == other.kind for other in taken):
             continue
         show(f"together + {omission.text}")
         less = omission.leave_out(best.scene)
-        departure, work = _departure(scene, less, budget)
+        departure, work, time = _departure(scene, less, budget)
         if departure > budget or work >= best.work:
             continue
         own = _own_error(less)
         if departure + own <= budget:
             taken.append(omission)
-            best = replace(best, scene=less, departure=departure, own_error=own, work=work)
+            best = replace(best, scene=less, departure=departure, own_error=own, work=work, time=time)
     kept = {omission.text for omission in taken}
     return replace(best, tried=tuple(trial._replace(kept=trial.text in kept) for trial in best.tried))
 
@@ -150,18 +155,24 @@ def _change(scene: Scene, section: str, **values: float) -> Scene:
     return scene.with_sections(**{section: replace(scene.section(section), **values) if values else None})
 
 
-def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
-    """Run two scenes in step."""
-    apart, done = 0.0, np.zeros(2)
+def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float, float]:
+    """Run two scenes in step; return how far apart they come, m, and the second's shares of work, time."""
+    apart, done, took = 0.0, np.zeros(2), np.zeros(2)
     pair = [assemble(full), assemble(less)]
-    runs = (periods(system, full.trajectories(), begin(system), full.periods) for system in pair)
+    runs = [periods(system, full.trajectories(), begin(system), full.periods) for system in pair]
     weights = [_weight(scene, system) for scene, system in zip((full, less), pair, strict=True)]
-    for both in zip(*runs, strict=True):
-        done += [each * state.active.cells.size for each, state in zip(weights, both, strict=True)]
-        apart = max(apart, float(np.abs(both[0].row(0) - both[1].row(0)).max()))
+    for _ in range(full.periods):
+        heights = []
+        for index, (steps, weight) in enumerate(zip(runs, weights, strict=True)):
+            started = process_time()
+            state = next(steps)
+            took[index] += process_time() - started
+            done[index] += weight * state.active.cells.size
+            heights.append(state.row(0))
+        apart = max(apart, float(np.abs(heights[0] - heights[1]).max()))
         if apart > budget:
-            return math.inf, math.nan
-    return apart, float(done[1] / done[0]) if done[0] else 1.0
+            return math.inf, math.nan, math.nan
+    return apart, float(done[1] / done[0]) if done[0] else 1.0, float(took[1] / took[0])
 
 
 def _weight(scene: Scene, system: System) -> int:
