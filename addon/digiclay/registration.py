@@ -9,7 +9,7 @@ from . import command_line, manual_map, operators, panels, preferences, translat
 from .device import detail, unit
 from .exchange import image_reader
 from .live import handlers
-from .press import brush, tool
+from .press import brush, ghost, tool
 from .settings import properties
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
@@ -21,6 +21,7 @@ MODULES: tuple[ModuleType, ...] = (
     operators,
     panels,
     tool,
+    ghost,
     translations,  # of all that is registered before
     command_line,
     manual_map,

@@ -10,7 +10,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.strokes.nominal import Device, Nominal, extend, find_nominal, list_ghosts
+from digiclay.strokes.nominal import Device, Ghost, Nominal, extend, find_ghosts, find_nominal
 from digiclay.strokes.stroke import Brush, Stroke, deepen, lay_path, lay_ring, make_images, start
 
 BED = make_grid(Layout(60, 60, pitch=1.5e-3))
@@ -149,7 +149,25 @@ def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_
 def test_queued_strokes_count_from_what_those_before_them_leave() -> None:
     level = stroke(np.array([[25e-3, 0.0], [-25e-3, 0.0]]), Brush.LEVEL)
     swept = replace(stroke(LINE), brush=Brush.SMOOTH)
-    first, second = list_ghosts((stroke(np.array([[0.0, -25e-3], [0.0, 25e-3]])), swept, level), DEVICE, FLAT)
+    ridge = stroke(np.array([[0.0, -25e-3], [0.0, 25e-3]]))
+    first, second = (ghost.nominal for ghost in find_ghosts((ridge, swept, level), DEVICE, FLAT))
     middle = BED.at(np.array([0.0]), np.array([0.0]))
     assert first.height[middle] == pytest.approx(REST + 4e-3, abs=1e-9)
     assert second.height[middle] == pytest.approx(REST, abs=1e-9)
+
+
+def test_a_ghost_that_is_drawn_on_is_that_of_the_whole_path_and_others_stay() -> None:
+    first, last = stroke(LINE), replace(stroke(WAVE, Brush.LOWER), number=2)
+    kept: tuple[Ghost, ...] = ()
+    for count in (1, 2, 60, 200):
+        drawn = replace(last, samples=last.samples[:count])
+        before, kept = kept, find_ghosts((first, drawn), DEVICE, FLAT.copy(), kept)
+        assert not before or before[0].nominal is kept[0].nominal
+    whole = find_ghosts((first, last), DEVICE, FLAT)
+    assert np.array_equal(kept[-1].nominal.height, whole[-1].nominal.height)
+    assert find_ghosts((first, last), DEVICE, FLAT, kept)[-1].nominal is kept[-1].nominal
+    # Another path of the same number, and other pins below it, are looked at anew.
+    other = find_ghosts((stroke(WAVE),), DEVICE, FLAT, kept)[0].nominal
+    assert np.array_equal(other.height, find_nominal(stroke(WAVE), DEVICE, FLAT).height)
+    raised = find_ghosts((first,), DEVICE, FLAT + 1e-3, kept)[0].nominal
+    assert np.array_equal(raised.before, FLAT + 1e-3)

@@ -12,12 +12,24 @@ from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.control.methods import METHODS
 from ..live import beds, loop, tick
-from ..press import aim, brush, pointer, tool
+from ..press import aim, brush, ghost, pointer, tool
 from ..press.pointer import begin_button, read_event
 from ..sessions import running
 from ..sessions.sculpting import change_stroke, find_stroke, last_place, queue_stroke
 from ..settings.declared import choice, flag, number, title
-from ..strokes.stroke import DEEPEST, Brush, deepen, draw, lay_line, lay_path, lay_ring, make_images, pull
+from ..strokes.stroke import (
+    DEEPEST,
+    Brush,
+    Stroke,
+    deepen,
+    draw,
+    lay_line,
+    lay_path,
+    lay_ring,
+    make_images,
+    pull,
+    start,
+)
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
 from .action import Drawing, Polled, clear_status, millimeters, show_status
@@ -325,7 +337,12 @@ class PressShape(Drawing, bpy.types.Operator):
         length = float(np.hypot(self.to[0] - self.start[0], self.to[1] - self.start[1]))
         self.words = localize(SHAPE_KEYS[self.shape], 1e3 * length)
         show_status(context, self.words)
+        ghost.plan(self.uid, _lay_stroke(brush.tool_settings(context), self._path(), self.kind))
         self.region.tag_redraw()
+
+    def end(self, context: Any, *result: str) -> set[str]:
+        ghost.plan(self.uid, None)
+        return super().end(context, *result)
 
     def draw_view(self, area: Any) -> None:
         context = bpy.context
@@ -362,16 +379,20 @@ class PressLine(Polled, bpy.types.Operator):
         return _queue_path(self, context, target.bed, path, Brush(settings.brush))
 
 
+def _lay_stroke(settings: Any, path: Any, kind: Brush) -> Stroke:
+    """Return the stroke along a path (k, 2), m, as the tool's settings have it."""
+    share = float(settings.strength)
+    depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
+    (x, y), images, accumulate = path[0], make_images(settings.symmetry), settings.accumulate
+    return lay_path(start(0, x, y, depth, images, kind, share, accumulate=accumulate), path)
+
+
 def _queue_path(operator: Any, context: Any, bed: Any, path: Any, kind: Brush) -> set[str]:
     """Queue a path for the fingertip, as the tool's settings have it."""
-    settings: Any = brush.tool_settings(context)
     session = open_session(operator, context, bed, kind)
     if session is None:
         return {"CANCELLED"}
-    share, (x, y) = float(settings.strength), path[0]
-    depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
-    session, number = queue_stroke(
-        session, x, y, depth, make_images(settings.symmetry), kind, share, accumulate=settings.accumulate
-    )
-    running.put(change_stroke(session, number, partial(lay_path, points=path)))
+    (x, y), laid = path[0], _lay_stroke(brush.tool_settings(context), path, kind)
+    session, number = queue_stroke(session, x, y, 0.0)
+    running.put(change_stroke(session, number, lambda queued: replace(laid, number=queued.number)))
     return {"FINISHED"}

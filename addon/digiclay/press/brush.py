@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -129,6 +130,14 @@ def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
         return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""
     return f"{localize(LABELS[brush])}, {localize(amount_name(brush))} {1e3 * depth:.3g} mm{share}"
+
+
+def describe_queue(strokes: int, seconds: float | None) -> str:
+    """Return how many strokes are still to be formed, and within about how many seconds; None: not known."""
+    if not strokes:
+        return ""
+    left = "" if seconds is None else localize(", {:.0f} s", math.ceil(seconds))
+    return localize("   To form: {}", strokes) + left
 
 
 #: Folder of the presets below ``presets``, here and in the user's own folder.

@@ -19,12 +19,22 @@ from ..device.instant import find_ellipsoid
 from ..overlay.picture import Color, Line, Words
 from ..roles import fingertip_of
 from ..sessions import running
+from ..sessions.sculpting import estimate_time
 from ..settings import devices
 from ..strokes.nominal import find_radius
 from ..strokes.stroke import Brush, make_images
 from ..ui_text import localize
 from . import aim
-from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, bed_in_use, describe_brush, find_kind
+from .brush import (
+    ADJUSTING,
+    OPERATOR,
+    TOOL,
+    amount_name,
+    bed_in_use,
+    describe_brush,
+    describe_queue,
+    find_kind,
+)
 
 #: A light line on a dark one is seen on everything.
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
@@ -160,10 +170,19 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     ]
     amount = 1e-3 * getattr(settings, amount_name(kind))
     text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)
+    text += describe_queue(*_measure_queue(target.bed))
     text = text if preferences.get(context).show_cursor_text else ""
     color = SMOOTHING if kind is Brush.SMOOTH else LIGHT
     paths = [*map(close, rims), *_trail(target)]
     draw_on_bed(context, target.bed, paths, text, xy, color, (region.x, region.y))
+
+
+def _measure_queue(bed: Any) -> tuple[int, float | None]:
+    """Return how many strokes a bed's session has to form, and within about how many seconds, if known."""
+    session = running.find(bed)
+    if session is None or session.paused or not session.clock.factor:
+        return (len(session.strokes) if session else 0), None
+    return len(session.strokes), estimate_time(session) / session.clock.factor
 
 
 def _shown_brush(bed: Any, settings: Any) -> Brush:

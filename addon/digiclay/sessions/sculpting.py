@@ -38,9 +38,9 @@ CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or i
 REST = 0.5
 #: Control periods of a queue that are simulated at a time, and between two estimates of the error: so many
 #: go by in a second that one as often as under a hand takes a quarter of the time.
-CHUNK, PAUSE = 8, 10 * accuracy.PAUSE
+CHUNK, PAUSE = 16, 10 * accuracy.PAUSE
 #: Time that a stroke takes beside its path, s: to come, press, rise and leave.
-BESIDE = 1.0
+BESIDE = 0.4
 #: Time between two ticks, s, unless told.
 INTERVAL = 1.0 / 30.0
 #: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one that is put
@@ -140,9 +140,14 @@ def _follow_stroke(running: Running, count: int) -> Running:
 
 def estimate_time(running: Running) -> float:
     """Return about how long the session's strokes still take, s of simulated time."""
-    paths = [path for stroke in running.strokes for path in stroke.ahead]
-    length = sum(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in paths)
-    return length / DRAG + len(paths) * BESIDE
+    tracking, time = running.strokes[0].tracking if running.strokes else None, 0.0
+    for stroke in running.strokes:
+        speed, deepest = DRAG, max(sample.depth for sample in stroke.samples)
+        if tracking is not None:
+            speed = tracking.limit_drag(deepest, pressed=stroke.brush is Brush.LOWER)
+        for path in stroke.ahead:
+            time += BESIDE + float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) / speed
+    return time
 
 
 def _pack(running: Running) -> Running:

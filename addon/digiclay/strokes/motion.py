@@ -113,8 +113,9 @@ def follow(stroke: Stroke, device: Device, pose: Floats, count: int, period: flo
         step = _step(stroke, way, path[-1][:3].tolist())
         if step is None:
             break
-        stroke, place = step
-        way = replace(way, safe=find_safe(stroke, device))
+        before, (stroke, place) = stroke, step
+        if (stroke.phase, stroke.image) != (before.phase, before.image):
+            way = replace(way, safe=find_safe(stroke, device))
         turn = _turn(stroke, path[-1][3:], place[2] >= way.safe - NEAR, period)
         path.append(np.array([*place, *turn]))
     return stroke, np.array(path)

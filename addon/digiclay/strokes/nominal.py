@@ -10,7 +10,6 @@ what the valves drive the pins to after the fingertip has left.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -184,6 +183,7 @@ def find_frame(stroke: Stroke, device: Device) -> tuple[float, float]:
 
 def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
     """Return what a stroke stamps, on the surface before it; where images meet, what goes farther."""
+    nominal = replace(nominal, count=len(stroke.samples))
     if stroke.stamp is None:
         return nominal
     (half, angle), first, last = find_frame(stroke, device), stroke.samples[0], stroke.samples[-1]
@@ -234,10 +234,36 @@ def find_undersides(
     return under
 
 
-def list_ghosts(strokes: tuple[Stroke, ...], device: Device, height: Floats) -> Iterator[Nominal]:
-    """Yield the nominal surface of each of a queue's strokes that has one, on pins at heights (n,), m."""
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """Stroke of a queue, and the nominal surface of it as far as it was drawn."""
+
+    stroke: Stroke
+    nominal: Nominal
+
+    def has_grown(self, stroke: Stroke, before: Floats) -> bool:
+        """Tell whether a stroke, on pins at heights (n,), m, is this one drawn on."""
+        own, count = self.stroke, self.nominal.count
+        same = own.number == stroke.number and own.images == stroke.images and own.turn is stroke.turn
+        same = same and own.samples[count - 1 :][:1] == stroke.samples[count - 1 :][:1]
+        return same and (self.nominal.before is before or np.array_equal(self.nominal.before, before))
+
+
+def find_ghosts(
+    strokes: tuple[Stroke, ...], device: Device, height: Floats, kept: tuple[Ghost, ...] = ()
+) -> tuple[Ghost, ...]:
+    """Return the ghosts of a queue's strokes that have one, on pins at heights (n,), m.
+
+    Those `kept` of an earlier look are drawn on, which takes less time than all of a path.
+    """
+    found: list[Ghost] = []
     for stroke in strokes:
         if stroke.brush in LIMITS or stroke.brush in STAMPS:
-            nominal = find_nominal(stroke, device, height if stroke.height is None else stroke.height)
+            before = height if stroke.height is None else stroke.height
+            same = [one.nominal for one in kept if one.has_grown(stroke, before)]
+            nominal = same[0] if same else find_nominal(stroke, device, before)
+            if nominal.count < len(stroke.samples):
+                nominal = extend(nominal, stroke, device)
+            found.append(Ghost(stroke, nominal))
             height = nominal.height
-            yield nominal
+    return tuple(found)

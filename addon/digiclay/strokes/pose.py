@@ -49,5 +49,11 @@ def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:
 
 def _multiply(first: Floats, second: Floats) -> Floats:
     """Return the rotation of a second quaternion followed by a first one."""
-    a, u, b, v = first[0], first[1:], second[0], second[1:]
-    return np.concatenate([[a * b - u @ v], a * v + b * u + np.cross(u, v)])
+    a, b, c, d = first.tolist()
+    w, x, y, z = second.tolist()
+    return np.array([
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y + c * w + d * x - b * z,
+        a * z + d * w + b * y - c * x,
+    ])  # fmt: skip

@@ -1,0 +1,156 @@
+"""Ghost of press strokes: the skin that the queue, and a path being laid, will leave, in the 3D views.
+
+It is there at once, translucent over all else, and goes where the pins have come to it. The views' own switch
+of their overlays hides it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import bridge
+from ..compat import bpy
+from ..core.base.arrays import Floats
+from ..core.model.layout import Grid, Layout
+from ..core.surface.formed import take_corners
+from ..sessions import running
+from ..sessions.running import Running
+from ..sessions.sculpting import find_device
+from ..strokes.nominal import Ghost, find_ghosts
+from ..strokes.stroke import Stroke
+from .brush import find_bed
+
+#: Colors of what is to be raised and lowered: blue and orange of Okabe and Ito, which all eyes tell apart.
+RAISED, LOWERED = np.array([0.0, 0.45, 0.70]), np.array([0.90, 0.62, 0.0])
+#: Where the light comes from, in the bed's space, and how dark a slope is that gets none.
+LIGHT, SHADE = np.array([-0.48, 0.36, 0.80]), 0.25
+#: Opacity, the way of a pin from which on it has that, m, and the least way that is drawn, m.
+OPACITY, OPAQUE, LEAST = 0.7, 1e-3, 0.1e-3
+#: A path that is being laid has another ghost after so many times as long as that took.
+REST = 3.0
+
+
+@dataclass
+class Drawn:
+    """What is drawn: ghosts of the strokes by the uid of their bed, and triangles."""
+
+    ghosts: dict[int, tuple[Ghost, ...]] = field(default_factory=dict)
+    #: Stroke along a path that is being laid, and the uid of its bed.
+    plan: tuple[int, Stroke] | None = None
+    #: Heights and tick that the triangles are of.
+    shown: tuple[Floats, int] | None = None
+    batch: Any = None
+    #: When the ghost of a path that is being laid may be found again, s.
+    ready: float = 0.0
+    handle: Any = None
+
+
+DRAWN = Drawn()
+
+
+def plan(uid: int, stroke: Stroke | None) -> None:
+    """Show what a stroke along a path that is being laid will leave on a bed; None: no longer."""
+    if stroke is None:
+        DRAWN.plan = None
+    elif time.perf_counter() >= DRAWN.ready:
+        DRAWN.plan = uid, stroke
+
+
+def find_surface(session: Running) -> Floats | None:
+    """Return the heights (n,), m, that the strokes of a session are to leave; None without any."""
+    planned = [DRAWN.plan[1]] if DRAWN.plan and DRAWN.plan[0] == session.uid else []
+    strokes, kept = (*session.strokes, *planned), DRAWN.ghosts.get(session.uid, ())
+    if not strokes:
+        DRAWN.ghosts.pop(session.uid, None)
+        return None
+    began = time.perf_counter()
+    ghosts = find_ghosts(strokes, find_device(session), session.state.row(0), kept)
+    DRAWN.ghosts[session.uid], took = ghosts, time.perf_counter() - began
+    DRAWN.ready = began + REST * took
+    return ghosts[-1].nominal.height if ghosts else None
+
+
+def find_colors(layout: Layout, ghost: Floats, height: Floats) -> Floats:
+    """Return colors and opacities (n, 4) of a surface (n,), m, that pins now at heights (n,), m, come to."""
+    table = ghost.reshape(layout.rows, layout.columns)
+    across, along = np.gradient(table, layout.row_spacing, layout.pitch)
+    normal = np.stack([-along, -across, np.ones_like(table)], axis=-1).reshape(-1, 3)
+    lit = (normal @ LIGHT / np.linalg.norm(normal, axis=1)).clip(0.0, 1.0)
+    way = ghost - height
+    color = np.where(way[:, None] > 0.0, RAISED, LOWERED) * (SHADE + (1.0 - SHADE) * lit[:, None])
+    opacity = OPACITY * (np.abs(way) / OPAQUE).clip(0.0, 1.0)
+    return np.column_stack([color, opacity])
+
+
+@lru_cache(maxsize=4)
+def _list_triangles(layout: Layout) -> NDArray[np.int32]:
+    """Return the triangles (k, 3) between the pins of a bed, counter-clockwise from above."""
+    cells = np.arange(layout.rows * layout.columns, dtype=np.int32).reshape(layout.rows, layout.columns)
+    first, second, third, fourth = (corner.ravel() for corner in take_corners(cells))
+    return np.concatenate([np.column_stack([first, second, third]), np.column_stack([first, third, fourth])])
+
+
+def _make_batch(grid: Grid, ghost: Floats, height: Floats) -> Any:
+    """Return the triangles of a surface (n,), m, where pins at heights (n,), m, have a way to it; or None."""
+    import gpu
+
+    triangles = _list_triangles(grid.layout)
+    moved = np.abs(ghost - height) > LEAST
+    chosen = np.ascontiguousarray(triangles[moved[triangles].any(axis=1)])
+    if not len(chosen):
+        return None
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    points = gpu.types.GPUVertBuf(shader.format_calc(), len(ghost))
+    place = np.column_stack([grid.positions, ghost]) * bridge.SCALE
+    points.attr_fill("pos", np.ascontiguousarray(place, np.float32))
+    points.attr_fill("color", np.ascontiguousarray(find_colors(grid.layout, ghost, height), np.float32))
+    return gpu.types.GPUBatch(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
+
+
+def _draw() -> None:
+    """Draw the ghosts of all sessions into a view."""
+    context = bpy.context
+    if not context.space_data.overlay.show_overlays:
+        return
+    for session in running.list_sessions():
+        bed, ghost = find_bed(context, session.uid), find_surface(session)
+        if bed is not None and ghost is not None and bed.visible_get():
+            _draw_surface(bed, session, ghost)
+
+
+def _draw_surface(bed: Any, session: Running, ghost: Floats) -> None:
+    """Draw a surface (n,), m, over a bed."""
+    import gpu
+
+    if DRAWN.shown is None or DRAWN.shown[0] is not ghost or DRAWN.shown[1] != session.tick:
+        DRAWN.shown = ghost, session.tick
+        DRAWN.batch = _make_batch(session.system.grid, ghost, session.state.row(0))
+    if DRAWN.batch is None:
+        return
+    gpu.state.blend_set("ALPHA")
+    gpu.state.face_culling_set("BACK")
+    try:
+        with gpu.matrix.push_pop():
+            gpu.matrix.multiply_matrix(bed.matrix_world)
+            DRAWN.batch.draw(gpu.shader.from_builtin("SMOOTH_COLOR"))
+    finally:
+        gpu.state.blend_set("NONE")
+        gpu.state.face_culling_set("NONE")
+
+
+def register() -> None:
+    """Draw ghosts in the 3D views from now on."""
+    DRAWN.handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
+
+
+def unregister() -> None:
+    """Draw no more of them, and forget what was drawn."""
+    bpy.types.SpaceView3D.draw_handler_remove(DRAWN.handle, "WINDOW")
+    DRAWN.ghosts.clear()
+    DRAWN.plan, DRAWN.shown, DRAWN.batch, DRAWN.handle = None, None, None, None

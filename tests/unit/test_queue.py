@@ -1,0 +1,144 @@
+"""Queue of press strokes: the same heights in whatever ticks, and the ghost that is shown of it at once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from digiclay.core.base.arrays import Floats
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
+from digiclay.settings.devices import BEDS, make_scene
+from digiclay.strokes.nominal import find_ghosts
+from digiclay.strokes.stroke import Brush, draw, lay_path, lay_ring, make_images, start
+
+from tests.hand import TICK, finish, heights, let_go
+
+#: Rows and columns of a part of a bed, and its name, arrangement and method.
+PARTS = {
+    "Method I on the paper's bed": (25, "paper", "aligned", "virtual_master"),
+    "Method III": (41, "design", "aligned", "hybrid"),
+    "Method I, rows shifted": (41, "design", "staggered", "virtual_master"),
+    "Method II on fine pins": (61, "fine", "aligned", "cell_states"),
+    "without a blister": (41, "design", "aligned", "plastic"),
+}
+
+
+def begin(name: str) -> Running:
+    """Return a session on a part of a bed."""
+    count, bed, arrangement, method = PARTS[name]
+    layout = Layout(count, count, BEDS[bed].pitch, arrangement=arrangement)
+    above = np.array([0.0, 0.0, 46e-3, *LEVEL])
+    scene = make_scene("paper", layout, method, BEDS[bed].share)
+    return sculpting.begin_session(7, "Bed", scene, above)[0]
+
+
+def play(brush: Brush, interval: float, moves: int, waits: int = 0) -> Floats:
+    """Draw two strokes, so many moves a tick, with ticks of an interval, s; return the heights, m."""
+    session, now = begin("Method III"), 0.0
+
+    def tick(count: int = 1) -> None:
+        nonlocal session, now
+        for _ in range(count):
+            now += TICK
+            session = sculpting.advance(session, session.pose, now, 100, interval=interval)
+
+    tick(waits)
+    for number, y in enumerate((-6e-3, 4e-3), 1):
+        session, _ = queue_stroke(session, -15e-3, y, 4e-3, brush=brush)
+        for index, x in enumerate(np.linspace(-15e-3, 15e-3, 30)[1:].tolist()):
+            session = change_stroke(session, number, partial(draw, x=x, y=y + 0.1 * x, depth=4e-3))
+            tick(index % moves == 0)
+        session = let_go(session, number)
+    for _ in range(2000):
+        tick(bool(session.strokes))
+    assert session.finished_strokes == 2
+    return heights(session)
+
+
+@pytest.mark.parametrize("brush", [Brush.LOWER, Brush.RAISE])
+def test_the_same_path_leaves_the_same_heights_whatever_the_ticks(brush: Brush) -> None:
+    formed = play(brush, 1.0 / 30.0, 1)
+    assert np.ptp(formed) > 3.5e-3
+    for interval, moves, waits in ((1e-6, 1, 0), (0.1, 7, 0), (1.0, 30, 0), (1.0 / 30.0, 2, 9)):
+        # Between two strokes the pins have come to rest or not, within the tolerance of their valves.
+        np.testing.assert_allclose(play(brush, interval, moves, waits), formed, rtol=0, atol=5e-6)
+
+
+@pytest.mark.parametrize("periods", [1, 7, 64])
+def test_a_stroke_leaves_the_same_bits_however_many_periods_are_simulated_at_a_time(periods: int) -> None:
+    session, number = queue_stroke(begin("Method III"), 0.0, 0.0, 3e-3, make_images("X"), Brush.RAISE)
+    ring = lay_ring((4e-3, 0.0), (12e-3, 5e-3))
+    session = change_stroke(session, number, partial(lay_path, points=ring))
+    whole = replace(session, state=session.state.copy())
+    whole = finish(whole)
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.pose, periods)
+    assert np.array_equal(heights(session), heights(whole))
+
+
+#: Strokes of a queue by their bed: brush, amount, mm, path, mm, and symmetry.
+WAVE = [(x, 4.0 * np.sin(0.3 * x)) for x in np.linspace(-18.0, 18.0, 40)]
+SHIFTED = 1e3 * lay_ring((5e-3, 3e-3), (17e-3, 3e-3))
+QUEUES = {
+    "a valley across a ridge": [
+        (Brush.RAISE, 5.0, WAVE, "NONE"),
+        (Brush.LOWER, 3.0, [(0, -20), (3, 20)], "NONE"),
+    ],
+    "a ring, mirrored": [(Brush.RAISE, 4.0, SHIFTED, "XY")],
+    "lines turned about the middle": [(Brush.LOWER, 3.0, [(4, 2), (17, 6)], "RADIAL")],
+    "a ridge that is leveled": [
+        (Brush.RAISE, 5.0, WAVE, "NONE"),
+        (Brush.LEVEL, 1.0, [(-20, 0), (20, 0)], "NONE"),
+    ],
+    "a leaning finger": [(Brush.LOWER, 2.0, WAVE, "X")],
+}
+
+
+RIDGE, RINGS, TURNED, LEVEL_RIDGE, LEANING = QUEUES
+CASES = [
+    *(("Method III", queue) for queue in QUEUES),
+    *(("Method I on the paper's bed", queue) for queue in (RIDGE, RINGS)),
+    *(("Method I, rows shifted", queue) for queue in (TURNED, LEANING)),
+    ("Method II on fine pins", LEVEL_RIDGE),
+    *(("without a blister", queue) for queue in (TURNED, LEANING)),
+]
+
+
+@pytest.mark.parametrize(("part", "queue"), CASES)
+def test_the_ghost_agrees_with_the_result_to_a_millimeter_over_most_pins(part: str, queue: str) -> None:
+    session = begin(part)
+    lean = (0.3, 0.2) if queue == LEANING else (0.0, 0.0)
+    for number, (brush, amount, path, symmetry) in enumerate(QUEUES[queue], 1):
+        places = 1e-3 * np.array(path)
+        stroke = start(number, *places[0], 1e-3 * amount, make_images(symmetry, 3), brush, lean=lean)
+        session = replace(session, strokes=(*session.strokes, lay_path(stroke, places)))
+    before = heights(session)
+    ghost = find_ghosts(session.strokes, find_device(session), before)[-1].nominal.height
+    formed = heights(finish(session, 3000))
+    # Of the pins that move, not of all: those far from a stroke agree anyway.
+    moved = np.maximum(np.abs(ghost - before), np.abs(formed - before)) > 0.1e-3
+    # Pins that only give way do so up to a force: 1.1 mm less than the fingertip comes down.
+    most = 1.2e-3 if part == "without a blister" else 1e-3
+    assert (np.abs(formed - ghost)[moved] < most).mean() >= 0.95
+    assert moved.sum() > 30
+
+
+@pytest.mark.parametrize("brush", [Brush.LOWER, Brush.RAISE])
+def test_the_time_that_a_queue_still_takes_is_known_roughly(brush: Brush) -> None:
+    session = begin("Method III")
+    for x in (-10e-3, 10e-3):
+        session, number = queue_stroke(session, x, -25e-3, 4e-3, make_images("X"), brush)
+        session = change_stroke(session, number, partial(lay_path, points=[(x, -25e-3), (x, 25e-3)]))
+    assert sculpting.estimate_time(session) > 0.0
+    session = sculpting.follow_finger(session, session.pose, 1)
+    expected, before = sculpting.estimate_time(session), session.state.period
+    done = finish(session)
+    taken = (done.state.period - before) * session.system.period
+    assert 0.6 * taken < expected < 1.6 * taken
+    assert sculpting.estimate_time(done) == 0.0

@@ -1,0 +1,143 @@
+"""Draws faster than strokes are formed, from outside Blender: a queue, its end at once, Esc, undo, load."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import bpy
+
+from tests.window.hand_strokes import (
+    act,
+    brush,
+    done,
+    drag,
+    finish,
+    hand,
+    note,
+    on_the_screen,
+    prepare,
+    reset,
+    to,
+)
+
+#: Ends of three quick strokes, mm, drawn one after the other in so many moves, within so long each, s.
+LINES = (((-27.0, 20.0), (27.0, 20.0)), ((-27.0, 0.0), (27.0, 0.0)), ((-27.0, -20.0), (27.0, -20.0)))
+DURATION, RATE = 0.25, 120
+#: Wave of a single stroke, drawn under different loads, mm.
+WAVE = ((-27.0, -9.0), (-9.0, 12.0), (9.0, -12.0), (27.0, 9.0))
+#: Redraws a second, and how long something else takes between two, s.
+LOADS = {"alone": (30, 0.0), "few redraws": (4, 0.0), "a load": (30, 0.15)}
+
+
+def session(blender: Any) -> Any:
+    """Return the session of the only bed."""
+    return blender.part("sessions.running").find(blender.beds()[0])
+
+
+def draw(blender: Any, *paths: tuple[tuple[float, float], ...]) -> Any:
+    """Start a hand that draws paths one after the other, without a pause."""
+    words = []
+    for path in paths:
+        places = [on_the_screen(blender, *place) for place in path]
+        words += [to(places[0], 0.02), "mousedown 1"]
+        words += [drag(start, end, DURATION / (len(places) - 1), RATE) for start, end in pairwise(places)]
+        words += ["mouseup 1"]
+    return hand(*words)
+
+
+def drawn(blender: Any, *paths: Any) -> Iterator[float | None]:
+    """Draw paths, and wait until the hand is done."""
+    yield from done(blender, draw(blender, *paths))
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what an impatient hand does."""
+    yield from prepare(blender, "TOP", bed="paper")
+    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "click 1")  # the session begins
+    yield from reset(blender)
+    yield from queue(blender)
+    yield from taken_back(blender)
+    brush(blender).brush, brush(blender).height = "RAISE", 8.0
+    yield from haste(blender)
+    brush(blender).brush = "LOWER"
+    for name, (rate, load) in LOADS.items():
+        yield from under_load(blender, name, rate, load)
+
+
+def queue(blender: Any) -> Iterator[float | None]:
+    """Draw three strokes at once; undo takes them back one by one."""
+    process = draw(blender, *LINES)
+    yield from blender.until(lambda: process.poll() is not None)
+    ended, simulated = time.perf_counter(), session(blender).state.period
+    yield from blender.rounds()
+    blender.SEEN["left"] = len(session(blender).strokes)
+    while session(blender).strokes:
+        yield 0.02
+    spent = time.perf_counter() - ended
+    simulated = (session(blender).state.period - simulated) * session(blender).system.period
+    blender.SEEN["time"] = {"after the hand": spent, "simulated": simulated}
+    yield from blender.settle()
+    note(blender, "formed")
+    for count in range(1, 4):
+        yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "key ctrl+z sleep 0.2")
+        note(blender, f"undone {count}")
+    yield from reset(blender)
+
+
+def haste(blender: Any) -> Iterator[float | None]:
+    """Have the strokes finished at once; then let Esc end that, and then again have them finished."""
+    loop = blender.part("live.loop").LOOP
+    for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.7 key Escape")):
+        yield from drawn(blender, *LINES)
+        blender.shot("queue_ghost")
+        yield from done(blender, hand(keys))
+        yield from blender.until(lambda: not loop.in_haste)
+        note(blender, name)
+        blender.SEEN[name]["left"] = len(session(blender).strokes)
+        yield from blender.until(lambda: not session(blender).strokes)
+        yield from blender.settle()
+        note(blender, f"{name}, formed")
+        yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "key ctrl+z sleep 0.2")
+        note(blender, f"{name}, undone")
+        yield from reset(blender)
+
+
+def taken_back(blender: Any) -> Iterator[float | None]:
+    """Take back the last stroke in the midst of the queue."""
+    process = hand("sleep 0.01")
+    yield from drawn(blender, *LINES)
+    yield from act(blender, "key Escape")
+    yield from finish(blender, process)
+    note(blender, "one taken back")
+    yield from reset(blender)
+
+
+def under_load(blender: Any, name: str, rate: int, load: float) -> Iterator[float | None]:
+    """Draw the same path while Blender redraws at a rate, and something else keeps it busy."""
+    preferences = blender.preferences()
+    preferences.redraw_rate = rate
+
+    def burn() -> float | None:
+        until = time.perf_counter() + load
+        while time.perf_counter() < until:
+            pass
+        return None if not preferences.redraw_rate else 0.01
+
+    if load:
+        bpy.app.timers.register(burn)
+    process = draw(blender, WAVE)
+    yield from blender.until(lambda: bool(session(blender).strokes))
+    path: list[tuple[float, float]] = []
+    while session(blender).strokes:
+        path = [(sample.x, sample.y) for sample in session(blender).strokes[0].samples]
+        yield 0.02
+    yield from done(blender, process)
+    if load:
+        bpy.app.timers.unregister(burn)
+    yield from blender.settle()
+    note(blender, name)
+    blender.SEEN[name] |= {"path": path, "exact": session(blender).state.row(0).tolist()}
+    yield from reset(blender)

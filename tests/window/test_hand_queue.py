@@ -1,0 +1,56 @@
+"""An impatient hand: its strokes do not wait for the clock, are finished at once, and taken back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.window.blender_window import FORMED, Seen, down
+from tests.window.hand_queue import LINES, LOADS
+
+PLAYED = {"script": "hand_queue.py", "size": (800, 560), "by_hand": True}
+#: Rows of the bed that lie on the lines, 3 mm a pin, and the columns looked at.
+ROWS = [round((y + 36) / 3) for ((_, y), _) in LINES]
+MIDDLE = slice(6, 19)
+
+
+def formed(seen: Seen, name: str) -> list[bool]:
+    """Return which of the lines are formed in a step."""
+    return [bool((np.abs(down(seen, name)[row, MIDDLE]) > FORMED).all()) for row in ROWS]
+
+
+def test_strokes_drawn_at_once_are_all_formed_and_undone_one_by_one(seen: Seen) -> None:
+    assert seen["left"] >= 2  # the hand was faster
+    assert formed(seen, "formed") == [True] * 3
+    for count in (1, 2, 3):
+        assert formed(seen, f"undone {count}") == [True] * (3 - count) + [False] * count
+
+
+def test_strokes_do_not_wait_for_the_wall_clock(seen: Seen) -> None:
+    # Software draws for most of the time, and the machine is shared: more than the clock's time is enough.
+    assert seen["time"]["simulated"] > seen["time"]["after the hand"]
+
+
+def test_strokes_are_finished_at_once_each_with_its_undo_step(seen: Seen) -> None:
+    assert seen["finished"]["left"] == 0
+    assert formed(seen, "finished") == formed(seen, "finished, formed") == [True] * 3
+    assert formed(seen, "finished, undone") == [True, True, False]
+
+
+def test_esc_lets_strokes_go_on_that_are_being_finished_at_once(seen: Seen) -> None:
+    assert seen["let go on"]["left"] >= 1
+    assert seen["let go on"]["sessions"] == 1
+    assert formed(seen, "let go on, formed") == [True] * 3
+    assert formed(seen, "let go on, undone") == [True, True, False]
+
+
+def test_esc_in_the_midst_takes_back_the_last_stroke(seen: Seen) -> None:
+    assert formed(seen, "one taken back") == [True, True, False]
+
+
+@pytest.mark.parametrize("name", list(LOADS)[1:])
+def test_the_same_path_leaves_the_same_heights_whatever_the_load(seen: Seen, name: str) -> None:
+    one, other = seen["alone"], seen[name]
+    assert one["path"] == other["path"]
+    assert np.array_equal(one["exact"], other["exact"])
+    assert np.ptp(one["exact"]) > 1e-3
