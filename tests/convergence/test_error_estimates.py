@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.scene_source import SAMPLES
+from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.accuracy import SHARE, Errors, estimate_errors, has_every_command
 from digiclay.core.session.run_scene import run
 
@@ -69,6 +70,28 @@ def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summar
     assert estimate_errors(scene, result.history, stopped=lambda: True) is None
     said = result.with_errors(Errors(2e-6, 5e-4, 1e-3)).summary()
     assert said.endswith("height error about 2 µm, force error about 0.5 mN")
+
+
+#: Heights of the fingertip above the bed's floor, mm, and their times, s, in a run with steps of 20 ms.
+WAYS = {
+    "presses and stays": ([(0.0, 41.0), (0.1, 38.5), (0.4, 38.5)], False),
+    "taps within steps": (
+        [(0.0, 41.0), (0.1, 38.5), (0.205, 41.0), (0.212, 37.6), (0.219, 41.0), (0.4, 41.0)],
+        True,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_an_estimate_that_cannot_see_a_contact_within_a_step_says_so(name: str) -> None:
+    points, unseen = WAYS[name]
+    path = [{"time": time, "position": [0.7e-3, 0.4e-3, 1e-3 * z]} for time, z in points]
+    times = {"control_period": 20e-3, "physics_step": 20e-3, "duration": 0.4}
+    bed = {"layout": {"rows": 13, "columns": 13}, "simulation": times, "recorder": {}}
+    result = run(resolve({**bed, "trajectory": {"interpolation": "linear", "waypoints": path}}))
+    known = result.estimate_errors()
+    assert known is not None
+    assert ("shorter simulation.physics_step" in known.summary()) == unseen
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-7])

@@ -8,6 +8,7 @@ which follows it for a short stretch now and then.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,7 +24,7 @@ from ..engine.state import State
 from ..engine.system import System
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Disc, Grid
-from ..model.trajectory import interpolate_poses
+from ..model.trajectory import interpolate_poses, sample_poses
 from ..scene.assembly import assemble
 from ..scene.schema import Scene, Simulation
 
@@ -37,6 +38,8 @@ SHARE = 4.0 / 3.0
 #: Control periods of a live session's stretch, and from the end of one to the start of the next. A period of
 #: the reference takes three times one of the session: one is done in so many, so that no tick is slow.
 STRETCH, PAUSE, SPREAD = 20, 180, 4
+#: Parts of a physics step in which a path is looked at, and steps looked at together.
+PARTS, BLOCK = 16, 4096
 
 
 @dataclass(frozen=True)
@@ -153,6 +156,24 @@ def estimate_errors(
         if stopped and stopped():
             return None
     return Errors.estimate(largest)
+
+
+def measure_bends(scene: Scene) -> float:
+    """Return how far fingertips leave the straight way within a physics step, m.
+
+    A contact that begins and ends there is seen neither by the run nor, in full, by its reference.
+    """
+    step, largest = scene.simulation.physics_step, 0.0
+    count = math.ceil(scene.simulation.duration / step)
+    for first in range(0, count, BLOCK):
+        steps = min(BLOCK, count - first)
+        times = (first + np.arange(steps * PARTS + 1) / PARTS) * step
+        place = sample_poses(scene.trajectories(), times)[..., :3]
+        ways = np.stack([place[part : part + steps * PARTS : PARTS] for part in range(PARTS)])
+        part = np.arange(PARTS)[:, None, None, None] / PARTS
+        straight = ways[0] + part * (place[PARTS::PARTS] - ways[0])
+        largest = max(largest, float(np.linalg.norm(ways - straight, axis=-1).max()))
+    return largest
 
 
 def start(scene: Scene) -> ErrorMonitor | None:
