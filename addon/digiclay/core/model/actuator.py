@@ -70,5 +70,8 @@ class Actuator(Parameters):
 
     def rate(self, flow: Floats, height: Floats) -> Floats:
         """Return dH/dt = q / A_a, m/s (equation 1), of flows q, m³/s, in; none goes into an end stop."""
+        speed: Floats = flow / self.area
+        if height.size and height.min() > 0.0 and height.max() < self.stroke:
+            return speed
         inward = ((height >= self.stroke) & (flow > 0.0)) | ((height <= 0.0) & (flow < 0.0))
-        return np.where(inward, 0.0, flow / self.area)
+        return np.where(inward, 0.0, speed)

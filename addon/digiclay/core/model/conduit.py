@@ -26,6 +26,10 @@ class Conduit(Parameters):
         return 128.0 * fluid.dynamic_viscosity * self.length / (math.pi * self.diameter**4)
 
 
+#: Keeps a shut valve without a drop from a division by 0.
+TINY = float(np.finfo(float).tiny)
+
+
 @dataclass(frozen=True)
 class OrificeAndConduit(Flow):
     """Valve and conduit in series: the drops add, the flow is one.
@@ -53,8 +57,14 @@ class OrificeAndConduit(Flow):
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return Q/ΔP of the series, m³/(s Pa), of openings K under drops over valve and conduit, Pa."""
-        a = self.valve.turbulent * np.abs(opening)
-        ra = self.resistance * a
-        turbulent = 2.0 * a / (ra + np.sqrt(ra * ra + 4.0 * np.abs(drop)) + np.finfo(float).tiny)
-        laminar: Floats = self.laminar_conductance(opening)
-        return np.minimum(laminar, turbulent)
+        # 2 a / (R a + sqrt((R a)² + 4 |ΔP|)) with a of the open valve.
+        turbulent: Floats = self.valve.turbulent * np.abs(opening)
+        ra = self.resistance * turbulent
+        root = 4.0 * np.abs(drop)
+        root += ra * ra
+        np.sqrt(root, root)
+        root += ra
+        root += TINY
+        turbulent *= 2.0
+        turbulent = turbulent / root
+        return np.minimum(self.laminar_conductance(opening), turbulent, out=turbulent)

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Floats
 from .actuator import Actuator, Supply
 from .interfaces import Flow, Lag
-from .touch import Touch, compute_force
+from .touch import Touch, compute_force, relax_force
 
 #: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
 GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
@@ -86,14 +86,16 @@ def find_contact_force(cell: Cell, y: Floats, under: Floats) -> Floats:
 def compute_rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     """Return dy/dt of rows y (r, n) under undersides (k,), m, and held valve commands (n,)."""
     height, lag, pulp = y[0], y[cell.lag_rows], y[cell.pulp_rows, : under.size]
-    pressure = np.zeros_like(height)
     change = np.zeros_like(y)
-    if cell.touch and under.size:
-        pressure[: under.size] = cell.actuator.pressure(find_contact_force(cell, y, under))
-        tension = cell.touch.contact.tension(height[: under.size] - under)
-        change[cell.pulp_rows, : under.size] = cell.touch.pulp.rate(pulp, tension)
     opening = cell.lag.opening(lag, command)
-    drop = cell.supply.pressure(opening) - pressure
+    drop: Floats = cell.supply.pressure(opening)
+    if cell.touch and under.size:
+        tension = cell.touch.contact.tension(height[: under.size] - under)
+        if len(pulp):
+            change[cell.pulp_rows, : under.size] = cell.touch.pulp.rate(pulp, tension)
+        # The pressure of the reservoir may be one number for all pins.
+        drop = np.broadcast_to(drop, height.shape).copy()
+        drop[: under.size] -= cell.actuator.pressure(relax_force(cell.touch, tension, pulp))
     change[0] = cell.actuator.rate(cell.flow.flow(opening, drop), height)
     change[cell.lag_rows] = cell.lag.rate(lag, command)
     return change

@@ -110,8 +110,12 @@ def join_paths(paths: Sequence[FingerPath]) -> FingerPath:
 
 def compute_force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
     """Return ``f_d max(T - Σ ĉ_i z_i, 0)``, N, of pin tops (k,), m, undersides (k,), m, and filters z_i."""
-    none, share = touch.constants[height.shape]
-    tension = touch.contact.tension(height - under)
+    return relax_force(touch, touch.contact.tension(height - under), filters)
+
+
+def relax_force(touch: Touch, tension: Floats, filters: Floats) -> Floats:
+    """Return the force, N, of tensions T (k,), N, and filters z_i, in the array of the tensions."""
+    none, share = touch.constants[tension.shape]
     tension -= touch.pulp.relaxed(filters)
     np.maximum(tension, none, out=tension)
     tension *= share
