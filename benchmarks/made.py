@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import radians
 from pathlib import Path
 
@@ -34,23 +35,85 @@ from .report import Report, Steps, tabulate
 Relief = Callable[[Floats, Floats], Floats]
 Corners = Sequence[tuple[float, float]]
 
-#: Letter A without serifs: outlines of its left leg, its right leg and its bar, and its depth.
-LETTER_A: tuple[Corners, ...] = (
-    ((-46.0, -53.0), (-34.0, -53.0), (6.0, 53.0), (-6.0, 53.0)),
-    ((46.0, -53.0), (34.0, -53.0), (-6.0, 53.0), (6.0, 53.0)),
-    ((-28.0, -17.5), (28.0, -17.5), (28.0, -6.5), (-28.0, -6.5)),
-)
-LETTER_DEPTH = 5.0
-#: Half of a torus: radius of its center line, and of its tube.
-RING, TUBE = 45.0, 8.0
+#: Section of a stroke by the bed's fingertip, and by a stylus of 6 mm: half its floor or top, and half of all.
+TIP, STYLUS = (3.0, 7.5), (2.25, 5.625)
+
+
+@dataclass(frozen=True)
+class Line:
+    """Drawn line: its corners, its height above what it is drawn on, and its section, mm; closed: an area."""
+
+    corners: Corners
+    height: float
+    section: tuple[float, float] = TIP
+    area: bool = False
+
+    def evaluate(self, x: Floats, y: Floats) -> Floats:
+        """Return heights at some places: even up to the flat part, and then down to nothing."""
+        sides = pairwise(self.corners) if len(self.corners) > 1 else [(*self.corners, *self.corners)]
+        far = np.min([_find_distance(start, end, x, y) for start, end in sides], axis=0)
+        if self.area:
+            far = np.where(_lies_inside(self.corners, x, y), 0.0, far)
+        flat, half = self.section
+        return np.asarray(self.height * np.clip((half - far) / (half - flat), 0.0, 1.0))
+
+
+def _arc(x: float, y: float, radius: float, start: float, end: float) -> Corners:
+    """Return the corners of an arc from angle to angle, degrees."""
+    angles = np.radians(np.linspace(start, end, 1 + max(2, round(abs(end - start)))))
+    return [(x + radius * np.cos(a), y + radius * np.sin(a)) for a in angles.tolist()]
+
+
+def _mirror(*lines: Line) -> list[Line]:
+    """Return lines and their mirror images."""
+    return [replace(line, corners=[(s * x, y) for x, y in line.corners]) for line in lines for s in (1, -1)]
+
+
+def _draw_r(height: float) -> list[Line]:
+    """Stem, bowl and leg of a letter R."""
+    bowl = [(-28.0, 50.0), *_arc(4.0, 25.0, 25.0, 90.0, -90.0), (-28.0, 0.0)]
+    return [Line(part, height) for part in ([(-28.0, -50.0), (-28.0, 50.0)], bowl, [(4.0, 0.0), (30.0, -50.0)])]
+
+
+#: Letter A without serifs, of one depth.
+LETTER_A = [
+    Line([(-40.0, -50.0), (0.0, 50.0), (40.0, -50.0)], -5.0), Line([(-25.2, -12.0), (25.2, -12.0)], -5.0),
+]  # fmt: skip
+#: Spiral whose turns are 18 mm apart: 400 mm between its first and its last radius.
+SPIRAL = [(r * np.cos(a), r * np.sin(a)) for r in np.linspace(4.0, 48.04, 1000) for a in (2 * np.pi * (r - 4) / 18,)]
+#: Leaf between two arcs from tip to tip, midrib with a stalk, and veins.
+LEAF = [
+    *_mirror(Line(_arc(-31.6, 2.5, 65.6, -61.2, 61.2), 5.0, STYLUS)),
+    Line([(0.0, 60.0), (0.0, -68.0)], 5.0, STYLUS),
+    *_mirror(*(Line(vein, 3.0, STYLUS) for vein in (
+        [(0.0, -30.0), (23.0, -6.0)], [(0.0, -5.0), (23.0, 19.0)], [(0.0, 20.0), (16.0, 38.0)]))),
+]  # fmt: skip
+#: Coin: rim, star of five points, beads.
+STAR = [(38.0 * np.sin(a), 38.0 * np.cos(a)) for a in np.radians(144.0 * np.arange(6)).tolist()]
+COIN = [
+    Line(_arc(0.0, 0.0, 62.0, 0.0, 360.0), 5.0), Line(STAR, 4.0, STYLUS),
+    *(Line([bead], 3.0, STYLUS) for bead in _arc(0.0, 0.0, 46.0, 15.0, 345.0)[::30]),
+]  # fmt: skip
+SMILEY = [
+    Line(_arc(0.0, 0.0, 52.0, 0.0, 360.0), 6.0), *_mirror(Line([(18.0, 22.0), (18.0, 12.0)], -5.0)),
+    Line(_arc(0.0, 0.0, 29.0, 205.0, 335.0), -5.0),
+]  # fmt: skip
+#: Head in profile: its contour; on it an ear, an eye, a mouth and three waves of hair.
+HEAD = [
+    (-8, -60), (-12, -44), (-26, -41), (-34, -35), (-31, -28), (-37, -23), (-33, -19.5), (-38, -15), (-35, -11),
+    (-48, -6), (-36, 12), (-39, 19), (-36, 34), (-23, 50), (0, 57), (22, 52), (38, 36), (42, 16), (34, -6),
+    (26, -18), (24, -40), (28, -60), (-8, -60),
+]  # fmt: skip
+PORTRAIT = (
+    [Line(HEAD, 5.0, area=True)],
+    [
+        Line(_arc(8.0, 2.0, 9.0, 120.0, -120.0), 2.5, STYLUS),
+        Line([(-26.0, 8.0), (-20.0, 9.0)], -3.0, STYLUS), Line([(-34.0, -19.5), (-22.0, -20.0)], -2.0, STYLUS),
+        *(Line(_arc(4.0, 6.0, *wave), -2.0, STYLUS) for wave in ((22, 130, 5), (32, 125, 5), (42, 115, 20))),
+    ],
+)  # fmt: skip
 #: Paraboloid of a bowl: radius and depth; its rim: radius, height and half its breadth.
 BOWL, RIM = (44.0, 12.0), (48.0, 5.0, 10.0)
-#: Leaf between two arcs from tip to tip, each so far from the midrib at most; half the breadth of its lines.
-TIPS, BULGE, LINE = ((0.0, -55.0), (0.0, 60.0)), 34.0, 6.0
-#: Heights of outline and midrib, and of the veins; the midrib continues as a stalk to here.
-OUTLINE_HEIGHT, VEIN_HEIGHT, STALK = 5.0, 3.0, -70.0
-#: Beginnings and ends of the veins on the right.
-VEINS = (((0.0, -30.0), (24.0, -5.0)), ((0.0, -5.0), (24.0, 20.0)), ((0.0, 20.0), (18.0, 40.0)))
 
 
 def find_relief(name: str, x: Floats, y: Floats) -> Floats:
@@ -58,22 +121,24 @@ def find_relief(name: str, x: Floats, y: Floats) -> Floats:
     return 1e-3 * RELIEFS[name](1e3 * x, 1e3 * y)
 
 
-def _letter_a(x: Floats, y: Floats) -> Floats:
-    """Cut to one depth within the outlines."""
-    inside = np.any([_lies_inside(part, x, y) for part in LETTER_A], axis=0)
-    return np.where(inside, -LETTER_DEPTH, 0.0)
+def _drawn(*layers: Sequence[Line]) -> Relief:
+    """Return the relief of lines: where those of a layer cross the greater counts; layers add up."""
+
+    def relief(x: Floats, y: Floats) -> Floats:
+        """Add up the layers."""
+        heights = [np.array([line.evaluate(x, y) for line in layer]) for layer in layers]
+        return np.asarray(sum(one.max(axis=0).clip(0.0) + one.min(axis=0).clip(None, 0.0) for one in heights))
+
+    return relief
 
 
 def _lies_inside(corners: Corners, x: Floats, y: Floats) -> NDArray[np.bool_]:
-    """Return whether places are inside a convex polygon."""
-    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
-    turns = [(bx - ax) * (y - ay) - (by - ay) * (x - ax) for (ax, ay), (bx, by) in sides]
-    return np.asarray(np.all(np.array(turns) >= 0.0, axis=0) | np.all(np.array(turns) <= 0.0, axis=0))
-
-
-def _ring(x: Floats, y: Floats) -> Floats:
-    """Upper half of a torus."""
-    return np.sqrt(np.clip(TUBE**2 - (np.hypot(x, y) - RING) ** 2, 0.0, None))
+    """Return whether places are inside a closed polygon: a ray from there crosses it an odd number of times."""
+    inside = np.zeros(x.shape, np.bool_)
+    for (ax, ay), (bx, by) in pairwise(corners):
+        if ay != by:
+            inside ^= ((ay > y) != (by > y)) & (x < ax + (bx - ax) * (y - ay) / (by - ay))
+    return inside
 
 
 def _crater(x: Floats, y: Floats) -> Floats:
@@ -81,22 +146,6 @@ def _crater(x: Floats, y: Floats) -> Floats:
     far, (radius, depth), (at, height, breadth) = np.hypot(x, y), BOWL, RIM
     bowl = -depth * np.clip(1.0 - (far / radius) ** 2, 0.0, None)
     return bowl + height * _bump((far - at) / breadth)
-
-
-def _leaf(x: Floats, y: Floats) -> Floats:
-    """Outline, midrib and veins as round lines."""
-    side = np.abs(x)
-    (_, foot), (_, top) = TIPS
-    half, middle = (top - foot) / 2.0, (top + foot) / 2.0
-    radius = (half**2 + BULGE**2) / (2.0 * BULGE)
-    arc = np.abs(np.hypot(side + radius - BULGE, y - middle) - radius)
-    # Beyond the tips the nearest place of the arc is a tip.
-    tips = np.minimum(np.hypot(side, y - foot), np.hypot(side, y - top))
-    arc = np.where((y >= foot) & (y <= top), arc, tips)
-    lines = [OUTLINE_HEIGHT * _bump(arc / LINE)]
-    lines.append(OUTLINE_HEIGHT * _bump(_find_distance((0.0, STALK), TIPS[1], side, y) / LINE))
-    lines += [VEIN_HEIGHT * _bump(_find_distance(*vein, side, y) / LINE) for vein in VEINS]
-    return np.asarray(np.max(lines, axis=0))
 
 
 def _face(x: Floats, y: Floats) -> Floats:
@@ -118,14 +167,26 @@ def _bump(far: Floats) -> Floats:
 def _find_distance(start: tuple[float, float], end: tuple[float, float], x: Floats, y: Floats) -> Floats:
     """Return how far places are from a line between two places."""
     along, across = end[0] - start[0], end[1] - start[1]
-    share = ((x - start[0]) * along + (y - start[1]) * across) / (along**2 + across**2)
+    square = along**2 + across**2
+    share = ((x - start[0]) * along + (y - start[1]) * across) / (square or 1.0)
     share = np.clip(share, 0.0, 1.0)
     return np.hypot(x - start[0] - share * along, y - start[1] - share * across)
 
 
 RELIEFS: dict[str, Relief] = {
-    "letter_a": _letter_a, "ring": _ring, "crater": _crater, "leaf": _leaf, "face": _face,
-}  # fmt: skip
+    "letter_a": _drawn(LETTER_A),
+    "r_lowered": _drawn(_draw_r(-4.0)),
+    "r_raised": _drawn(_draw_r(8.0)),
+    "smiley": _drawn(SMILEY),
+    "spiral": _drawn([Line(SPIRAL, -6.0)]),
+    "ring": _drawn([Line(_arc(0.0, 0.0, 45.0, 0.0, 360.0), 8.0)]),
+    "lines": _drawn([Line([(-50.0, y), (50.0, y)], -3.0) for y in range(-54, 60, 12)]),
+    "coin": _drawn(COIN),
+    "portrait": _drawn(*PORTRAIT),
+    "crater": _crater,
+    "leaf": _drawn(LEAF),
+    "face": _face,
+}
 
 
 #: The things: each has recorded strokes and an intended relief.

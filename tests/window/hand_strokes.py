@@ -16,8 +16,9 @@ HALF = 27.0
 STROKES = ((0.3, 125), (3.0, 60))
 #: Places of three taps within a second, mm.
 TAPS = ((-24.0, 24.0), (0.0, 24.0), (24.0, 24.0))
-#: The strokes of the letter A of the gallery.
-LETTER = Path(__file__).parents[2] / "benchmarks" / "strokes" / "letter_a.toml"
+#: Strokes of the gallery, and what is formed of it.
+DRAWN = Path(__file__).parents[2] / "benchmarks" / "strokes"
+THINGS = ("letter_a", "r_lowered", "smiley", "spiral", "coin", "portrait")
 
 Pixel = tuple[int, int]
 Place = tuple[float, float]
@@ -171,7 +172,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from pie_menu(blender)
     yield from taken_back(blender)
     yield from act(blender, "key Escape")
-    yield from letter(blender)
+    yield from things(blender)
 
 
 def message(blender: Any) -> Iterator[float | None]:
@@ -258,13 +259,28 @@ def follow(blender: Any, recorded_stroke: Any) -> str:
     return " ".join([*words, "mouseup 1"])
 
 
-def letter(blender: Any) -> Iterator[float | None]:
-    """Form the letter on an empty bed, stroke by stroke, with the brush of each."""
-    recorded = blender.part("recorded.pointer_strokes").read_strokes(LETTER)
-    yield from prepare(blender, "TOP", bed=recorded.bed)
+def things(blender: Any) -> Iterator[float | None]:
+    """Form some things of the gallery on an empty bed, stroke by stroke, with what each has in the header."""
+    read = blender.part("recorded.pointer_strokes").read_strokes
+    drawn = [(name, read(DRAWN / f"{name}.toml")) for name in THINGS]
+    yield from prepare(blender, "TOP", bed=drawn[0][1].bed)
+    usual = tuple(bpy.context.window_manager.digiclay_finger)
+    for name, recorded in drawn:
+        note(blender, f"before {name}")
+        for one in recorded.strokes:
+            choose(blender, one, usual)
+            yield from act(blender, follow(blender, one))
+        blender.shot(f"thing_{name}")
+        note(blender, name)
+        yield from reset(blender)
+
+
+def choose(blender: Any, stroke: Any, usual: tuple[float, float, float]) -> None:
+    """Set the header of the tool for a recorded stroke; usual: length, width and height of a finger, mm."""
     settings = brush(blender)
-    for number, recorded_stroke in enumerate(recorded.strokes, 1):
-        settings.brush, settings.depth = recorded_stroke.kind.value, 1e3 * recorded_stroke.depth
-        yield from act(blender, follow(blender, recorded_stroke))
-        blender.shot(f"letter_{number}")
-    note(blender, "formed")
+    axes = stroke.length, stroke.width, stroke.thickness
+    size = tuple(1e3 * given or other for given, other in zip(axes, usual, strict=True))
+    bpy.context.window_manager.digiclay_finger = size
+    settings.brush, settings.strength = stroke.kind.value, stroke.strength
+    settings.path, settings.symmetry = stroke.path.upper(), stroke.symmetry.upper()
+    settings.depth, settings.height = 1e3 * stroke.depth, 1e3 * stroke.height

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.model.layout import Layout, make_grid
+from digiclay.recorded.pointer_strokes import read_strokes
 from digiclay.settings.devices import BEDS
 
 from benchmarks.made import find_relief
 from tests.window.blender_window import FORMED, Seen, down
-from tests.window.hand_strokes import HALF, STROKES, TAPS
+from tests.window.hand_strokes import DRAWN, HALF, STROKES, TAPS, THINGS
 
 PLAYED = {"script": "hand_strokes.py", "size": (800, 560), "by_hand": True}
 #: The columns of the bed that lie on the strokes, 3 mm a pin, and their row.
@@ -60,12 +61,14 @@ def test_an_unfinished_stroke_is_taken_back_and_the_session_goes_on(seen: Seen, 
     assert seen[name]["sessions"] == 1
 
 
-def test_a_letter_drawn_by_a_hand_is_what_was_intended(seen: Seen) -> None:
+@pytest.mark.parametrize("name", THINGS)
+def test_a_thing_drawn_by_a_hand_is_what_was_intended(seen: Seen, name: str) -> None:
     plan = BEDS["design"]
     grid = make_grid(Layout(rows=plan.rows, columns=plan.columns, pitch=plan.pitch))
-    intended = find_relief("letter_a", *grid.positions.T)
-    formed = -1e-3 * down(seen, "formed").ravel()
-    assert seen["formed"]["drawn"] == 3
-    assert np.corrcoef(formed, intended)[0, 1] >= 0.9
+    intended = find_relief(name, *grid.positions.T)
+    formed = -1e-3 * down(seen, name).ravel()
+    strokes = read_strokes(DRAWN / f"{name}.toml").strokes
+    assert seen[name]["drawn"] - seen[f"before {name}"]["drawn"] == len(strokes)
+    assert np.corrcoef(formed, intended)[0, 1] >= 0.96
     slope = np.cov(formed, intended)[0, 1] / intended.var(ddof=1)
-    assert 0.75 <= slope <= 1.25
+    assert 0.9 <= slope <= 1.1

@@ -1,0 +1,75 @@
+"""Measures of a relief along the strokes that formed it: how even it is, and its spikes; no Blender."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from digiclay.core.base.arrays import Floats
+from digiclay.core.control.blister import Blister
+from digiclay.core.model.layout import Grid
+from digiclay.recorded.pointer_strokes import PointerStroke
+from digiclay.strokes.stroke import SYMMETRIES, lay_ring
+
+#: Parts of the flat top, and of the slope, between which a section is straight.
+PARTS = (3, 6)
+
+
+def measure_distances(stroke: PointerStroke, grid: Grid) -> Floats:
+    """Return how far pins are from the path of a stroke, or its nearest mirror image, (n,), m."""
+    path = np.array([move[1:] for move in stroke.moves])
+    if stroke.path != "free":
+        path = lay_ring(path[0], path[-1]) if stroke.path == "ring" else path[[0, -1]]
+    path = path if len(path) > 1 else np.repeat(path, 2, axis=0)
+    near = np.full(grid.count, np.inf)
+    for mirror in SYMMETRIES[stroke.symmetry.upper()]:
+        for (ax, ay), (bx, by) in pairwise(path * mirror):
+            along, across = bx - ax, by - ay
+            x, y = grid.x - ax, grid.y - ay
+            share = np.clip((x * along + y * across) / (along**2 + across**2 or 1.0), 0.0, 1.0)
+            near = np.minimum(near, np.hypot(x - share * along, y - share * across))
+    return near
+
+
+def measure_unevenness(height: Floats, near: Floats, blister: Blister) -> Floats:
+    """Return how far pins (k,) at equal distance from a path, m, differ from their common section, (k,), m."""
+    flat, radius = blister.flat_radius, blister.radius
+    knots = np.concatenate([
+        np.linspace(0.0, flat, PARTS[0], endpoint=False), np.linspace(flat, radius, PARTS[1]),
+        [max(2.0 * radius - flat, near.max() * (1.0 + 1e-9))],
+    ])  # fmt: skip
+    hats = np.array([np.interp(near, knots, row) for row in np.eye(len(knots))]).T
+    return np.asarray(height - hats @ np.linalg.lstsq(hats, height, rcond=None)[0])
+
+
+def find_unevenness(
+    height: Floats, strokes: tuple[PointerStroke, ...], grid: Grid, blisters: tuple[Blister, ...]
+) -> Floats:
+    """Return `measure_unevenness` of the pins at just one stroke that raises or lowers, (k,), m."""
+    near = np.array([measure_distances(stroke, grid) for stroke in strokes])
+    reach = np.array([[blister.radius + grid.layout.pitch] for blister in blisters])
+    alone, found = (near < reach).sum(axis=0) == 1, [np.zeros(1)]
+    for stroke, row, (most,), blister in zip(strokes, near, reach, blisters, strict=True):
+        cells = np.flatnonzero(alone & (row < most))
+        if stroke.kind.has_amount and cells.size:
+            found.append(measure_unevenness(height[cells], row[cells], blister))
+    return np.concatenate(found)
+
+
+def find_spike(height: Floats, grid: Grid) -> float:
+    """Return how far a pin is above, or below, all its neighbors at most, m."""
+    beside = np.append(height, np.nan)[grid.layout.find_neighbors(corners=True)]
+    above = height - np.fmax.reduce(beside, axis=1)
+    below = np.fmin.reduce(beside, axis=1) - height
+    return float(max(above.max(), below.max(), 0.0))
+
+
+def turn(strokes: tuple[PointerStroke, ...], angle: float, shift: tuple[float, float]) -> tuple[PointerStroke, ...]:
+    """Return strokes turned by an angle, rad, and shifted, m."""
+    c, s = math.cos(angle), math.sin(angle)
+    return tuple(
+        replace(one, moves=tuple((t, c * x - s * y + shift[0], s * x + c * y + shift[1]) for t, x, y in one.moves))
+        for one in strokes
+    )
