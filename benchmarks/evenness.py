@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -12,6 +11,8 @@ from digiclay.core.control.blister import Blister
 from digiclay.core.model.layout import Grid
 from digiclay.recorded.pointer_strokes import PointerStroke
 from digiclay.strokes.stroke import SYMMETRIES, lay_ring
+
+from .intended import find_distance
 
 #: Parts of the flat top, and of the slope, between which a section is straight.
 PARTS = (3, 6)
@@ -22,19 +23,12 @@ def measure_distances(stroke: PointerStroke, grid: Grid) -> Floats:
     path = np.array([move[1:] for move in stroke.moves])
     if stroke.path != "free":
         path = lay_ring(path[0], path[-1]) if stroke.path == "ring" else path[[0, -1]]
-    path = path if len(path) > 1 else np.repeat(path, 2, axis=0)
-    near = np.full(grid.count, np.inf)
-    for mirror in SYMMETRIES[stroke.symmetry.upper()]:
-        for (ax, ay), (bx, by) in pairwise(path * mirror):
-            along, across = bx - ax, by - ay
-            x, y = grid.x - ax, grid.y - ay
-            share = np.clip((x * along + y * across) / (along**2 + across**2 or 1.0), 0.0, 1.0)
-            near = np.minimum(near, np.hypot(x - share * along, y - share * across))
-    return near
+    images = (path * mirror for mirror in SYMMETRIES[stroke.symmetry.upper()])
+    return np.asarray(np.min([find_distance(image.tolist(), grid.x, grid.y) for image in images], axis=0))
 
 
 def measure_unevenness(height: Floats, near: Floats, blister: Blister) -> Floats:
-    """Return how far pins (k,) at equal distance from a path, m, differ from their common section, (k,), m."""
+    """Return how far pins (k,) differ, (k,), m, from the common section of those so far from a path, m."""
     flat, radius = blister.flat_radius, blister.radius
     knots = np.concatenate([
         np.linspace(0.0, flat, PARTS[0], endpoint=False), np.linspace(flat, radius, PARTS[1]),
@@ -66,10 +60,13 @@ def find_spike(height: Floats, grid: Grid) -> float:
     return float(max(above.max(), below.max(), 0.0))
 
 
-def turn(strokes: tuple[PointerStroke, ...], angle: float, shift: tuple[float, float]) -> tuple[PointerStroke, ...]:
-    """Return strokes turned by an angle, rad, and shifted, m."""
-    c, s = math.cos(angle), math.sin(angle)
+def move(
+    strokes: tuple[PointerStroke, ...], angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0),
+    share: float = 1.0,
+) -> tuple[PointerStroke, ...]:  # fmt: skip
+    """Return strokes turned by an angle, rad, scaled, and shifted, m; depths and heights stay."""
+    c, s, (x0, y0) = share * math.cos(angle), share * math.sin(angle), shift
     return tuple(
-        replace(one, moves=tuple((t, c * x - s * y + shift[0], s * x + c * y + shift[1]) for t, x, y in one.moves))
+        replace(one, moves=tuple((t, c * x - s * y + x0, s * x + c * y + y0) for t, x, y in one.moves))
         for one in strokes
     )

@@ -8,7 +8,7 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.recorded.pointer_strokes import read_strokes
 from digiclay.settings.devices import BEDS
 
-from benchmarks.made import find_relief
+from benchmarks.intended import find_relief
 from tests.window.blender_window import FORMED, Seen, down
 from tests.window.hand_strokes import DRAWN, HALF, STROKES, TAPS, THINGS
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.made import THINGS, make
+from benchmarks.intended import THINGS
+from benchmarks.made import make
 
 
 @pytest.mark.parametrize("name", THINGS)

@@ -1,0 +1,175 @@
+"""Even and equal strokes: one path turned, crossing itself, mirrored, drawn at other rates, and to depths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from digiclay.core.base.arrays import Floats
+from digiclay.core.control.blister import Blister
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Grid, Layout
+from digiclay.core.scene.schema import Scene
+from digiclay.device.instant import CLEARANCE, find_ellipsoid
+from digiclay.recorded.pointer_strokes import RATE, PointerStroke, play_strokes
+from digiclay.sessions.running import Running
+from digiclay.sessions.sculpting import begin_session
+from digiclay.settings.devices import BEDS, FIRST, change_finger, make_scene
+from digiclay.strokes.stroke import FINISHING
+
+from .evenness import find_spike, find_unevenness, measure_distances, move
+from .report import Report, tabulate
+
+#: Rows and columns of the bed of the cases.
+SIDE = 60
+#: Angles, degrees, and shifts, m, of the cases: beside the grid of the pins.
+TURNS = ((0.0, (0.0, 0.0)), (17.0, (0.4e-3, 0.7e-3)))
+#: Depths and heights asked for, m; ticks a second of a session.
+AMOUNTS, RATES = (2e-3, 4e-3, 8e-3, 15e-3), (60.0, 24.0, 7.0)
+#: How far from the path pins are whose heights count as those of the stroke, m.
+CORE = 1.5e-3
+#: Rows of a session's trace that a tick adds at most.
+ROWS = 20
+#: What Raise and Lower do in the cases.
+KINDS: dict[str, dict[str, Any]] = {
+    "lowered 6 mm": {"brush": "lower", "depth": 6e-3}, "raised 8 mm": {"brush": "raise", "height": 8e-3},
+}  # fmt: skip
+
+
+def _bend(*places: Any) -> dict[str, Any]:
+    """Return the moves of a hand through places, mm, within half a second."""
+    times = np.linspace(0.0, 0.5, len(places))
+    return {"moves": tuple((t, 1e-3 * x, 1e-3 * y) for t, (x, y) in zip(times.tolist(), places, strict=True))}
+
+
+PATHS: dict[str, dict[str, Any]] = {
+    "line": {**_bend((-28.0, 0.0), (28.0, 0.0)), "path": "line"},
+    "ring": {**_bend((0.0, 0.0), (26.0, 0.0)), "path": "ring"},
+    "free": _bend(*((26.0 * u, 14.0 * math.sin(3.0 * u)) for u in np.linspace(-1.0, 1.0, 24).tolist())),
+    "loop": _bend(
+        (-28.0, -14.0), (10.0, -14.0),
+        *((10.0 + 14.0 * math.sin(a), -14.0 * math.cos(a)) for a in np.linspace(0.3, 4.7, 24).tolist()),
+        (-4.0, -28.0),
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What strokes have left on an even bed."""
+
+    session: Running
+    formed: Floats
+    """(n,): Heights above rest, m."""
+    raw: Floats
+    """(n,): Before the valves finished the last stroke, m."""
+    force: float
+    """Greatest total force on the fingertip, N."""
+    time: float
+    """Simulated until all is formed, s."""
+    strokes: tuple[PointerStroke, ...]
+
+    @property
+    def grid(self) -> Grid:
+        """Of the pins."""
+        return self.session.system.grid
+
+    def find_unevenness(self, height: Floats) -> Floats:
+        """Return `evenness.find_unevenness` of heights (n,), m, of the bed."""
+        usual, scene = find_ellipsoid(self.session.scene), self.session.scene
+        scenes = [change_finger(scene, usual, one.size_finger(usual)) for one in self.strokes]
+        return find_unevenness(
+            height, self.strokes, self.grid, tuple(one.blister or Blister() for one in scenes)
+        )
+
+
+def make_bed(name: str = FIRST, side: int | None = None) -> Scene:
+    """Return a bed as Add makes it, or one with so many rows and columns."""
+    bed = BEDS[name]
+    layout = Layout(rows=side or bed.rows, columns=side or bed.columns, pitch=bed.pitch)
+    return make_scene("paper", layout, "virtual_master", bed.share)
+
+
+def play(scene: Scene, strokes: tuple[PointerStroke, ...], rate: float = RATE) -> Played:
+    """Play strokes on a bed at rest, at some ticks a second."""
+    above, rest = (
+        np.array([0.0, 0.0, scene.actuator.rest_height + CLEARANCE, *LEVEL]),
+        scene.actuator.rest_height,
+    )
+    session, _ = begin_session(1, "Bed", scene, above)
+    raw, force = session.state.row(0), 0.0
+    for after in play_strokes(session, strokes, rate):
+        session = after
+        force = max(force, float(session.trace.force[-ROWS:].max(initial=0.0)))
+        if session.strokes and session.strokes[0].phase != FINISHING:
+            raw = session.state.row(0).copy()
+    time = session.state.period * session.system.period
+    return Played(session, session.state.row(0) - rest, raw - rest, force, time, strokes)
+
+
+def list_reliefs() -> Iterator[dict[str, Any]]:
+    """Yield how even each kind of stroke is along each path, m, and its spikes, m."""
+    for (kind, amount), (name, path) in product(KINDS.items(), PATHS.items()):
+        for angle, shift in TURNS:
+            made = play(
+                make_bed(side=SIDE), move((PointerStroke(**amount, **path),), math.radians(angle), shift)
+            )
+            formed, raw = made.find_unevenness(made.formed), made.find_unevenness(made.raw)
+            yield {
+                "case": f"{name}, {kind}, at {angle:g} degrees", "rms": math.sqrt(np.mean(formed**2)),
+                "most": np.abs(formed).max(), "raw": math.sqrt(np.mean(raw**2)), "raw_most": np.abs(raw).max(),
+                "spike": find_spike(made.formed, made.grid), "force": made.force,
+            }  # fmt: skip
+
+
+def list_differences() -> Iterator[dict[str, Any]]:
+    """Yield how far apart strokes are that are to be alike, and what remains of depths and heights, m."""
+    for kind, amount in KINDS.items():
+        free = PointerStroke(**amount, **PATHS["free"])
+        shifted = move((free,), 0.5 * math.pi, (14e-3, 0.0))[0]
+        mirrored = replace(shifted, moves=tuple((t, -x, y) for t, x, y in shifted.moves))
+        first, other, both = (
+            play(make_bed(side=SIDE), (one,)).formed.reshape(SIDE, SIDE)
+            for one in (shifted, mirrored, replace(shifted, symmetry="x"))
+        )
+        yield _differ(f"{kind}: its mirror image in one stroke", both - both[:, ::-1])
+        yield _differ(f"{kind}: drawn mirrored", first - other[:, ::-1])
+        usual, *others = (play(make_bed(side=SIDE), (free,), rate).formed for rate in RATES)
+        for rate, height in zip(RATES[1:], others, strict=True):
+            yield _differ(f"{kind}: at {rate:g} ticks a second", height - usual)
+        slow = replace(free, moves=tuple((3.0 * t, x, y) for t, x, y in free.moves))
+        yield _differ(
+            f"{kind}: by a hand three times as slow", play(make_bed(side=SIDE), (slow,)).formed - usual
+        )
+    for brush, asked in product(("lower", "raise"), AMOUNTS):
+        line = PointerStroke(brush=brush, depth=asked, height=asked, **PATHS["line"])
+        made = play(make_bed(side=SIDE), (line,))
+        core = np.abs(made.formed[measure_distances(line, made.grid) < CORE])
+        yield _differ(f"{brush} {1e3 * asked:g} mm", core - asked, float(core.mean()))
+
+
+def _differ(case: str, difference: Floats, left: float | None = None) -> dict[str, Any]:
+    """Return the row of a case: what is left, m, and the greatest difference, m."""
+    return {"case": case, "left": left, "difference": float(np.abs(difference).max())}
+
+
+#: Columns of the two tables.
+RELIEF = {
+    "case": "case", "uneven, rms, mm": "rms .3f 1e3", "most, mm": "most .2f 1e3",
+    "raw, rms, mm": "raw .3f 1e3", "raw, most, mm": "raw_most .2f 1e3",
+    "spike, mm": "spike .2f 1e3", "force, N": "force .2f",
+}  # fmt: skip
+ALIKE = {"case": "case", "left, mm": "left .2f 1e3", "greatest difference, µm": "difference .1f 1e6"}
+
+
+def compare() -> list[Report]:
+    """Return the reports of both tables."""
+    reliefs, differences = list(list_reliefs()), list(list_differences())
+    return [
+        Report(["", *tabulate(reliefs, RELIEF)], reliefs, name="made_relief"),
+        Report(["", *tabulate(differences, ALIKE)], differences, name="made_alike"),
+    ]
