@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -15,21 +16,21 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Grid, Layout
 from digiclay.core.scene.schema import Scene
 from digiclay.device.instant import CLEARANCE, find_ellipsoid
-from digiclay.recorded.pointer_strokes import RATE, PointerStroke, play_strokes
+from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes
 from digiclay.sessions.running import Running
-from digiclay.sessions.sculpting import begin_session
+from digiclay.sessions.sculpting import begin_session, change_stroke, find_stroke, follow_finger, queue_stroke
 from digiclay.settings.devices import BEDS, FIRST, change_finger, make_scene
-from digiclay.strokes.stroke import FINISHING
+from digiclay.strokes.stroke import FINISHING, draw
 
-from .evenness import find_spike, find_unevenness, measure_distances, move
+from .evenness import find_spikes, find_unevenness, measure_distances, move
 from .report import Report, tabulate
 
 #: Rows and columns of the bed of the cases.
 SIDE = 60
 #: Angles, degrees, and shifts, m, of the cases: beside the grid of the pins.
 TURNS = ((0.0, (0.0, 0.0)), (17.0, (0.4e-3, 0.7e-3)))
-#: Depths and heights asked for, m; ticks a second of a session.
-AMOUNTS, RATES = (2e-3, 4e-3, 8e-3, 15e-3), (60.0, 24.0, 7.0)
+#: Depths and heights asked for, m; ticks a second, and moves a tick, of hands on slow and quick machines.
+AMOUNTS, HANDS = (2e-3, 4e-3, 8e-3, 15e-3), ((60.0, 1), (24.0, 5), (7.0, 1))
 #: How far from the path pins are whose heights count as those of the stroke, m.
 CORE = 1.5e-3
 #: Rows of a session's trace that a tick adds at most.
@@ -94,21 +95,36 @@ def make_bed(name: str = FIRST, side: int | None = None) -> Scene:
     return make_scene("paper", layout, "virtual_master", bed.share)
 
 
-def play(scene: Scene, strokes: tuple[PointerStroke, ...], rate: float = RATE) -> Played:
-    """Play strokes on a bed at rest, at some ticks a second."""
-    above, rest = (
-        np.array([0.0, 0.0, scene.actuator.rest_height + CLEARANCE, *LEVEL]),
-        scene.actuator.rest_height,
-    )
-    session, _ = begin_session(1, "Bed", scene, above)
-    raw, force = session.state.row(0), 0.0
-    for after in play_strokes(session, strokes, rate):
-        session = after
-        force = max(force, float(session.trace.force[-ROWS:].max(initial=0.0)))
+def begin(scene: Scene) -> Running:
+    """Return a session of a bed at rest, the fingertip above it."""
+    above = np.array([0.0, 0.0, scene.actuator.rest_height + CLEARANCE, *LEVEL])
+    return begin_session(1, "Bed", scene, above)[0]
+
+
+def play(scene: Scene, strokes: tuple[PointerStroke, ...]) -> Played:
+    """Play strokes on a bed at rest."""
+    session, force, rest = begin(scene), 0.0, scene.actuator.rest_height
+    raw = session.state.row(0)
+    for after in play_strokes(session, strokes):
+        session, force = after, max(force, float(after.trace.force[-ROWS:].max(initial=0.0)))
         if session.strokes and session.strokes[0].phase != FINISHING:
             raw = session.state.row(0).copy()
     time = session.state.period * session.system.period
     return Played(session, session.state.row(0) - rest, raw - rest, force, time, strokes)
+
+
+def draw_by_hand(scene: Scene, stroke: PointerStroke, rate: float, moves: int) -> Floats:
+    """Draw a stroke on a bed at rest, some moves a tick, ticks at a rate, 1/s; return heights, (n,), m."""
+    session = begin(scene)
+    session, number = queue_stroke(session, *stroke.moves[0][1:], stroke.amount, brush=stroke.kind)
+    left, count = list(stroke.moves[1:]), round(1.0 / (rate * session.system.period))
+    while find_stroke(session, number) is not None:
+        for _, x, y in left[:moves]:
+            session = change_stroke(session, number, partial(draw, x=x, y=y, depth=stroke.amount))
+        left = left[moves:]
+        session = change_stroke(session, number, partial(replace, held=bool(left)))
+        session = follow_finger(session, session.pose, count)
+    return np.asarray(session.state.row(0) - scene.actuator.rest_height)
 
 
 def list_reliefs() -> Iterator[dict[str, Any]]:
@@ -122,7 +138,7 @@ def list_reliefs() -> Iterator[dict[str, Any]]:
             yield {
                 "case": f"{name}, {kind}, at {angle:g} degrees", "rms": math.sqrt(np.mean(formed**2)),
                 "most": np.abs(formed).max(), "raw": math.sqrt(np.mean(raw**2)), "raw_most": np.abs(raw).max(),
-                "spike": find_spike(made.formed, made.grid), "force": made.force,
+                "spike": find_spikes(made.formed, made.grid).max(), "force": made.force,
             }  # fmt: skip
 
 
@@ -138,13 +154,10 @@ def list_differences() -> Iterator[dict[str, Any]]:
         )
         yield _differ(f"{kind}: its mirror image in one stroke", both - both[:, ::-1])
         yield _differ(f"{kind}: drawn mirrored", first - other[:, ::-1])
-        usual, *others = (play(make_bed(side=SIDE), (free,), rate).formed for rate in RATES)
-        for rate, height in zip(RATES[1:], others, strict=True):
-            yield _differ(f"{kind}: at {rate:g} ticks a second", height - usual)
-        slow = replace(free, moves=tuple((3.0 * t, x, y) for t, x, y in free.moves))
-        yield _differ(
-            f"{kind}: by a hand three times as slow", play(make_bed(side=SIDE), (slow,)).formed - usual
-        )
+        usual = play(make_bed(side=SIDE), (free,)).formed
+        for rate, moves in HANDS:
+            drawn = draw_by_hand(make_bed(side=SIDE), free, rate, moves)
+            yield _differ(f"{kind}: drawn by {moves} moves a tick, {rate:g} ticks a second", drawn - usual)
     for brush, asked in product(("lower", "raise"), AMOUNTS):
         line = PointerStroke(brush=brush, depth=asked, height=asked, **PATHS["line"])
         made = play(make_bed(side=SIDE), (line,))

@@ -10,7 +10,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.layout import Grid
 from digiclay.recorded.pointer_strokes import PointerStroke
-from digiclay.strokes.stroke import SYMMETRIES, lay_ring
+from digiclay.strokes.stroke import lay_ring, make_images
 
 from .intended import find_distance
 
@@ -23,8 +23,9 @@ def measure_distances(stroke: PointerStroke, grid: Grid) -> Floats:
     path = np.array([move[1:] for move in stroke.moves])
     if stroke.path != "free":
         path = lay_ring(path[0], path[-1]) if stroke.path == "ring" else path[[0, -1]]
-    images = (path * mirror for mirror in SYMMETRIES[stroke.symmetry.upper()])
-    return np.asarray(np.min([find_distance(image.tolist(), grid.x, grid.y) for image in images], axis=0))
+    images = make_images(stroke.symmetry.upper())
+    paths = [[image.place(x, y) for x, y in path.tolist()] for image in images]
+    return np.asarray(np.min([find_distance(one, grid.x, grid.y) for one in paths], axis=0))
 
 
 def measure_unevenness(height: Floats, near: Floats, blister: Blister) -> Floats:
@@ -52,12 +53,11 @@ def find_unevenness(
     return np.concatenate(found)
 
 
-def find_spike(height: Floats, grid: Grid) -> float:
-    """Return how far a pin is above, or below, all its neighbors at most, m."""
+def find_spikes(height: Floats, grid: Grid) -> Floats:
+    """Return how far pins are above, or below, all their neighbors, (n,), m."""
     beside = np.append(height, np.nan)[grid.layout.find_neighbors(corners=True)]
     above = height - np.fmax.reduce(beside, axis=1)
-    below = np.fmin.reduce(beside, axis=1) - height
-    return float(max(above.max(), below.max(), 0.0))
+    return np.asarray(np.maximum(above, np.fmin.reduce(beside, axis=1) - height).clip(0.0))
 
 
 def move(

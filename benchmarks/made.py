@@ -24,7 +24,7 @@ from digiclay.roles import fingertip_of
 from digiclay.settings.devices import BEDS
 
 from .alike import Played, compare, make_bed, play
-from .evenness import find_spike, move
+from .evenness import find_spikes, move
 from .intended import THINGS, find_relief
 from .kinds import STROKES
 from .report import Report, Steps, tabulate
@@ -135,6 +135,12 @@ def draw_relief(scene: Scene, relief: Floats, lowest: float, out: Path) -> None:
         render_picture(drawn, out, out)
 
 
+def find_new_spike(made: Made) -> float:
+    """Return how far a pin is beyond all its neighbors at most, as none is meant to be, m."""
+    grid = made.played.grid
+    return float((find_spikes(made.formed, grid) - find_spikes(made.intended, grid)).max())
+
+
 #: Columns of the table.
 COLUMNS = {
     "thing": "title", "bed": "bed", "strokes": "strokes d", "hand, s": "hand .1f", "formed, s": "formed .1f",
@@ -161,7 +167,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report | list[Report
             "formed": made.played.time, "force": made.played.force, "correlation": made.correlation,
             "slope": made.slope, "rms": made.error, "relief": float(made.intended.std()),
             "uneven": float(np.sqrt(np.mean(uneven**2))), "most": float(np.abs(uneven).max()),
-            "spike": find_spike(made.formed, made.played.grid), "CPU": made.spent, "title": made.title,
+            "spike": find_new_spike(made), "CPU": made.spent, "title": made.title,
         })  # fmt: skip
         if arguments.pictures is not None:
             other = "" if made.bed == made.own_bed else f"_{made.bed}"

@@ -76,7 +76,8 @@ def test_ctrl_inverts_the_brush() -> None:
 
 def test_a_stroke_has_its_own_fingertip_and_the_bed_has_its_own_again_after_it() -> None:
     begun = begin()
-    sessions = list(play_strokes(begun, (PointerStroke(width=6e-3, moves=ALONG),)))
+    first, *_, last = play_strokes(begun, (PointerStroke(width=6e-3, moves=ALONG),))
+    sessions = [first, last]
     sizes = [one.scene.fingers[0].fingertip.width for one in sessions]
     assert sizes == [3e-3, 8e-3]
     blisters = [one.scene.blister.radius for one in sessions]

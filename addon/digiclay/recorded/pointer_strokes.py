@@ -152,15 +152,16 @@ def _read_text(table: Mapping[str, Any], key: str, usual: str) -> str:
 
 
 def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterator[Running]:
-    """Play strokes in a session, as fast as the machine can; yield the session after each of them."""
+    """Play strokes in a session, as fast as the machine can; yield the session after each tick."""
     usual = running.scene
     for number, stroke in enumerate(strokes, 1):
         running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
         needs_blister = stroke.kind in (Brush.RAISE, Brush.LEVEL)
         if needs_blister and find_tracking(running.scene, running.system) is None:
             raise StateError(f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister.")
-        running = _play(running, stroke, number)
-        yield running
+        for after in _play(running, stroke, number):
+            running = after
+            yield running
     last, _ = change_scene(running, usual)
     yield last
 
@@ -170,8 +171,8 @@ def _take_finger(running: Running, usual: Scene, finger: Fingertip) -> Running:
     return change_scene(running, change_finger(usual, find_ellipsoid(usual), finger))[0]
 
 
-def _play(running: Running, stroke: PointerStroke, number: int) -> Running:
-    """Draw a stroke, and continue the session until it is formed."""
+def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Running]:
+    """Draw a stroke, and continue the session until it is formed; yield it after each tick."""
     places = [(x, y) for _, x, y in stroke.moves]
     running, queued = queue_stroke(
         running, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength,
@@ -187,9 +188,9 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Running:
     first = running.state.period
     while find_stroke(running, queued) is not None:
         running = _tick(running)
+        yield running
         if (running.state.period - first) * running.system.period > PATIENCE:
             raise StateError(f"The fingertip has not finished stroke {number} after {PATIENCE:g} s.")
-    return running
 
 
 def _tick(running: Running) -> Running:
