@@ -92,7 +92,7 @@ def make_bed(name: str = FIRST, side: int | None = None) -> Scene:
     """Return a bed as Add makes it, or one with so many rows and columns."""
     bed = BEDS[name]
     layout = Layout(rows=side or bed.rows, columns=side or bed.columns, pitch=bed.pitch)
-    return make_scene("paper", layout, "virtual_master", bed.share)
+    return make_scene(bed.preset, layout, bed.method, bed.share)
 
 
 def begin(scene: Scene) -> Running:

@@ -209,14 +209,13 @@ def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
     """Come down to the pins, and press into them: to the depth of the stroke, or until a blister starts."""
     x, y, z = place
     lowest, after, fastest = way.find_lowest(stroke, x, y), DRAGGING, PRESS
+    touch = way.find_touch(stroke, x, y)
     if stroke.tracking:
         fastest = stroke.tracking.sink_speed
         if stroke.brush is not Brush.LOWER:
-            assert stroke.ground is not None
-            surface = way.device.find_surface(stroke.ground, x, y)
-            lowest = way.pass_over_locked(stroke, x, y, max(0.0, surface - stroke.tracking.press))
-            after = RISING
-    touch = max(way.find_touch(stroke, x, y), lowest)
+            pressed = max(0.0, touch - stroke.tracking.press)
+            lowest, after = way.pass_over_locked(stroke, x, y, pressed), RISING
+    touch = max(touch, lowest)
     # One limit after the other, the last that it comes to.
     for end, speed in ((touch + CLEARANCE, DESCEND), (touch, APPROACH), (lowest, fastest)):
         if z > end:

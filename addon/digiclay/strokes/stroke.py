@@ -180,8 +180,9 @@ class Stroke:
     turn: Floats | None = None
     #: (n,), heights to which the valves drive pins after the fingertip has left, m, NaN: not driven.
     finish: Floats | None = None
-    #: Control periods since the fingertip waits for its pins.
+    #: Control periods since the fingertip waits for its pins, and whether they stood at the last look.
     waited: int = 0
+    arrived: bool = False
 
     @property
     def done(self) -> bool:

@@ -90,7 +90,10 @@ def finish(
     if stroke.finish is None or astray.any():
         stroke = replace(stroke, finish=np.where(astray, stroke.height, surface))
     assert stroke.finish is not None
-    return _wait(stroke, pose, count, period, place(1, stroke.finish), arrived=arrived and not astray.any())
+    # A method that still looks for the fingertip would move pins once more.
+    searched = stroke.tracking is None or stroke.waited * period > stroke.tracking.search + period
+    arrived = arrived and searched and not astray.any()
+    return _wait(stroke, pose, count, period, place(1, stroke.finish), arrived=arrived)
 
 
 def _wait(
@@ -98,10 +101,11 @@ def _wait(
 ) -> tuple[Stroke, Floats, Orders]:
     """Repeat an order until the pins have arrived, as far as the next look at them; returns as `sweep`."""
     looks = stroke.waited > 0 and stroke.waited % LOOK == 0
-    if stroke.waited * period >= PATIENCE or (looks and arrived):
+    # At the first look some pins pass their heights.
+    if stroke.waited * period >= PATIENCE or (looks and arrived and stroke.arrived):
         last = stroke.image + 1 == len(stroke.images)
         stroke = replace(stroke, phase=DONE) if last else finish_image(stroke)
         return stroke, np.array([pose, pose]), Orders(np.zeros((1, ORDER)))
     most = min(count, LOOK - stroke.waited % LOOK)
-    stroke = replace(stroke, waited=stroke.waited + most)
+    stroke = replace(stroke, waited=stroke.waited + most, arrived=arrived if looks else stroke.arrived)
     return stroke, np.tile(pose, (most + 1, 1)), replace(order, rows=np.tile(order.rows, (most, 1)))

@@ -62,6 +62,8 @@ class Tracking:
     radius: float
     #: Highest place of a pin's top, m.
     highest: float
+    #: How long the method looks for a fingertip that has left, s.
+    search: float
     #: Whether pins ahead stand so that they come to any height in time.
     ready: bool = False
 
@@ -99,7 +101,10 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
     drag, push = (min(pace.fastest, radii * blister.radius) for radii in (pace.drag, pace.push))
     gain, down = min(lift / pace.gain, SUDDEN), min(pace.press, PRESS * speed)
     radius, highest = blister.radius, system.cell.actuator.stroke
-    return Tracking(sink, press, speed, lift, gain, down, drag, push, slope, radius, highest, pace.ready)
+    search = 0.0 if isinstance(control, CellStates) else control.loss_time
+    return Tracking(
+        sink, press, speed, lift, gain, down, drag, push, slope, radius, highest, search, pace.ready
+    )
 
 
 def _find_slope(blister: Blister) -> float:
