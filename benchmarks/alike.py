@@ -137,7 +137,8 @@ def list_reliefs() -> Iterator[dict[str, Any]]:
             formed, raw = made.find_unevenness(made.formed), made.find_unevenness(made.raw)
             yield {
                 "case": f"{name}, {kind}, at {angle:g} degrees", "rms": math.sqrt(np.mean(formed**2)),
-                "most": np.abs(formed).max(), "raw": math.sqrt(np.mean(raw**2)), "raw_most": np.abs(raw).max(),
+                "most": np.abs(formed).max(), "raw": math.sqrt(np.mean(raw**2)),
+                "raw_most": np.abs(raw).max(),
                 "spike": find_spikes(made.formed, made.grid).max(), "force": made.force,
             }  # fmt: skip
 

@@ -22,7 +22,7 @@ from ..core.model.fingertip import Fingertip
 from .nominal import Device, find_nominal, find_undersides, returns
 from .pose import lean_finger, turn_image, turn_toward
 from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, RISING, STAMPS, Brush, Stroke
-from .tracking import Tracking
+from .tracking import SUDDEN, Tracking
 
 #: Lowest point of the fingertip, m.
 Point = tuple[float, float, float]
@@ -216,6 +216,10 @@ def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
             pressed = max(0.0, touch - stroke.tracking.press)
             lowest, after = way.pass_over_locked(stroke, x, y, pressed), RISING
     touch = max(touch, lowest)
+    if stroke.tracking:
+        # Stopped at once it would be lost: the pins below it go on.
+        braked = math.sqrt(2.0 * SUDDEN * max(z - lowest, 0.0))
+        fastest = min(fastest, max(braked, SUDDEN * way.period))
     # One limit after the other, the last that it comes to.
     for end, speed in ((touch + CLEARANCE, DESCEND), (touch, APPROACH), (lowest, fastest)):
         if z > end:
