@@ -10,7 +10,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.layout import Grid
 from digiclay.recorded.pointer_strokes import PointerStroke
-from digiclay.strokes.stroke import lay_ring, make_images
+from digiclay.strokes.stroke import lay_ring
 
 from .intended import find_distance
 
@@ -23,8 +23,7 @@ def measure_distances(stroke: PointerStroke, grid: Grid) -> Floats:
     path = np.array([move[1:] for move in stroke.moves])
     if stroke.path != "free":
         path = lay_ring(path[0], path[-1]) if stroke.path == "ring" else path[[0, -1]]
-    images = make_images(stroke.symmetry.upper())
-    paths = [[image.place(x, y) for x, y in path.tolist()] for image in images]
+    paths = [[image.place(x, y) for x, y in path.tolist()] for image in stroke.images]
     return np.asarray(np.min([find_distance(one, grid.x, grid.y) for one in paths], axis=0))
 
 

@@ -127,7 +127,8 @@ THINGS = tuple(RELIEFS)
 def find_relief(name: str, x: Floats, y: Floats) -> Floats:
     """Return the intended heights of one of `THINGS` above rest at some places (n,), m."""
     layers = [np.array([line.evaluate(1e3 * x, 1e3 * y) for line in layer]) for layer in RELIEFS[name]]
-    return 1e-3 * np.sum([one.max(axis=0).clip(0.0) + one.min(axis=0).clip(None, 0.0) for one in layers], 0)
+    heights = [one.max(axis=0).clip(0.0) + one.min(axis=0).clip(None, 0.0) for one in layers]
+    return np.asarray(1e-3 * np.sum(heights, axis=0))
 
 
 def find_distance(corners: Corners, x: Floats, y: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Things made by recorded strokes of the Press tool are what was intended, in the time that a hand can wait."""
+"""Things made by recorded strokes of the Press tool are what was intended, even, alike, and soon formed."""
 
 from __future__ import annotations
 
