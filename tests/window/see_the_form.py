@@ -40,13 +40,15 @@ def add_by_hand(blender: Any, name: str) -> None:
 
 def see_at_once(blender: Any) -> Iterator[float | None]:
     """Add beds from the default perspective and from above, with the sidebar closed and open; press lines."""
-    area, _ = blender.view()
+    area, region = blender.view()
     looking = area.spaces.active.region_3d
     before = {name: getattr(looking, name) for name in ("view_perspective", "view_distance")}
     turned = looking.view_rotation.copy()
     for side in ("USER", "TOP"):
         if side == "TOP":
             blender.call(bpy.ops.view3d.view_axis, type=side)
+            yield from blender.rounds(20)
+            blender.SEEN["turned"] = [rectangle_of_the_bed(blender), region.width, region.height]
         for is_open in (False, True):
             area.spaces.active.show_region_ui = is_open
             yield from blender.rounds(20)

@@ -29,7 +29,13 @@ def test_a_bed_that_is_added_is_seen_whole_beside_the_sidebar(seen: Seen, side: 
     assert left <= x0 < x1 <= right
     assert bottom <= y0 < y1 <= top
     # It takes most of that; as much when the sidebar is opened later.
-    assert max((x1 - x0) / (right - left), (y1 - y0) / (top - bottom)) > 0.6
+    assert max((x1 - x0) / (right - left), (y1 - y0) / (top - bottom)) > 0.5
+
+
+def test_the_bed_is_whole_from_above_too_after_the_view_is_turned(seen: Seen) -> None:
+    (left, bottom, right, top), width, height = seen["turned"]
+    assert 0.0 <= left < right <= width
+    assert 0.0 <= bottom < top <= height
 
 
 def test_alt_s_shows_the_skin_and_the_pins_again_and_a_session_the_skin(seen: Seen) -> None:

@@ -10,7 +10,7 @@ from .. import preferences
 from ..compat import bpy
 from ..core.base.arrays import Floats
 from ..device import detail, view
-from ..overlay.sections import list_rooms
+from ..overlay.sections import find_compact_box
 from ..overlay.views import find_free_room
 from ..roles import BALL, fingertip_of
 
@@ -18,6 +18,10 @@ from ..roles import BALL, fingertip_of
 SIDEBAR = 280.0
 #: Space about a bed, of the room it has.
 SPACE = 0.04
+#: Distances tried, in nearest ones, until a bed is whole from above too: within as much of the view.
+FARTHER, ABOVE = (1.0, 1.05, 1.1, 1.15, 1.2, 1.25), 0.95
+#: Least square of the level part of a view's direction that is divided by: from above there is none.
+LEVEL = 0.01
 #: Shading of a 3D view nobody has changed; and what differs where a relief is to be seen: a matcap, as in
 #: Blender's Sculpting workspace, but lit from one side; edges are brightened, and valleys darkened.
 FACTORY = {"type": "SOLID", "light": "STUDIO", "color_type": "MATERIAL", "show_cavity": False}
@@ -53,42 +57,70 @@ def frame(context: Any, bed: Any) -> None:
     if shown is None:
         return
     area, region = shown
-    scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
-    room = find_free_room(area, region, {"UI": SIDEBAR * scale})
     looking, size = region.data, np.array([region.width, region.height])
     if looking.view_perspective == "CAMERA":
         looking.view_perspective = "PERSP"
         looking.update()
     context.view_layer.update()
     axes, parallel = np.array(looking.view_rotation.to_matrix()), looking.view_perspective == "ORTHO"
-    lens, points = np.diag(np.array(looking.window_matrix))[:2], _list_corners(bed) @ axes
+    lens, corners = np.diag(np.array(looking.window_matrix))[:2], _list_corners(bed)
     if parallel:
         lens = lens * looking.view_distance
-    rooms = (2.0 * np.reshape(each, (2, 2)) / size - 1.0 for each in list_rooms(room, scale, corner))
-    eyes = [place_eye(points, lens, each, parallel) for each in rooms if (each[1] > each[0]).all()]
-    if not eyes:
-        return
-    x, y, distance = min(eyes, key=lambda eye: float(eye[2]))
-    middle = float(points[:, 2].mean())
-    looking.view_location = axes @ [x, y, middle]
-    looking.view_distance = distance if parallel else distance - middle
+    scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
+    room = find_free_room(area, region, {"UI": SIDEBAR * scale})
+    free, taken = 2.0 * np.reshape([room, find_compact_box(room, scale, corner)], (2, 2, 2)) / size - 1.0
+    middle, back = corners.mean(axis=0), axes[:, 2]
+    half = np.abs(corners - middle)[:, :2].max(axis=0)
+    for farther in FARTHER:
+        eye = find_eye((corners - middle) @ axes, lens, free, taken, parallel, farther)
+        if eye is None:
+            return
+        # The view turns about a place over or under the middle, so that it shows the bed from above as well.
+        aside = axes[:, :2] @ eye[:2]
+        depth = -float(aside[:2] @ back[:2]) / max(float(back[:2] @ back[:2]), LEVEL)
+        looking.view_location = middle + aside + depth * back
+        looking.view_distance = eye[2] - (0.0 if parallel else depth)
+        if (lens * (half + np.abs(aside + depth * back)[:2]) < ABOVE * looking.view_distance).all():
+            break
     looking.update()
     detail.follow()
 
 
-def place_eye(points: Floats, lens: Floats, room: Floats, parallel: bool) -> Floats:
-    """Return the nearest eye (3,) that sees points (k, 3) in a room: lower and upper corner (2, 2), -1 to 1.
+def find_eye(
+    points: Floats, lens: Floats, room: Floats, box: Floats, parallel: bool, farther: float = 1.0
+) -> Floats | None:
+    """Return the nearest eye (3,) that sees all between points (k, 3) in a room, nothing in a box; or None.
 
-    Axes are those of the view: right, up, to the eye. `lens` (2,): size in the view of a length of 1 at a
-    distance of 1. Seen in parallel, the third number is the distance that scales the view.
+    Axes are those of the view: right, up, to the eye; the origin is amidst the points. `lens` (2,): size in
+    the view of a length of 1 at a distance of 1. `room`, and `box` in a corner of it: lower and upper corners
+    (2, 2), -1 to 1. Seen in parallel the third number is the distance that scales the view. `farther`: times
+    the nearest.
     """
+    cuts, along = np.linspace(0.0, 1.0, 6), np.linspace(0.0, 1.0, 12)[:, None, None, None]
+    lines = (points + along * (points[:, None] - points)).reshape(-1, 3)
+    eyes: list[Floats] = []
+    for cut in cuts:
+        for axis in (0, 1):
+            part, end = room.copy(), int(box[1, axis] == room[1, axis])
+            part[end, axis] += cut * (box[1 - end, axis] - room[end, axis])
+            if (part[0] < part[1]).all():
+                eye = place_eye(points, lens, part, parallel, farther)
+                seen = lens * (lines[:, :2] - eye[:2]) / (eye[2] - (0.0 if parallel else lines[:, 2:]))
+                if not ((box[0] < seen) & (seen < box[1])).all(axis=1).any():
+                    eyes.append(eye)
+    return min(eyes, key=lambda eye: round(float(eye[2]), 6)) if eyes else None
+
+
+def place_eye(points: Floats, lens: Floats, room: Floats, parallel: bool, farther: float = 1.0) -> Floats:
+    """Return the nearest eye (3,) that sees points (k, 3) in a room, in the middle if it can: `find_eye`."""
     low, high = room + SPACE * (room[1] - room[0]) * [[1.0], [-1.0]]
     depth = 0.0 * points[:, 2:] if parallel else points[:, 2:]
     # The eye at z sees a point at x right of `low`: lens (x - eye) >= low (z - depth); and so left of `high`.
     most = (points[:, :2] + low * depth / lens).min(axis=0)
     least = (points[:, :2] + high * depth / lens).max(axis=0)
-    z = float(((least - most) * lens / (high - low)).max())
-    return np.array([*((least + most - (low + high) * z / lens) / 2.0), z])
+    z = farther * float(((least - most) * lens / (high - low)).max())
+    middle = (points[:, :2].min(axis=0) + points[:, :2].max(axis=0)) / 2.0
+    return np.array([*np.clip(middle, least - high * z / lens, most - low * z / lens), z])
 
 
 def _list_corners(bed: Any) -> Floats:

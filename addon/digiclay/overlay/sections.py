@@ -276,14 +276,15 @@ def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> 
     return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
 
 
-def list_rooms(room: Room, scale: float, corner: str) -> tuple[Room, Room]:
-    """Return what a room has beside, and above or below, a compact overlay in a corner of it, pixels."""
+def find_compact_box(room: Room, scale: float, corner: str) -> Room:
+    """Return left, bottom, right and top of what a compact overlay takes of a corner of a room, pixels."""
     left, bottom, right, top = room
     wide = (COMPACT.width + 2 * MARGIN) * scale
     tall = (2 * (ROW + PADDING + MARGIN) + TAKEN.get(corner, 0.0)) * scale
     at_top, at_left = corner.startswith("top"), corner.endswith("left")
-    beside = (left + wide * at_left, bottom, right - wide * (not at_left), top)
-    return beside, (left, bottom + tall * (not at_top), right, top - tall * at_top)
+    x, y = (left, left + wide) if at_left else (right - wide, right), (top - tall, top)
+    y = y if at_top else (bottom, bottom + tall)
+    return x[0], y[0], x[1], y[1]
 
 
 def lay_out(
