@@ -102,8 +102,8 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
     [
         pytest.param(1e-3, 23e-3, 33e-3, id="a graphics card: all of the time but a share for the person"),
         pytest.param(15e-3, 19e-3, 34e-3, id="a slow one: what is left of the time between two ticks"),
-        pytest.param(30e-3, 12e-3, 42e-3, id="drawing takes all of it: a share of the drawing"),
-        pytest.param(0.5, 0.2, 0.7, id="drawing by software"),
+        pytest.param(30e-3, 15e-3, 45e-3, id="drawing takes all of it: a share of the drawing"),
+        pytest.param(0.5, 0.25, 0.75, id="drawing by software"),
     ],
 )
 def test_the_periods_of_a_queue_leave_the_window_its_redraws(drawing, spent, between):

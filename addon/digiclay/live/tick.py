@@ -111,6 +111,17 @@ def has_strokes() -> bool:
     return any(not stroke.held for session in free for stroke in session.strokes)
 
 
+def end_haste(context: Any) -> None:
+    """Let ticks take their time again, and show what has been formed in haste."""
+    if loop.LOOP.in_haste:
+        loop.LOOP.in_haste = False
+        for session in running.list_sessions():
+            bed = find_bed(session.uid, session.name)
+            if bed is not None:
+                show(bed, session)
+                place_finger(context, bed, session)
+
+
 def tick(context: Any, now: float) -> list[Note]:
     """Advance every session to the current time of a monotonic clock, s; return the messages."""
     notes: list[Note] = []
@@ -162,10 +173,11 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         later = replace(drop_strokes(back), paused=True)
         yield Note("ERROR", localize("The session of {} is paused: {}", bed.name, error), session.uid)
     running.put(later)
-    moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
-    beds.write(bed, later, before)
+    # Whatever is written into the bed, Blender draws.
     if loop.LOOP.in_haste and later.finished_strokes == session.finished_strokes:
         return
+    moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
+    beds.write(bed, later, before)
     # Drawing costs most: where nothing has changed, nothing is redrawn.
     if before.stale or before.blocking_reason or changes or not np.array_equal(seen, _visible_rows(later)):
         view.show_state(bed, later.system, later.state)

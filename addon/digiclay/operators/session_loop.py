@@ -128,6 +128,7 @@ class FinishStrokes(Ticking, bpy.types.Operator):
         """Have the loop hurry, beside which this one shows the progress and takes Esc."""
         self.whole = _estimate_time()
         self.timer, loop.LOOP.in_haste = loop.time_window(context), True
+        views.stop()  # its curves would have the views drawn
         context.window_manager.progress_begin(0, 100)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -154,7 +155,8 @@ class FinishStrokes(Ticking, bpy.types.Operator):
 
     def _end(self, context: Any, *result: str) -> set[str]:
         """Give back the cursor and the timer, and let the loop take its time again; return the result."""
-        loop.LOOP.in_haste = False
+        tick.end_haste(context)
+        views.follow()
         context.window_manager.progress_end()
         if self.timer is not None:
             context.window_manager.event_timer_remove(self.timer)

@@ -29,7 +29,7 @@ from .brush import find_bed
 #: Colors of what is to be raised and lowered: blue and orange of Okabe and Ito, which all eyes tell apart.
 RAISED, LOWERED = np.array([0.0, 0.45, 0.70]), np.array([0.90, 0.62, 0.0])
 #: Where the light comes from, in the bed's space, and how dark a slope is that gets none.
-LIGHT, SHADE = np.array([-0.48, 0.36, 0.80]), 0.25
+LIGHT, SHADE = np.array([-0.48, 0.36, 0.80]), 0.4
 #: Opacity, the way of a pin from which on it has that, m, and the least way that is drawn, m.
 OPACITY, OPAQUE, LEAST = 0.7, 1e-3, 0.1e-3
 #: A path that is being laid has another ghost after so many times as long as that took.
@@ -77,15 +77,15 @@ def find_surface(session: Running) -> Floats | None:
 
 
 def find_colors(layout: Layout, ghost: Floats, height: Floats) -> Floats:
-    """Return colors and opacities (n, 4) of a surface (n,), m, that pins now at heights (n,), m, come to."""
+    """Return colors (n, 4), times their opacity, of a surface that pins at heights come to, (n,), m."""
     table = ghost.reshape(layout.rows, layout.columns)
     across, along = np.gradient(table, layout.row_spacing, layout.pitch)
     normal = np.stack([-along, -across, np.ones_like(table)], axis=-1).reshape(-1, 3)
     lit = (normal @ LIGHT / np.linalg.norm(normal, axis=1)).clip(0.0, 1.0)
     way = ghost - height
     color = np.where(way[:, None] > 0.0, RAISED, LOWERED) * (SHADE + (1.0 - SHADE) * lit[:, None])
-    opacity = OPACITY * (np.abs(way) / OPAQUE).clip(0.0, 1.0)
-    return np.column_stack([color, opacity])
+    # Times the opacity: from a pin that has no way its color does not reach those beside it.
+    return np.column_stack([color, np.ones(way.size)]) * OPACITY * (np.abs(way) / OPAQUE).clip(0, 1)[:, None]
 
 
 @lru_cache(maxsize=4)
@@ -133,7 +133,7 @@ def _draw_surface(bed: Any, session: Running, ghost: Floats) -> None:
         DRAWN.batch = _make_batch(session.system.grid, ghost, session.state.row(0))
     if DRAWN.batch is None:
         return
-    gpu.state.blend_set("ALPHA")
+    gpu.state.blend_set("ALPHA_PREMULT")
     gpu.state.face_culling_set("BACK")
     try:
         with gpu.matrix.push_pop():

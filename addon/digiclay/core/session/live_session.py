@@ -26,7 +26,7 @@ WINDOW = 1.0
 #: is for drawing, and for the person at the window.
 SHARE = 0.7
 #: Least time of those of a queue, as a share of what Blender draws for: software draws for half a second.
-LEAST = 0.4
+LEAST = 0.5
 #: Share of the time beside the periods that is drawing for certain: Blender also waits for the next tick.
 DRAWN = 0.9
 #: Shortest time between two ticks that is counted with, s: ticks may come in a burst.
