@@ -130,6 +130,9 @@ BENCHMARKS = {
     "methods": Benchmark(
         "method_figures.measure", "force deviation of Method III in fast drags and on other devices"
     ),
+    "pace": Benchmark(
+        "pace.measure", "how fast a fingertip can lead each method, beside what the method states"
+    ),
     "ablation": Benchmark(
         "method_figures.measure_ablation", "Method III with one part left out at a time",
         ("", "--part skirt"),

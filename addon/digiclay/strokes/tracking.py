@@ -30,7 +30,7 @@ CONTACT_TIME = 0.3
 MARGIN = 0.5e-3
 #: Fastest press, as a share of the speed of pins without load, and greatest acceleration of a fingertip up
 #: and down, m/s²: at 5 m/s² pins of the bed "design" lose it where a press ends.
-PRESS, SUDDEN = 0.8, 2.0
+PRESS, SUDDEN = 0.5, 2.0
 #: Changes of height less than this share of the blister's radius are none.
 NEAREST = 1e-9
 #: Samples across a fingertip, and halvings, in the search for its sink.
