@@ -17,7 +17,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.live_session import simulate_path
 from digiclay.settings.devices import BEDS, make_scene
-from digiclay.strokes.tracking import Tracking, find_tracking
+from digiclay.strokes.tracking import SUDDEN, Tracking, find_tracking
 
 from .report import Report, Steps, tabulate
 
@@ -100,7 +100,7 @@ def lay_stroke(
     top = rest + height - tracking.sink if raised else down
     z = np.append(np.arange(rest + ABOVE, rest, -DOWN * period), rest).tolist()
     while z[-1] > down:
-        speed = min(tracking.sink_speed, math.sqrt(2.0 * tracking.stop * (z[-1] - down)))
+        speed = min(tracking.sink_speed, math.sqrt(2.0 * SUDDEN * (z[-1] - down)))
         z.append(max(down, z[-1] - speed * period))
     pressed, climb = len(z), 0.0
     while z[-1] < top:
@@ -131,7 +131,7 @@ def find_limit(scene: Scene, system: System, tracking: Tracking, name: str) -> t
         held, speed = speed, speed * STEP
         faster = replace(tracking, **{name: speed})  # whatever the pins ahead can do
         if name == "lift":  # in the same time
-            faster = replace(faster, gain=min(tracking.gain * speed / stated, tracking.stop))
+            faster = replace(faster, gain=min(tracking.gain * speed / stated, SUDDEN))
         led = lead(scene, system, faster, height)
     return held, first
 
