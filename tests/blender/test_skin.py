@@ -162,7 +162,10 @@ def test_a_session_shows_the_skin_of_an_automatic_bed_and_leaves_what_was_chosen
         bed.digiclay_display.form = chosen
         view.show_form(bed)
         assert bed.digiclay_display.form == shown
-    bed.digiclay_display.form = "automatic"
+    bed.digiclay_display.form, bed.digiclay_display.color = "automatic", "force"
+    view.show_form(bed)
+    assert bed.digiclay_display.form == "automatic"
+    bed.digiclay_display.color = "mode"
     view.show_form(bed)
     bpy.ops.digiclay.skin_toggle()
     assert bed.digiclay_display.form == "automatic"

@@ -152,7 +152,7 @@ def shown(blender: Any) -> Iterator[float | None]:
     note(blender, "picked")
     yield from drag(blender, [(-12.0 + 4.0 * step, -24.0) for step in range(0, 5, 2)])
     display = blender.beds()[0].digiclay_display
-    display.color, display.arrows, display.overlay_full = "force", True, True
+    display.form, display.color, display.arrows, display.overlay_full = "pins", "force", True, True
     chosen = bpy.context.preferences.addons[blender.EXTENSION].preferences
     chosen.overlay_corner = "bottom_right"  # the finger is on the left
     yield from blender.settle()
@@ -164,7 +164,7 @@ def shown(blender: Any) -> Iterator[float | None]:
     bpy.ops.script.execute_preset(
         filepath=f"{theme}/Blender_Light.xml", menu_idname="USERPREF_MT_interface_theme_presets"
     )
-    display.color, display.arrows, display.overlay_full = "mode", False, False
+    display.form, display.color, display.arrows, display.overlay_full = "skin", "mode", False, False
     chosen.overlay_corner = "top_left"
     yield 1.5
     blender.shot("press_light")

@@ -22,7 +22,7 @@ def _palette(*codes: str) -> dict[Mode, Color]:
 
 
 #: sRGB of the skin; and the share of a mode's color in its tint.
-CLAY, SHARE = (0.76, 0.70, 0.63), 0.25
+CLAY, SHARE = (0.76, 0.70, 0.63), 0.2
 #: Modes over which the skin is plain clay: nothing moves these pins.
 PLAIN = (Mode.REST, Mode.HOLD)
 #: Beginning of the roles of the skin's materials over pins of the other modes.

@@ -189,8 +189,8 @@ def set_form(bed: Any, form: str) -> None:
 
 
 def show_form(bed: Any) -> None:
-    """Show a bed that is shown as "automatic" as a skin: the form is what a sculptor looks at."""
-    if read_form(bed) == "automatic":
+    """Show a bed that is shown as "automatic" as a skin for a sculptor, unless its pins tell forces."""
+    if read_form(bed) == "automatic" and not wants_force(bed):
         set_form(bed, "skin")
         bed[BEFORE] = "automatic"
 

@@ -160,7 +160,7 @@ def details(sidebar: Any, context: Any) -> None:
     skin = column.column()
     skin.enabled = view.can_show_skin(bed)
     draw_property(skin, shown, "skin", shown.form != "pins", expand=True)
-    draw_property(column, shown, "color", expand=True)
+    draw_property(column, shown, "color", shown.form != "skin", expand=True)
     draw_property(column, shown, "top_force", shown.color == "force")
     draw_property(column, shown, "arrows")
     draw_property(column, shown, "arrow_length", shown.arrows)
