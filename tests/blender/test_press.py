@@ -149,4 +149,6 @@ def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_uni
     assert brush.describe_brush(finger, Brush.LOWER, 4e-3, 0.5) == "Size 16 mm   Lower, depth 4 mm × 50 %"
     assert brush.describe_brush(finger, Brush.LEVEL, 4e-3) == "Size 16 mm   Level 100 %"
     assert brush.describe_brush(finger, Brush.SMOOTH, 4e-3, 0.8) == "Size 16 mm   Smooth 80 %"
-    assert [brush.amount_name(one) for one in Brush] == ["depth", "height", "depth", "depth"]
+    assert brush.describe_brush(finger, Brush.UNLOCK, 4e-3) == "Size 16 mm   Unlock"
+    assert brush.describe_brush(finger, Brush.STAMP, 4e-3) == "Size 16 mm   Stamp, height 4 mm"
+    assert [one for one in Brush if brush.amount_name(one) == "height"] == [Brush.RAISE, Brush.STAMP]

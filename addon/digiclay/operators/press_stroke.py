@@ -16,9 +16,12 @@ from ..press import aim, brush, ghost, pointer, tool
 from ..press.pointer import begin_button, read_event
 from ..sessions import running
 from ..sessions.sculpting import change_stroke, find_stroke, last_place, queue_stroke
-from ..settings.declared import choice, flag, number, title
+from ..settings.declared import choice, flag, integer, number, text, title
 from ..strokes.stroke import (
     DEEPEST,
+    FEWEST,
+    MOST,
+    STAMPS,
     Brush,
     Stroke,
     deepen,
@@ -26,7 +29,7 @@ from ..strokes.stroke import (
     lay_line,
     lay_path,
     lay_ring,
-    make_images,
+    lay_square,
     pull,
     start,
 )
@@ -44,9 +47,13 @@ KEYS_PLAIN = "{}  |  Esc or right click: take the stroke back"
 #: Reports where a brush cannot work.
 NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
 HIDDEN = "{} hides the bed here: press beside it, look from elsewhere, or hide it (H)"
-RECOVERS = "Smoothed pins will not stay so: the method {} brings all pins back"
+RECOVERS = "These pins will not stay so: the method {} brings all pins back"
 #: Result of a press on something else: Blender shows no reports of an operator that only passes.
 NOT_PRESSED = {"CANCELLED", "PASS_THROUGH"}
+
+
+#: Range of a place on the bed, mm.
+PLACE = {"soft_min": -100.0, "soft_max": 100.0, "step": 100}
 
 
 class PressSettings:
@@ -57,11 +64,11 @@ class PressSettings:
         translation_context="Brush",
     )  # fmt: skip
     depth: millimeters(
-        "Depth", 4e-3, "How far a stroke of Lower goes below the surface, in mm",
+        "Depth", 4e-3, "How far a stroke of Lower, or a stamp with Ctrl, goes below the surface, in mm",
         min=0.1, max=1e3 * DEEPEST, soft_max=10.0, step=25,
     )  # fmt: skip
     height: millimeters(
-        "Height", 15e-3, "How far a stroke of Raise goes above the surface, in mm",
+        "Height", 15e-3, "How far a stroke of Raise, or a stamp, goes above the surface, in mm",
         min=0.1, max=1e3 * DEEPEST, soft_max=30.0, step=100,
     )  # fmt: skip
     strength: number(
@@ -70,9 +77,19 @@ class PressSettings:
         subtype="FACTOR", precision=2,
     )  # fmt: skip
     symmetry: choice(
-        "Symmetry", "Mirror images of a stroke about the middle of the bed. The device has one finger: "
+        "Symmetry", "Mirror images of a stroke, or turned ones. The device has one finger: "
         "it forms them one after the other, as one undo step", items=brush.SYMMETRY_ITEMS, default="NONE",
     )  # fmt: skip
+    radial: integer("Radial Count", "Number of images", default=6, min=FEWEST, max=MOST)
+    center_x: millimeters(
+        "Center X", 0.0, "Center of the symmetry", soft_min=-100.0, soft_max=100.0, step=100
+    )
+    center_y: millimeters(
+        "Center Y", 0.0, "Center of the symmetry", soft_min=-100.0, soft_max=100.0, step=100
+    )
+    axis: number("Axis", "Turn of the mirror's axes", default=0.0, subtype="ANGLE", step=1000)
+    stamp: choice("Stamp", "Shape that is stamped", items=brush.STAMP_ITEMS, default="heart")
+    stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
     accumulate: flag(
         "Accumulate", "Where a stroke comes back to what it has formed, it counts from there once more",
         default=False,
@@ -108,13 +125,13 @@ class Press(PressSettings, Polled, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points; beside the bed there is nothing to press."""
-        if self.path != "FREE":
-            return {"PASS_THROUGH"}  # to the operator of lines and rings
+        # Shift and Ctrl change the brush for as long as this stroke lasts.
+        self.kind = brush.choose_brush(self.brush, event)
+        if brush.find_path(self, self.kind) != "FREE":
+            return {"PASS_THROUGH"}  # to the operator of lines, rings and stamps
         target = find_pressed(self, context, brush.find_press(context, event))
         if target is None:
             return NOT_PRESSED
-        # Shift and Ctrl change the brush for as long as this stroke lasts.
-        self.kind = brush.choose_brush(self.brush, event)
         session = open_session(self, context, target.bed, self.kind)
         if session is None:
             return {"CANCELLED"}
@@ -131,7 +148,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             session,
             *place,
             depth,
-            make_images(self.symmetry),
+            brush.find_images(self),
             self.kind,
             share,
             self.lean,
@@ -264,7 +281,7 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
         names = brush.LABELS[kind], title(session.scene.method)
         operator.report({"ERROR"}, localize(NO_BLISTER, *map(localize, names)))
         return None
-    if kind is Brush.SMOOTH and session.scene.control and METHODS[session.scene.method].recovers:
+    if kind in (Brush.SMOOTH, *STAMPS) and session.scene.control and METHODS[session.scene.method].recovers:
         operator.report({"WARNING"}, localize(RECOVERS, localize(title(session.scene.method))))
     if session.paused:
         words = localize("The session is paused: the fingertip follows after it resumes")
@@ -274,22 +291,23 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
 
 
 #: Path between two places of the bed, by the tool's setting.
-SHAPES: dict[str, Callable[[Any, Any], Any]] = {"LINE": lay_line, "RING": lay_ring}
+SHAPES: dict[str, Callable[[Any, Any], Any]] = {"LINE": lay_line, "RING": lay_ring, "STAMP": lay_square}
 SHAPE_KEYS = {
     "LINE": "Length {:.1f} mm  |  Release: form the line  |  Esc or right click: cancel",
     "RING": "Radius {:.1f} mm  |  Release: form the ring  |  Esc or right click: cancel",
+    "STAMP": "Half width {:.1f} mm  |  Release: stamp  |  Esc or right click: cancel",
 }
 
 
 def _no_shape(context: Any) -> str:
     """The tool is set to free strokes, or another one is in use: the press is for another operator."""
     settings = brush.tool_settings(context)
-    chosen = settings is not None and settings.path in SHAPES
-    return "" if chosen else "Select the Press tool, and Line or Ring in its header"
+    chosen = settings is not None and brush.find_path(settings, Brush(settings.brush)) in SHAPES
+    return "" if chosen else "Select the Press tool, and Line, Ring or Stamp in its header"
 
 
 class PressShape(Drawing, bpy.types.Operator):
-    """Form a line from the place under the mouse, or a ring about it, by dragging to its end or rim"""
+    """Form a line from the place under the mouse, or a ring or stamp about it, by dragging to its end"""
 
     bl_idname = "digiclay.press_shape"
     bl_label = "Press Line or Ring"
@@ -297,12 +315,15 @@ class PressShape(Drawing, bpy.types.Operator):
     needs = (_no_shape,)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
+        settings: Any = brush.tool_settings(context)
+        self.kind = brush.choose_brush(settings.brush, event)
+        self.shape = brush.find_path(settings, self.kind)
+        if self.shape not in SHAPES:
+            return {"PASS_THROUGH"}  # Shift smooths along a free path
         target = find_pressed(self, context, brush.find_press(context, event))
         if target is None:
             return NOT_PRESSED
-        settings: Any = brush.tool_settings(context)
         self.uid, self.grid, self.height = target.bed.session_uid, target.grid, target.height.copy()
-        self.shape, self.kind = settings.path, brush.choose_brush(settings.brush, event)
         self.start = self.to = float(target.point[0]), float(target.point[1])
         self.begin(context)
         self._show(context)
@@ -326,10 +347,14 @@ class PressShape(Drawing, bpy.types.Operator):
         if event.type == "MOUSEMOVE":
             return {"RUNNING_MODAL"}
         self.end(context)
-        return _queue_path(self, context, bed, self._path(), self.kind)
+        return _queue_path(self, context, bed, self._lay(), self.kind)
+
+    def _lay(self) -> Any:
+        """Return the path of the stroke, (k, 2), m: that of a stamp is from its middle to its right side."""
+        return lay_line(self.start, self.to) if self.shape == "STAMP" else self._path()
 
     def _path(self) -> Any:
-        """Return the path as it is now, (k, 2), m."""
+        """Return what is drawn of the path as it is now, (k, 2), m."""
         return SHAPES[self.shape](self.start, self.to)
 
     def _show(self, context: Any) -> None:
@@ -337,7 +362,7 @@ class PressShape(Drawing, bpy.types.Operator):
         length = float(np.hypot(self.to[0] - self.start[0], self.to[1] - self.start[1]))
         self.words = localize(SHAPE_KEYS[self.shape], 1e3 * length)
         show_status(context, self.words)
-        ghost.plan(self.uid, _lay_stroke(brush.tool_settings(context), self._path(), self.kind))
+        ghost.plan(self.uid, _lay_stroke(brush.tool_settings(context), self._lay(), self.kind))
         self.region.tag_redraw()
 
     def end(self, context: Any, *result: str) -> set[str]:
@@ -350,7 +375,7 @@ class PressShape(Drawing, bpy.types.Operator):
         if bed is None or settings is None or context.area != area:
             return
         lines = []
-        for image in make_images(settings.symmetry):
+        for image in brush.find_images(settings):
             path = np.array([image.place(*place) for place in self._path()])
             heights = self.height[self.grid.at(path[:, 0], path[:, 1])]
             lines += [np.column_stack([path, heights])] if len(path) > 1 else []
@@ -375,16 +400,18 @@ class PressLine(Polled, bpy.types.Operator):
         session = running.find(target.bed)
         start = last_place(session) if session is not None else None
         settings: Any = brush.tool_settings(context)
-        path = [to] if start is None else lay_line(start, to)
-        return _queue_path(self, context, target.bed, path, Brush(settings.brush))
+        kind = Brush(settings.brush)
+        path = [to] if start is None or kind in STAMPS else lay_line(start, to)
+        return _queue_path(self, context, target.bed, path, kind)
 
 
 def _lay_stroke(settings: Any, path: Any, kind: Brush) -> Stroke:
     """Return the stroke along a path (k, 2), m, as the tool's settings have it."""
     share = float(settings.strength)
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
-    (x, y), images, accumulate = path[0], make_images(settings.symmetry), settings.accumulate
-    return lay_path(start(0, x, y, depth, images, kind, share, accumulate=accumulate), path)
+    (x, y), images, kept = path[0], brush.find_images(settings), brush.find_stamp(settings, kind)
+    laid = start(0, x, y, depth, images, kind, share, accumulate=settings.accumulate, stamp=kept)
+    return lay_path(laid, path)
 
 
 def _queue_path(operator: Any, context: Any, bed: Any, path: Any, kind: Brush) -> set[str]:

@@ -40,6 +40,16 @@ def stroke_options(column: Any, settings: Any) -> None:
     row.enabled = settings.path == "FREE"
     row.prop(settings, "stabilizer")
     column.prop(settings, "symmetry")
+    if settings.symmetry == "RADIAL":
+        column.prop(settings, "radial")
+    if settings.symmetry != "NONE":
+        column.prop(settings, "center_x")
+        column.prop(settings, "center_y")
+        if settings.symmetry != "RADIAL":
+            column.prop(settings, "axis")
+    # From a popover an operator would be called in the header.
+    column.operator_context = "INVOKE_REGION_WIN"
+    column.operator("digiclay.press_center", icon="PIVOT_CURSOR")
     column.prop(settings, "accumulate")
 
 

@@ -10,10 +10,13 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.model.fingertip import Fingertip
+from ..core.shapes.fitting import list_shapes
+from ..core.shapes.heightmap import HeightMap
 from ..live import beds
 from ..roles import bed_of, is_bed
 from ..settings import devices
-from ..strokes.stroke import Brush
+from ..strokes.stamps import load_stamp
+from ..strokes.stroke import LOCKS, STAMPS, Brush, Image, make_images
 from ..ui_text import localize
 
 #: Semi-axes that differ by less are the same, m.
@@ -56,8 +59,11 @@ def _same(first: Fingertip, other: Fingertip) -> bool:
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.
-ADJUSTING = frozenset({"DIGICLAY_OT_press_size", "DIGICLAY_OT_press_depth", "DIGICLAY_OT_press_strength"})
-LABELS = {brush: brush.value.title() for brush in Brush}
+ADJUSTING = frozenset({
+    "DIGICLAY_OT_press_size", "DIGICLAY_OT_press_depth", "DIGICLAY_OT_press_strength",
+    "DIGICLAY_OT_press_center",
+})  # fmt: skip
+LABELS = {brush: brush.value.replace("_", " ").title() for brush in Brush}
 BRUSH_WORDS = {
     Brush.LOWER: "Press a valley of the given depth. With Ctrl: Raise",
     Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge. "
@@ -65,13 +71,53 @@ BRUSH_WORDS = {
     Brush.LEVEL: "Bring hills and hollows to the height of the surface under the first touch",
     Brush.SMOOTH: "Drive the pins in the ring to smoothed heights, without a touch. "
     "Shift and drag: with any brush",
+    Brush.ERASE: "Drive the pins in the ring back to rest, without a touch",
+    Brush.LOCK: "Shut the valves of the pins in the ring, so that nothing moves them. With Ctrl: Unlock",
+    Brush.STAMP: "Put a shape onto the surface: click for the size of the ring, or drag from the middle to "
+    "the right side. With Ctrl: pressed in",
 }
 BRUSH_ITEMS = tuple((brush.value, LABELS[brush], words) for brush, words in BRUSH_WORDS.items())
 SYMMETRY_ITEMS = (
     ("NONE", "No Symmetry", "Form the stroke alone"),
-    ("X", "X", "Form the stroke, then its mirror image across the bed's YZ plane"),
-    ("Y", "Y", "Form the stroke, then its mirror image across the bed's XZ plane"),
+    ("X", "X", "Form the stroke, then its mirror image across the axis along the bed's y"),
+    ("Y", "Y", "Form the stroke, then its mirror image across the axis along the bed's x"),
     ("XY", "X and Y", "Form the stroke, then its three mirror images"),
+    ("RADIAL", "Radial", "Form the stroke, then turned about the center"),
+)
+#: Settings of a placed symmetry, and the shortest drag that turns its axis, m.
+PLACED, SHORT = ("symmetry", "center_x", "center_y", "axis"), 1e-3
+
+
+def find_images(settings: Any) -> tuple[Image, ...]:
+    """Return a stroke's path and its images, by the settings of the tool."""
+    center = 1e-3 * settings.center_x, 1e-3 * settings.center_y
+    return make_images(settings.symmetry, settings.radial, center, settings.axis)
+
+
+def read_center(settings: Any) -> dict[str, Any]:
+    """Return the settings that `put_center` and `turn_axis` change."""
+    return {name: getattr(settings, name) for name in PLACED}
+
+
+def put_center(settings: Any, x: float, y: float) -> None:
+    """Place the center of symmetry, m; without symmetry from now on with one axis."""
+    settings.center_x, settings.center_y = 1e3 * x, 1e3 * y
+    if settings.symmetry == "NONE":
+        settings.symmetry = "X"
+
+
+def turn_axis(settings: Any, x: float, y: float) -> None:
+    """Turn the first axis of symmetry into a direction."""
+    if math.hypot(x, y) >= SHORT:
+        upright = math.pi / 2.0 if settings.symmetry == "X" else 0.0
+        settings.axis = math.remainder(math.atan2(y, x) - upright, math.pi)
+
+
+#: What is stamped: a sample shape, or a file.
+FILE = "FILE"
+STAMP_ITEMS = (
+    *((name, name.replace("_", " ").title(), "") for name in list_shapes()),
+    (FILE, "File", "A mesh, a picture (bright is high) or a .npy file of heights"),
 )
 PATH_ITEMS = (
     ("FREE", "Free", "Drag to draw the path"),
@@ -114,6 +160,18 @@ def find_press(context: Any, event: Any) -> tuple[int, int]:
     return event.mouse_prev_press_x - context.region.x, event.mouse_prev_press_y - context.region.y
 
 
+def find_path(settings: Any, brush: Brush) -> str:
+    """Return the path of a stroke: that of the settings, or STAMP."""
+    return "STAMP" if brush in STAMPS else str(settings.path)
+
+
+def find_stamp(settings: Any, brush: Brush) -> HeightMap | None:
+    """Return what a brush stamps; a DigiclayError where it cannot be read."""
+    if brush not in STAMPS:
+        return None
+    return load_stamp(bpy.path.abspath(settings.stamp_file) if settings.stamp == FILE else settings.stamp)
+
+
 def amount_name(brush: Brush) -> str:
     """Return which of the tool's settings says how far a brush goes: depth or height."""
     return "height" if brush.rises else "depth"
@@ -126,6 +184,8 @@ def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: floa
 
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
     """Return a brush, and its depth or height (m) times strength, in mm."""
+    if brush in LOCKS:
+        return localize(LABELS[brush])
     if not brush.has_amount:
         return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,17 +23,20 @@ from ..sessions import running
 from ..sessions.sculpting import estimate_time
 from ..settings import devices
 from ..strokes.nominal import find_radius
-from ..strokes.stroke import Brush, make_images
+from ..strokes.stroke import LOCKS, STAMPS, Brush, lay_ring, lay_square
+from ..strokes.sweep import SWEEPS
 from ..ui_text import localize
 from . import aim
 from .brush import (
     ADJUSTING,
+    FILE,
     OPERATOR,
     TOOL,
     amount_name,
     bed_in_use,
     describe_brush,
     describe_queue,
+    find_images,
     find_kind,
 )
 
@@ -40,6 +44,8 @@ from .brush import (
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
 #: That of a stroke that smooths has the color of the pins that the device drives.
 SMOOTHING = COLORS[Mode.BLISTER]
+#: Radius of the mark of a center of symmetry, m, and how many places along an axis lie on pins.
+MARK, PARTS = 2e-3, 240
 
 
 def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> list[Line]:
@@ -73,17 +79,18 @@ def draw_on_bed(
     cursor(make_lines(shown, system.pixel_size, color), label)
 
 
-#: Width from which on a header names brushes and popovers in full, in pixels at a resolution scale of 1.
-WIDE = 1000
+#: Widths from which on a header names popovers in full, and has a button for each brush, in pixels at a
+#: resolution scale of 1.
+WIDE, WIDEST = 1000, 1450
 #: Widths of what it holds, in Blender's units of 20 pixels.
 BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 5.8, 6.6, 6.0
 
 
 def draw_header(context: Any, layout: Any, settings: Any) -> None:
     """Draw the tool's settings into the header."""
-    wide = context.region.width >= WIDE * context.preferences.system.ui_scale
-    row = layout.row(align=True)
-    if wide:
+    width = context.region.width / context.preferences.system.ui_scale
+    wide, row = width >= WIDE, layout.row(align=True)
+    if width >= WIDEST:
         row.prop(settings, "brush", expand=True)
     else:
         row.ui_units_x = BRUSH
@@ -95,7 +102,16 @@ def draw_header(context: Any, layout: Any, settings: Any) -> None:
         row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
     if Brush(settings.brush).has_amount:
         _number(layout, settings, amount_name(Brush(settings.brush)), AMOUNT)
-    _number(layout, settings, "strength", STRENGTH)
+    if Brush(settings.brush) in LOCKS:
+        row = layout.row(align=True)
+        row.operator("digiclay.press_locks_invert", text="Invert")
+        row.operator("digiclay.press_locks_clear", text="Clear")
+    else:
+        _number(layout, settings, "strength", STRENGTH)
+    if Brush(settings.brush) in STAMPS:
+        layout.prop(settings, "stamp", text="")
+        if settings.stamp == FILE:
+            layout.prop(settings, "stamp_file", text="")
     if bed is not None:
         kind = find_kind(devices.read_finger(bed.digiclay))
         words = (kind.label if kind else "Finger") if wide else ""
@@ -133,7 +149,9 @@ def touch_outline(
 
 def find_outline(finger: Fingertip, turn: Floats, depth: float, kind: Brush, layout: Layout) -> Floats:
     """Return the rim of what a brush would form about the origin at a depth, m, (k, 2), m."""
-    if kind is Brush.SMOOTH:
+    if kind in STAMPS:
+        return lay_square((0.0, 0.0), (find_radius(finger, layout), 0.0))[:-1]
+    if kind in SWEEPS:
         radius = find_radius(finger, layout)
         return find_contact_outline(Fingertip(radius, radius, radius), turn, radius)
     return find_contact_outline(finger, turn, depth)
@@ -166,14 +184,14 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
             depth,
             kind,
         )
-        for image in make_images(settings.symmetry)
+        for image in find_images(settings)
     ]
     amount = 1e-3 * getattr(settings, amount_name(kind))
     text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)
     text += describe_queue(*_measure_queue(target.bed))
     text = text if preferences.get(context).show_cursor_text else ""
-    color = SMOOTHING if kind is Brush.SMOOTH else LIGHT
-    paths = [*map(close, rims), *_trail(target)]
+    color = SMOOTHING if kind in SWEEPS else LIGHT
+    paths = [*map(close, rims), *find_axes(target.grid, target.height, settings), *_trail(target)]
     draw_on_bed(context, target.bed, paths, text, xy, color, (region.x, region.y))
 
 
@@ -183,6 +201,21 @@ def _measure_queue(bed: Any) -> tuple[int, float | None]:
     if session is None or session.paused or not session.clock.factor:
         return (len(session.strokes) if session else 0), None
     return len(session.strokes), estimate_time(session) / session.clock.factor
+
+
+def find_axes(grid: Grid, height: Floats, settings: Any) -> list[Floats]:
+    """Return axes and center of the tool's symmetry, lying on pins at heights (n,), m; (k, 3), m."""
+    if settings.symmetry == "NONE":
+        return []
+    center, axis = 1e-3 * np.array([settings.center_x, settings.center_y]), float(settings.axis)
+    lines = [lay_ring(tuple(center), (center[0] + MARK, center[1]))]
+    right, up = np.abs(grid.x).max(), np.abs(grid.y).max()
+    parts = np.linspace(-2.0, 2.0, PARTS)[:, None] * np.hypot(right, up)
+    for kind, angle in (("Y", axis), ("X", axis + math.pi / 2.0)):
+        if kind in settings.symmetry:
+            line = center + parts * (math.cos(angle), math.sin(angle))
+            lines.append(line[(np.abs(line) <= (right, up)).all(axis=1)])
+    return [drape(grid, height, line) for line in lines if len(line) > 1]
 
 
 def _shown_brush(bed: Any, settings: Any) -> Brush:

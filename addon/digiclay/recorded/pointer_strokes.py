@@ -70,7 +70,7 @@ class PointerStroke(Parameters):
     center_x: float = quantity(0.0, "center of the symmetry", unit="m", at_least=-1.0, at_most=1.0)
     center_y: float = quantity(0.0, "center of the symmetry", unit="m", at_least=-1.0, at_most=1.0)
     axis: float = quantity(0.0, "turn of the mirrors' axes, in degrees", at_least=-360.0, at_most=360.0)
-    stamp: str = quantity("dome", "what is stamped: a sample shape's name, or a file")
+    stamp: str = quantity("heart", "what is stamped: a sample shape's name, or a file")
     accumulate: bool = quantity(False, "whether a path that comes back counts from what it has left there")
     stabilizer: float = quantity(0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3)
     length: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)

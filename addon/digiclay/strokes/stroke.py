@@ -123,6 +123,8 @@ class Brush(Enum):
         return self in (Brush.RAISE, Brush.LEVEL)
 
 
+#: Brushes without a strength.
+LOCKS = (Brush.LOCK, Brush.UNLOCK, Brush.INVERT_LOCKS, Brush.CLEAR_LOCKS)
 #: Brushes that put a shape onto the surface, up or down.
 STAMPS = (Brush.STAMP, Brush.IMPRINT)
 INVERSES = {Brush.LOWER: Brush.RAISE, Brush.LOCK: Brush.UNLOCK, Brush.STAMP: Brush.IMPRINT}
@@ -257,6 +259,14 @@ def pull(place: Place, mouse: Place, radius: float) -> Place:
 def lay_line(start: Place, end: Place) -> Floats:
     """Return the ends of a line, (2, 2), m."""
     return np.array([start, end])
+
+
+def lay_square(middle: Place, side: Place) -> Floats:
+    """Return a closed square (5, 2), m, about a place, with the middle of its right side at another."""
+    along = np.subtract(side, middle)
+    across = np.array([-along[1], along[0]])
+    corners = [along - across, along + across, across - along, -along - across]
+    return np.array([*corners, corners[0]]) + middle
 
 
 def lay_ring(center: Place, rim: Place) -> Floats:

@@ -1,0 +1,93 @@
+"""What the Press tool's header has beside strokes: the center of symmetry, and the locks of all pins."""
+
+from dataclasses import replace
+from typing import Any
+
+from ..compat import bpy
+from ..press import aim, brush, tool
+from ..sessions import running
+from ..sessions.sculpting import change_stroke, queue_stroke
+from ..strokes.stroke import SHALLOWEST, Brush
+from ..ui_text import localize
+from .action import Drawing, action, show_status
+from .poll_messages import no_finger, no_tool_in_view
+from .press_stroke import find_pressed, open_session
+
+KEYS = "Press where the center is to be, and drag along the axis  |  Esc or right click: cancel"
+
+
+class PlaceCenter(Drawing, bpy.types.Operator):
+    """Place the center of symmetry: press on the bed, and drag along the mirror's axis"""
+
+    bl_idname = "digiclay.press_center"
+    bl_label = "Place Center"
+    bl_options = {"INTERNAL"}
+    needs = no_tool_in_view, no_finger
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Wait for the press."""
+        self.uid, self.center = 0, (0.0, 0.0)
+        self.before = brush.read_center(brush.tool_settings(context))
+        show_status(context, localize(KEYS))
+        return self.begin(context)
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Place the center by the press, and the axis until the release; the view can be turned meanwhile."""
+        settings = brush.tool_settings(context)
+        if settings is None:
+            return self.end(context, "CANCELLED", "PASS_THROUGH")
+        if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
+            for name, value in self.before.items():
+                setattr(settings, name, value)
+            return self.end(context, "CANCELLED")
+        xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            with context.temp_override(region=self.region):
+                target = find_pressed(self, bpy.context, xy)
+            if target is not None:
+                self.uid, self.grid, self.height = target.bed.session_uid, target.grid, target.height.copy()
+                self.center = float(target.point[0]), float(target.point[1])
+                brush.put_center(settings, *self.center)
+        elif event.type in ("MOUSEMOVE", "LEFTMOUSE") and self.uid:
+            bed = brush.find_bed(context, self.uid)
+            with context.temp_override(region=self.region):
+                point = bed and aim.hit_point(bpy.context, bed, self.grid, self.height, xy)
+            if point is not None:
+                brush.turn_axis(settings, float(point[0]) - self.center[0], float(point[1]) - self.center[1])
+            if event.type == "LEFTMOUSE":
+                return self.end(context, "FINISHED")
+        else:
+            return {"PASS_THROUGH"}
+        self.region.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def draw_view(self, area: Any) -> None:
+        """Draw center and axes in the view the operator was called in."""
+        context = bpy.context
+        bed, settings = brush.bed_in_use(context), brush.tool_settings(context)
+        if bed is not None and settings is not None and context.area == area:
+            tool.draw_on_bed(context, bed, tool.find_axes(*aim.read_surface(bed), settings), "", (0.0, 0.0))
+
+
+def _tell_all(operator: Any, context: Any, kind: Brush) -> set[str] | None:
+    """Queue a stroke that tells all pins something."""
+    session = open_session(operator, context, brush.bed_in_use(context), kind)
+    if session is None:
+        return {"CANCELLED"}
+    x, y = session.pose[:2].tolist()
+    session, number = queue_stroke(session, x, y, SHALLOWEST, brush=kind)
+    running.put(change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
+    return None
+
+
+# The session makes the undo step.
+@action("digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=())
+def invert_locks(operator: Any, context: Any) -> set[str] | None:
+    """Lock the pins that are not locked, and unlock those that are"""
+    return _tell_all(operator, context, Brush.INVERT_LOCKS)
+
+
+@action("digiclay.press_locks_clear", "Clear Locks", no_tool_in_view, no_finger, options=())
+def clear_locks(operator: Any, context: Any) -> set[str] | None:
+    """Unlock all pins"""
+    return _tell_all(operator, context, Brush.CLEAR_LOCKS)
