@@ -24,7 +24,9 @@ def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
     blender.select(blender.beds()[0])
     yield None
     move, press = ("MOUSEMOVE", "NOTHING"), "LEFTMOUSE"
-    way = [(*move, x) for x in (15, -15) * 4]  # more than the fingertip forms until Tab
+    settings = blender.part("press.brush").tool_settings(bpy.context)
+    settings.brush = "RAISE"  # it takes the device of this bed longest
+    way = [(*move, x) for x in (15, -15) * 8]  # more than the fingertip forms until Tab
     for kind, value, x in ((*move, -15), (press, "PRESS", -15), *way, (press, "RELEASE", -15)):
         blender.event(kind, value, blender.on_the_bed(x, -25.0))  # beside the sidebar
         yield 0.05
@@ -36,6 +38,7 @@ def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
         strokes.append([len(session.strokes) for session in blender.sessions()])
     blender.shot("session_edited")
     yield from blender.after("edited no more", "TAB")
+    settings.brush = "LOWER"
 
 
 def script(blender: Any) -> Iterator[float | None]:

@@ -21,9 +21,11 @@ def finger(seen: Seen, name: str) -> np.ndarray:
 
 def test_a_press_starts_a_session_and_puts_the_finger_under_the_mouse(seen: Seen) -> None:
     assert (seen["added"]["sessions"], seen["pressed"]["sessions"]) == (0, 1)
-    # 18 mm, 6 mm to a pixel of the picture: the bed of 75 mm is 500 pixels wide.
-    np.testing.assert_allclose(finger(seen, "pressed")[:2], [18.0, 6.0], rtol=0, atol=0.3)
-    assert finger(seen, "pressed")[2] == pytest.approx(REST - 4.0, abs=0.3)
+    # 18 mm, 6 mm to a pixel of the picture: the bed of 75 mm is 500 pixels wide. The fingertip waits within
+    # 0.5 mm of the hand, the way of a control period.
+    np.testing.assert_allclose(finger(seen, "pressed")[:2], [18.0, 6.0], rtol=0, atol=0.8)
+    # Its lowest point is below the tops of the pins that hold its force.
+    assert -6.0 < finger(seen, "pressed")[2] - REST < -4.0
 
 
 def test_dragging_draws_a_valley_alone_and_let_go_the_fingertip_leaves_the_bed(seen: Seen) -> None:
@@ -52,12 +54,10 @@ def test_gestures_are_taken_back_and_the_session_goes_on(
 
 
 def test_the_wheel_presses_deeper_and_ctrl_in_mid_stroke_draws_on_as_deep(seen: Seen) -> None:
-    before, deeper, along = (
-        finger(seen, name) for name in ("before the wheel", "after the wheel", "after Ctrl")
-    )
-    assert deeper[2] == pytest.approx(before[2] - 2.0, abs=0.3)
-    assert along[2] == pytest.approx(deeper[2], abs=0.3)
-    assert np.linalg.norm((along - deeper)[:2]) > 3.0
+    before, along = (finger(seen, name) for name in ("before the wheel", "after Ctrl"))
+    # The fingertip goes deeper where the hand goes on; until then the ghost does.
+    assert along[2] == pytest.approx(before[2] - 2.0, abs=0.3)
+    assert np.linalg.norm((along - before)[:2]) > 3.0
 
 
 def test_clicks_pick_the_pins_under_the_mouse_and_forces_are_written_once_they_are_shown(seen: Seen) -> None:
