@@ -326,6 +326,10 @@ def test_discs_are_locked_unlocked_and_inverted(given: list[Orders], left: tuple
     np.testing.assert_array_equal(state.mode()[places] == Mode.LOCKED, left)
     again = snapshot.load(system, snapshot.dump(system, state))
     np.testing.assert_array_equal(again.mode(), state.mode())
+    *_, state = simulate_path(system, state, stay_away(80))
+    np.testing.assert_array_equal(state.mode(), again.mode())
+    # Locked pins cost nothing: none takes part where no finger is.
+    assert state.active.cells.size == 0
 
 
 def test_a_pin_locked_on_its_way_stops_there_and_stays_there_when_it_is_unlocked() -> None:

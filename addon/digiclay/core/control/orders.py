@@ -43,8 +43,8 @@ from .exchange import Exchange, make_exchange
 from .servo import mark_formed
 from .travel import measure_square
 
-#: Numbers of an order, and of one in takes of the third version, which had no verb.
-ORDER, VERBLESS = 5, 4
+#: Numbers of an order.
+ORDER = 5
 #: How long strength 1 takes, s, to spread heights over the radius, SMOOTH and AVERAGE, and to erase all
 #: but 1/e. At 100 mm/s one pass of SMOOTH leaves 15 to 45 % of what varies on the beds of `settings.devices`.
 SPREADING, AVERAGING, ERASING = 0.25, 1.0, 5e-3
@@ -108,20 +108,13 @@ def add_verbs(rows: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class DrivingControl:
-    """Controller of one control period with an order: the method's, but for the cells the valves drive.
+class Around:
+    """Controller around the method's, whose memory it has.
 
-    Its memory is the method's, and its cells remember nothing of their own. After any period the method alone
-    can continue the session.
+    Cells remember nothing of it: after any period the method alone can continue the session.
     """
 
     method: Controller
-    free: bool
-    """Whether the bed has no method."""
-    drive: Drive
-    actuator: Actuator
-    reach: Disc
-    """Cells to be driven, and those whose heights that takes, m."""
 
     @property
     def rows(self) -> int:
@@ -131,6 +124,18 @@ class DrivingControl:
     def begin(self) -> Any:
         """Return the memory before a session."""
         return self.method.begin()
+
+
+@dataclass(frozen=True, eq=False)
+class DrivingControl(Around):
+    """Controller of one control period with an order: the method's, but for the cells the valves drive."""
+
+    free: bool
+    """Whether the bed has no method."""
+    drive: Drive
+    actuator: Actuator
+    reach: Disc
+    """Cells to be driven, and those whose heights that takes, m."""
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
         """Request the order's disc, and the method's; see `Controller`."""
@@ -242,26 +247,16 @@ class PlacingControl(DrivingControl):
 
 
 @dataclass(frozen=True, eq=False)
-class LockingControl:
+class LockingControl(Around):
     """Controller of a bed with locked pins: the method's, which takes them for pins that hold or rest.
 
     A locked pin is commanded to where it is, so that it stays there when it is unlocked.
     """
 
-    method: Controller
     actuator: Actuator
     verb: Verb
     disc: Disc | None = None
     """Pins to be locked or unlocked; None: the locked ones stay as they are."""
-
-    @property
-    def rows(self) -> int:
-        """State rows a cell needs."""
-        return self.method.rows
-
-    def begin(self) -> Any:
-        """Return the memory before a session."""
-        return self.method.begin()
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
         """Request the disc, and the method's; see `Controller`."""
