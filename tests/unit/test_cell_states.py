@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 
@@ -18,14 +19,16 @@ from digiclay.core.control.cell_states import (
     Patch,
     follow_arrows,
 )
-from digiclay.core.control.travel import Heading
+from digiclay.core.control.travel import Heading, Rim
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout, make_grid
 
 REST = 40e-3
 BLISTER = Blister(radius=12e-3, edge_radius=15.5e-3, flat_radius=3e-3)
-CONTROL = CellStatesControl(CellStates(), BLISTER, Actuator(), lift=0.157, period=5e-3)
+CONTROL = CellStatesControl(
+    CellStates(), BLISTER, Actuator(), Rim(math.inf, math.inf, 0.0), lift=0.157, period=5e-3
+)
 BED = make_grid(Layout(rows=13, columns=13))
 MIDDLE = 6 * 13 + 6
 

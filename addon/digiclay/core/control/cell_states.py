@@ -23,7 +23,7 @@ from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .servo import Tracking, lock_overloaded, mark_formed
-from .travel import ABEAM, Heading, measure_lead, measure_square, update_heading
+from .travel import ABEAM, Heading, Rim, measure_lead, measure_square, update_heading
 
 VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
 
@@ -145,6 +145,7 @@ class CellStatesControl:
     blister: Blister
     """Its radii count from the nearest cell under the fingertip."""
     actuator: Actuator
+    rim: Rim
     lift: float
     """Force the high reservoir can lift, N."""
     period: float
@@ -194,7 +195,13 @@ class CellStatesControl:
             memory = memory._replace(felt=False, losses=memory.losses + memory.felt)
         mode = self._resting(mode, target, seen.force)
         seen.own[0] = np.where(mode == Mode.CRITICAL, seen.own[0] + 1.0, 0.0)
-        return memory, Commands(target, mode, self._commands(seen, mode, target, under))
+        most = 0.0 if self._leaves(memory) else 1.0
+        return memory, Commands(target, mode, self._commands(seen, mode, target, under, most))
+
+    def _leaves(self, memory: Patch) -> bool:
+        """Tell whether the fingertip leaves the bed: then no cell is to rise for it."""
+        x, y, (_, _, *toward), *_ = memory
+        return any(toward) and (self.rim.is_under(x, y) or self.rim.is_ahead(x, y, *toward))
 
     def _by_force(self, seen: Measurement) -> dict[str, Flags]:
         """Return the conditions of `BY_FORCE`."""
@@ -233,7 +240,8 @@ class CellStatesControl:
         mode = follow_arrows(mode, BY_PLACE, conditions)
         weight = np.maximum(blister.evaluate_profile(distance), 0.0)
         top = np.dot(seen.height[under], weight) / np.maximum(weight.sum(axis=0), 1e-12)
-        shape = blister.interpolate(nearest, memory.edge, top + self.parameters.rise)
+        rise = 0.0 if self._leaves(memory) else self.parameters.rise
+        shape = blister.interpolate(nearest, memory.edge, top + rise)
         shape = np.minimum(np.maximum(shape, 0.0), self.actuator.stroke)
         np.putmask(target, mode == Mode.BLISTER, shape)
         return memory, mode, target
@@ -245,13 +253,13 @@ class CellStatesControl:
         formed = mark_formed(target, self.actuator.rest_height, self.parameters.dead_band)
         return np.where(spring, np.where(force > 0.0, np.int8(Mode.SPRING), formed), mode)
 
-    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags) -> Floats:
+    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags, most: float) -> Floats:
         """Return valve commands: force control under the fingertip, springs and profile elsewhere."""
         gains = self.parameters
         springs = (mode <= Mode.EDGE) | (mode == Mode.SPRING)
         command = gains.command(target - springs * seen.force / gains.spring_stiffness, seen.height)
         follow = gains.force_gain * (gains.force_setpoint - seen.force)
-        np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), 1.0))
+        np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), most))
         return lock_overloaded(command, seen.force, self.lift)
 
 
@@ -267,5 +275,5 @@ def build(parameters: CellStates, device: DeviceInfo) -> CellStatesControl:
     asked, floor = parameters.force_setpoint, device.force_floor
     check_floor(asked, "force_setpoint", asked, floor)
     return CellStatesControl(
-        parameters, device.blister, device.cell.actuator, device.lift, device.period, floor
+        parameters, device.blister, device.cell.actuator, device.rim, device.lift, device.period, floor
     )

@@ -8,7 +8,9 @@ that is controlled is the sum of the readings as they are, which has no bias.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from ..base.errors import ParameterError
 from ..model.layout import Grid
 from ..model.physics import Cell
 from .blister import Blister
+from .travel import Rim
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,14 @@ class DeviceInfo:
     """Force from which on the reading of a cell is no noise, N; how far that of a height may be off, m."""
     dead_time: float = 0.0
     """Of the valves' commands, s."""
+
+    @cached_property
+    def rim(self) -> Rim:
+        """Where the bed ends for a fingertip that leads the blister."""
+        assert self.blister is not None
+        plan, (left, bottom), reach = self.grid.layout, self.grid.corner, 0.5 * self.blister.flat_radius
+        x, y = -left - 0.5 * (plan.pitch + plan.shift), -bottom - 0.5 * plan.row_spacing
+        return Rim(x if x > reach else math.inf, y if y > reach else math.inf, reach)
 
     @property
     def lift(self) -> float:

@@ -30,7 +30,7 @@ from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Estimate, FingerFilter, Spread
 from .flow_servo import FlowServo, make_flow_servo
-from .led_blister import Follower, LeadProfile, LedBlister, Region
+from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
 from .methods import ControlParameters, Pace
 from .pulp_estimate import PulpEstimate, Reach, find_top, lead_heights
 from .servo import declare_again, mark_formed
@@ -341,16 +341,26 @@ class HybridControl:
                 later += top - memory.top
             else:
                 top, coming = self._solve_top(memory, seen, region, coasting)
+            if self._leaves(memory) and top > (along := self._move_top(memory)):
+                top, coming = along, -1.0  # fewer cells carry the fingertip, and none is to rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
             memory = self._doubt(memory, force, coming, seen.force.size, top)
             if abs(asked - force) <= LEARNED * asked:
-                trim += (asked - force) * self.device.period / self.parameters.trim_time
+                learned = (asked - force) * self.device.period / self.parameters.trim_time
+                trim += learned * (coming >= 0.0)
                 felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
         x, y, _ = region.aim
         reach = self.profile.find_reach(top - memory.edge, region.speed)
         return memory._replace(top=top, felt=felt, trim=trim, led_x=x, led_y=y, led_radius=reach)
+
+    def _leaves(self, memory: Follower) -> bool:
+        """Tell whether the fingertip goes off the bed."""
+        x, y, _, vx, vy, *_ = memory.estimate.mean.tolist()
+        rim, speed = self.device.rim, math.hypot(vx, vy)
+        goes = speed > SLOWEST and rim.is_ahead(x, y, vx / speed, vy / speed)
+        return goes or rim.is_under(x, y, -rim.reach)
 
     def _doubt(self, memory: Follower, force: float, coming: float, cells: int, top: float) -> Follower:
         """Compare a force of some cells, N, with its prediction; hand over to Method I when they disagree."""

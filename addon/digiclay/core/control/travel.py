@@ -19,6 +19,30 @@ from ..base.arrays import Floats
 ABEAM = 1e-12
 #: A direction is opposite to another when the cosine of the angle between them is below this.
 BACK = -0.5
+#: A fingertip goes off the bed where the cosine of its direction to outward is above this: under one that
+#: goes along the rim the centroid of the forces moves about.
+OUTWARD = 0.1
+
+
+class Rim(NamedTuple):
+    """Outer cells of a bed: a fingertip that leaves over them is carried by fewer, which are not to rise."""
+
+    x: float
+    y: float
+    """How far from the middle of the bed they begin, m; infinite: the bed is no wider than a fingertip."""
+    reach: float
+    """How far ahead of a fingertip cells carry it, m."""
+
+    def is_under(self, x: float, y: float, farther: float = 0.0) -> bool:
+        """Tell whether a place, m, is over the outer cells or beyond, or would be so much farther off, m."""
+        return abs(x) + farther > self.x or abs(y) + farther > self.y
+
+    def is_ahead(self, x: float, y: float, toward_x: float, toward_y: float) -> bool:
+        """Tell whether a fingertip at a place, m, goes off the bed in a direction, and is near the rim."""
+        out_x, out_y = math.copysign(toward_x, toward_x * x), math.copysign(toward_y, toward_y * y)
+        return (out_x > OUTWARD and abs(x) + self.reach * out_x > self.x) or (
+            out_y > OUTWARD and abs(y) + self.reach * out_y > self.y
+        )
 
 
 class Heading(NamedTuple):

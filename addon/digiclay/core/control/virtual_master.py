@@ -32,7 +32,7 @@ from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .ground import GROUNDS, EdgeGround, OwnGround, raise_blister
 from .servo import BatchControl, Tracking, lock_overloaded, mark_formed, sum_weighted
-from .travel import Heading, measure_excess, update_heading
+from .travel import Heading, Rim, measure_excess, update_heading
 
 #: Share of the total force that the cell in the middle of the fingertip carries while shaping, at least: 0.23
 #: to 0.33 of it measured while the fingertip moves slowly.
@@ -53,6 +53,8 @@ class Phase(IntEnum):
     IDLE = 0
     SPRING = 1
     SHAPING = 2
+    LEAVING = 3
+    """Shaping under a fingertip that goes off the bed."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class MasterCell:
         if self.laminar:
             speed: float = self.flow.laminar_conductance(opening) * drive
             return speed
-        return float(self.flow.conductance(np.array(opening), np.array(drive * self.area))) * drive
+        return float(self.flow.conductance(np.array([opening]), np.array([drive * self.area]))[0]) * drive
 
 
 def make_master_cell(cell: Cell, period: float) -> MasterCell:
@@ -213,6 +215,7 @@ class VirtualMasterControl(BatchControl):
     actuator: Actuator
     model: MasterCell
     """The master's own cylinder and valve."""
+    rim: Rim
     period: float
     lift: float
     floor: float = 0.0
@@ -247,7 +250,11 @@ class VirtualMasterControl(BatchControl):
         if master.phase is not Phase.IDLE:
             if near >= gains.felt_force:
                 x, y = near_x / near, near_y / near
-                return master.move_to(x, y, update_heading(master.heading, x, y, gains.travel, self.reversal))
+                reversal, reach = self.reversal, self.rim.reach
+                if self.rim.is_under(x, y, reach):
+                    # The patch grows and shrinks away from the rim: only farther back is another direction.
+                    reversal = max(reversal, reach)
+                return master.move_to(x, y, update_heading(master.heading, x, y, gains.travel, reversal))
             # The fingertip has jumped out of reach: this is a new touch elsewhere.
             master = master._replace(losses=master.losses + 1)
         x, y = x / total, y / total
@@ -272,11 +279,16 @@ class VirtualMasterControl(BatchControl):
             return master._replace(height=master.felt)
         force += noise
         if force >= gains.force_setpoint:
-            phase = Phase.SHAPING
+            phase = max(phase, Phase.SHAPING)
         if phase is Phase.SPRING:
             effort = gains.position_gain * (master.reference - force / gains.spring_stiffness - master.height)
         else:
             effort = gains.force_gain * (gains.force_setpoint - force)
+            x, y, *toward = self.get_pose(master)
+            # Beyond the outer cells their forces no longer tell where the fingertip goes.
+            leaves = self.rim.is_ahead(x, y, *toward) or (phase is Phase.LEAVING and self.rim.is_under(x, y))
+            phase = Phase.LEAVING if leaves else Phase.SHAPING
+            effort = min(effort, 0.0) if leaves else effort
         height, opening = self.model.advance(master.height, master.opening, min(max(effort, -1.0), 1.0))
         return master.lead(phase, height, opening)
 
@@ -301,7 +313,7 @@ class VirtualMasterControl(BatchControl):
 
     def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
         """Return heights around and of a master, m, mode of felt cells, whether frozen ones stay behind."""
-        kind = FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING
+        kind = SPRING if master.phase is Phase.SPRING else FORCE_FOLLOW
         beyond = master.alone > 0 and master.height - master.felt > CARRIED * self.blister.radius
         return master.edge, master.height, kind, beyond
 
@@ -407,6 +419,6 @@ def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl
     asked = parameters.force_setpoint
     check_floor(HEAVIEST * asked, "force_setpoint", asked, device.force_floor)
     model = make_master_cell(device.cell, device.period)
-    parts = parameters, device.blister, device.cell.actuator, model
+    parts = parameters, device.blister, device.cell.actuator, model, device.rim
     ground = GROUNDS[parameters.ground]
     return VirtualMasterControl(*parts, device.period, device.lift, device.force_floor, ground)
