@@ -108,7 +108,7 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
 def has_strokes() -> bool:
     """Return whether a session has a stroke to finish that the hand has drawn, and is free to do so."""
     free = (one for one in running.list_sessions() if not (one.paused or one.blocking_reason))
-    return any(not stroke.held for session in free for stroke in session.strokes)
+    return any(session.strokes and not session.strokes[0].held for session in free)
 
 
 def end_haste(context: Any) -> None:

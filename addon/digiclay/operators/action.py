@@ -181,7 +181,7 @@ def show_status(context: Any, words: str) -> None:
         return
     if name not in _TOLD:
         clear_status()
-    context.workspace.status_text_set(words)
+    context.workspace.status_text_set_internal(words)
     _TOLD[name] = words
 
 
@@ -190,5 +190,5 @@ def clear_status() -> None:
     for name in _TOLD:
         workspace = bpy.data.workspaces.get(name)
         if workspace is not None:
-            workspace.status_text_set(None)
+            workspace.status_text_set_internal(None)
     _TOLD.clear()

@@ -27,9 +27,9 @@ from ..strokes.stroke import Stroke
 from .brush import find_bed
 
 #: Colors of what is to be raised and lowered: blue and orange of Okabe and Ito, which all eyes tell apart.
-RAISED, LOWERED = np.array([0.0, 0.45, 0.70]), np.array([0.90, 0.62, 0.0])
+RAISED, LOWERED = (0.0, 0.45, 0.70), (0.90, 0.62, 0.0)
 #: Where the light comes from, in the bed's space, and how dark a slope is that gets none.
-LIGHT, SHADE = np.array([-0.48, 0.36, 0.80]), 0.4
+LIGHT, SHADE = (-0.48, 0.36, 0.80), 0.4
 #: Opacity, the way of a pin from which on it has that, m, and the least way that is drawn, m.
 OPACITY, OPAQUE, LEAST = 0.7, 1e-3, 0.1e-3
 #: A path that is being laid has another ghost after so many times as long as that took.
@@ -43,8 +43,11 @@ class Drawn:
     ghosts: dict[int, tuple[Ghost, ...]] = field(default_factory=dict)
     #: Stroke along a path that is being laid, and the uid of its bed.
     plan: tuple[int, Stroke] | None = None
-    #: Heights and tick that the triangles are of.
-    shown: tuple[Floats, int] | None = None
+    #: Heights that the triangles are of, the light on them, and the tick of the pins below, whose way to them
+    #: their opacity tells.
+    heights: Floats | None = None
+    light: Floats | None = None
+    tick: int = 0
     batch: Any = None
     #: When the ghost of a path that is being laid may be found again, s.
     ready: float = 0.0
@@ -76,16 +79,24 @@ def find_surface(session: Running) -> Floats | None:
     return ghosts[-1].nominal.height if ghosts else None
 
 
-def find_colors(layout: Layout, ghost: Floats, height: Floats) -> Floats:
-    """Return colors (n, 4), times their opacity, of a surface that pins at heights come to, (n,), m."""
-    table = ghost.reshape(layout.rows, layout.columns)
-    across, along = np.gradient(table, layout.row_spacing, layout.pitch)
-    normal = np.stack([-along, -across, np.ones_like(table)], axis=-1).reshape(-1, 3)
-    lit = (normal @ LIGHT / np.linalg.norm(normal, axis=1)).clip(0.0, 1.0)
-    way = ghost - height
-    color = np.where(way[:, None] > 0.0, RAISED, LOWERED) * (SHADE + (1.0 - SHADE) * lit[:, None])
+def find_light(layout: Layout, surface: Floats) -> Floats:
+    """Return how light each place of a surface (n,), m, is, (n,), from 0 to 1."""
+    table = surface.reshape(layout.rows, layout.columns)
+    across, along = (slope.ravel() for slope in np.gradient(table, layout.row_spacing, layout.pitch))
+    toward = LIGHT[2] - LIGHT[0] * along - LIGHT[1] * across
+    lit: Floats = (toward / np.sqrt(1.0 + along * along + across * across)).clip(0.0, 1.0)
+    return SHADE + (1.0 - SHADE) * lit
+
+
+def find_colors(light: Floats, way: Floats) -> NDArray[np.float32]:
+    """Return colors (n, 4), times opacity, of a lit surface (n,) to which pins have a way (n,), m."""
     # Times the opacity: from a pin that has no way its color does not reach those beside it.
-    return np.column_stack([color, np.ones(way.size)]) * OPACITY * (np.abs(way) / OPAQUE).clip(0, 1)[:, None]
+    opacity = (OPACITY / OPAQUE) * np.minimum(np.abs(way), OPAQUE)
+    color = np.empty((way.size, 4), np.float32)
+    for part, (raised, lowered) in enumerate(zip(RAISED, LOWERED, strict=True)):
+        color[:, part] = np.where(way > 0.0, raised, lowered) * light * opacity
+    color[:, 3] = opacity
+    return color
 
 
 @lru_cache(maxsize=4)
@@ -96,20 +107,20 @@ def _list_triangles(layout: Layout) -> NDArray[np.int32]:
     return np.concatenate([np.column_stack([first, second, third]), np.column_stack([first, third, fourth])])
 
 
-def _make_batch(grid: Grid, ghost: Floats, height: Floats) -> Any:
-    """Return the triangles of a surface (n,), m, where pins at heights (n,), m, have a way to it; or None."""
+def _make_batch(grid: Grid, surface: Floats, light: Floats, height: Floats) -> Any:
+    """Return the triangles of a lit surface (n,), m, where pins (n,), m, have a way to it; or None."""
     import gpu
 
-    triangles = _list_triangles(grid.layout)
-    moved = np.abs(ghost - height) > LEAST
-    chosen = np.ascontiguousarray(triangles[moved[triangles].any(axis=1)])
+    triangles, way = _list_triangles(grid.layout), surface - height
+    moves = np.abs(way) > LEAST
+    chosen = triangles[moves[triangles[:, 0]] | moves[triangles[:, 1]] | moves[triangles[:, 2]]]
     if not len(chosen):
         return None
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    points = gpu.types.GPUVertBuf(shader.format_calc(), len(ghost))
-    place = np.column_stack([grid.positions, ghost]) * bridge.SCALE
+    points = gpu.types.GPUVertBuf(shader.format_calc(), len(surface))
+    place = np.column_stack([grid.positions, surface]) * bridge.SCALE
     points.attr_fill("pos", np.ascontiguousarray(place, np.float32))
-    points.attr_fill("color", np.ascontiguousarray(find_colors(grid.layout, ghost, height), np.float32))
+    points.attr_fill("color", find_colors(light, way))
     return gpu.types.GPUBatch(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
 
 
@@ -128,9 +139,12 @@ def _draw_surface(bed: Any, session: Running, ghost: Floats) -> None:
     """Draw a surface (n,), m, over a bed."""
     import gpu
 
-    if DRAWN.shown is None or DRAWN.shown[0] is not ghost or DRAWN.shown[1] != session.tick:
-        DRAWN.shown = ghost, session.tick
-        DRAWN.batch = _make_batch(session.system.grid, ghost, session.state.row(0))
+    grid = session.system.grid
+    if DRAWN.light is None or DRAWN.heights is not ghost:
+        DRAWN.heights, DRAWN.light, DRAWN.tick = ghost, find_light(grid.layout, ghost), -1
+    if DRAWN.tick != session.tick:
+        DRAWN.tick = session.tick
+        DRAWN.batch = _make_batch(grid, ghost, DRAWN.light, session.state.row(0))
     if DRAWN.batch is None:
         return
     gpu.state.blend_set("ALPHA_PREMULT")
@@ -153,4 +167,4 @@ def unregister() -> None:
     """Draw no more of them, and forget what was drawn."""
     bpy.types.SpaceView3D.draw_handler_remove(DRAWN.handle, "WINDOW")
     DRAWN.ghosts.clear()
-    DRAWN.plan, DRAWN.shown, DRAWN.batch, DRAWN.handle = None, None, None, None
+    DRAWN.plan, DRAWN.heights, DRAWN.light, DRAWN.batch = None, None, None, None

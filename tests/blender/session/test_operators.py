@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
-from digiclay.live import beds, tick
+from digiclay.live import beds, loop, tick
+from digiclay.operators.action import clear_status, show_status
 from digiclay.operators.session_loop import LoopMixin
+from digiclay.press import ghost
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
+from digiclay.sessions.sculpting import queue_stroke
+from digiclay.strokes.stroke import start
 
 from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
+from tests.hand import let_go
 
 
 def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:
@@ -127,3 +132,51 @@ def test_without_a_session_there_is_nothing_to_go_on_with() -> None:
 def test_blender_lists_the_modal_operators_of_a_window() -> None:
     # The session looks them up in every version that is supported.
     assert "modal_operators" in bpy.types.Window.bl_rna.properties
+
+
+def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed: Any, clock: Clock) -> None:
+    started(bed)
+    for number, x in enumerate((-6e-3, 6e-3), 1):
+        assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)
+        running.put(queue_stroke(running.find(bed), x, 0.0, 4e-3)[0])
+        assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)  # the hand still draws
+        running.put(let_go(running.find(bed), number))
+    loop.LOOP.in_haste = True
+    clock.tick()
+    assert (running.find(bed).strokes[0].phase, shown(bed).min()) > (0, 39.9e-3)
+    tick.end_haste(bpy.context)
+    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+    assert bpy.ops.digiclay.finish_strokes() == {"FINISHED"}
+    assert running.find(bed).strokes == ()
+    assert exact(bed).min() < 37e-3
+    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+
+
+def test_the_ghost_is_there_with_the_queue_and_goes_with_it(bed: Any, clock: Clock) -> None:
+    started(bed)
+    assert ghost.find_surface(running.find(bed)) is None
+    ghost.plan(bed.session_uid, start(0, 0.0, 0.0, 4e-3))
+    assert ghost.find_surface(running.find(bed)).min() == pytest.approx(36e-3, abs=1e-6)
+    ghost.plan(bed.session_uid, None)
+    running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
+    surface = ghost.find_surface(running.find(bed))
+    assert surface.min() == pytest.approx(36e-3, abs=1e-6)
+    way = surface - shown(bed)
+    colors = ghost.find_colors(ghost.find_light(running.find(bed).scene.layout, surface), way)
+    assert (colors[:, 3] > 0.0).tolist() == (way != 0.0).tolist()
+    # Orange, and none where pins stay.
+    assert colors[way < -1e-3, 0].min() > colors[way < -1e-3, 2].max() == 0.0
+    running.put(let_go(running.find(bed), 1))
+    assert bpy.ops.digiclay.finish_strokes() == {"FINISHED"}
+    assert ghost.find_surface(running.find(bed)) is None
+
+
+def test_words_in_the_status_bar_leave_what_else_is_drawn_there() -> None:
+    from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
+
+    before = bar.draw
+    show_status(bpy.context, "Radius 5 mm")
+    clear_status()
+    # Blender's own function would draw from then on as at the first call: without the keys of a session.
+    assert bar.draw is before
+    assert not hasattr(bar, "_draw_orig")
