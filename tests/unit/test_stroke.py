@@ -62,7 +62,7 @@ def path(
     """Let the finger go on as far as it is drawn, a chunk of periods at a time, without a blister."""
     stroke, poses, part = begin(stroke, bed, at[3:], None), [at], at[None]
     while not stroke.done and (len(part) > 1 or len(poses) == 1):
-        stroke, part = follow(stroke, DEVICE, poses[-1], chunk, PERIOD)
+        stroke, part = follow(stroke, DEVICE, bed, poses[-1], chunk, PERIOD)
         poses += list(part[1:])
     return stroke, np.array(poses)
 
@@ -100,7 +100,7 @@ def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(chun
     poses = [*first]
     stroke = replace(part, samples=whole.samples, held=False)
     while not stroke.done:
-        stroke, more = follow(stroke, DEVICE, poses[-1], chunk, PERIOD)
+        stroke, more = follow(stroke, DEVICE, HEIGHT, poses[-1], chunk, PERIOD)
         poses += list(more[1:])
     np.testing.assert_array_equal(np.array(poses), path(whole)[1])
 

@@ -359,4 +359,4 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
         return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
     if stroke.phase == FINISHING:
         return finish(stroke, device, state.row(0), pose, count, period, arrived=arrived)
-    return *follow(stroke, device, pose, count, period), None
+    return *follow(stroke, device, state.row(0), pose, count, period), None

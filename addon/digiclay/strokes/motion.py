@@ -59,13 +59,13 @@ class Way:
     def find_touch(self, stroke: Stroke, x: float, y: float) -> float:
         """Return how high a fingertip is that descends at a place and first touches a pin, m."""
         # On a slope it touches the pins beside it first, several millimeters above the surface below it.
-        assert stroke.ground is not None
+        assert stroke.standing is not None
         grid, finger = self.device.grid, self.device.finger
         cells = grid.disc(x, y, finger.width)
         square = ((grid.x[cells] - x) ** 2 + (grid.y[cells] - y) ** 2) / finger.width**2
         gap = finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))
-        surface = self.device.find_surface(stroke.ground, x, y)
-        return max(surface, float((stroke.ground[cells] - gap).max(initial=0.0)))
+        surface = self.device.find_surface(stroke.standing, x, y)
+        return max(surface, float((stroke.standing[cells] - gap).max(initial=0.0)))
 
     def pass_over_locked(self, stroke: Stroke, x: float, y: float, z: float) -> float:
         """Return a height of the fingertip, m, at which it presses into no locked pin."""
@@ -87,6 +87,9 @@ class Way:
         assert stroke.height is not None
         level = self.device.find_level(stroke, stroke.images[stroke.image], stroke.height)
         top = self.device.find_top(stroke, stroke.samples[stroke.reached], (x, y), stroke.ground, level)
+        if stroke.brush is Brush.RAISE and stroke.standing is not None:
+            # It rides over what an image before has raised higher.
+            top = max(top, self.find_touch(stroke, x, y))
         lowest = max(0.0, top - stroke.tracking.sink) if stroke.tracking else top
         return self.pass_over_locked(stroke, x, y, lowest)
 
@@ -103,11 +106,16 @@ def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | Non
     return begun
 
 
-def follow(stroke: Stroke, device: Device, pose: Floats, count: int, period: float) -> tuple[Stroke, Floats]:
+def follow(
+    stroke: Stroke, device: Device, now: Floats, pose: Floats, count: int, period: float
+) -> tuple[Stroke, Floats]:
     """Advance the fingertip along a stroke that has begun; return it and the path (k + 1, 7), k <= count.
 
-    The path ends where the hand has not drawn further, and where the fingertip has left the last image.
+    The path ends where the hand has not drawn further, where the fingertip has left the last image, and where
+    it comes down to one: it presses into the pins that stand there, `now` (n,), m.
     """
+    if stroke.phase == PRESSING and stroke.standing is None:
+        stroke = replace(stroke, standing=now.copy())
     way, path = Way(device, period, find_safe(stroke, device)), [pose]
     while len(path) <= count and stroke.phase not in (FINISHING, DONE):
         step = _step(stroke, way, path[-1][:3].tolist())
@@ -118,6 +126,8 @@ def follow(stroke: Stroke, device: Device, pose: Floats, count: int, period: flo
             way = replace(way, safe=find_safe(stroke, device))
         turn = _turn(stroke, path[-1][3:], place[2] >= way.safe - NEAR, period)
         path.append(np.array([*place, *turn]))
+        if stroke.phase == PRESSING and stroke.standing is None:
+            break
     return stroke, np.array(path)
 
 
@@ -170,7 +180,7 @@ def finish_image(stroke: Stroke) -> Stroke:
     """Return the stroke with its next image begun, or with the wait for its pins, if valves drive any."""
     if stroke.image + 1 < len(stroke.images):
         begun = replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, first=0, climb=0.0)
-        return replace(begun, ground=stroke.height)
+        return replace(begun, ground=stroke.height, standing=None)
     return replace(stroke, phase=FINISHING if stroke.tracking else DONE)
 
 

@@ -172,6 +172,8 @@ class Stroke:
     #: m; None before.
     height: Floats | None = None
     ground: Floats | None = None
+    #: (n,), heights of the pins when the fingertip came down to the image that it is at, m; None before.
+    standing: Floats | None = None
     #: First sample of the present pass of a path that accumulates.
     first: int = 0
     #: How the blister follows, of a device that has one; found when the fingertip begins.
