@@ -282,3 +282,16 @@ def test_other_parameters_in_mid_stroke_leave_a_session_that_goes_on() -> None:
 @pytest.mark.parametrize(("width", "radius"), [(8e-3, 8e-3), (1e-3, 6e-3)])
 def test_the_disc_is_the_fingers_width_and_no_less_than_two_pitches(width: float, radius: float) -> None:
     assert find_radius(Fingertip(width=width), Layout()) == pytest.approx(radius)
+
+
+@pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER])
+@pytest.mark.parametrize("accumulate", [False, True])
+def test_an_image_that_begins_on_another_one_is_pressed_into_what_stands_there(brush, accumulate):
+    scene = make_scene("design", Layout(30, 30, 1.5e-3), "hybrid", 0.5)
+    session, _ = sculpting.begin_session(7, "Bed", scene, np.array([0.0, 0.0, 60e-3, *LEVEL]))
+    session = queue(session, [(1.0, 2.0), (15.0, 9.0)], brush, 12.0)
+    (stroke,) = session.strokes
+    images = make_images("RADIAL", 3)
+    session = replace(session, strokes=(replace(stroke, images=images, accumulate=accumulate),))
+    # Into the bed as it was before the first image: 10^5 N.
+    assert finish(session).trace.force.max() < 1.0

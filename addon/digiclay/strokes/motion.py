@@ -46,6 +46,8 @@ TURN = 3.0
 #: Fastest drag where no blister follows, m/s and half widths a second, and fastest press there, m/s. Pressed
 #: faster, the fingertip runs into pins whose valves have not opened yet.
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
+#: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
+UNEVEN = 0.5e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,8 +222,11 @@ def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
     x, y, z = place
     lowest, after, fastest = way.find_lowest(stroke, x, y), DRAGGING, PRESS
     touch = way.find_touch(stroke, x, y)
+    assert stroke.standing is not None
+    slopes = touch - way.device.find_surface(stroke.standing, x, y) > UNEVEN
     if stroke.tracking:
-        fastest = stroke.tracking.sink_speed
+        # Felt beside its lowest point alone, a fingertip is lost when it is quick.
+        fastest = min(stroke.tracking.sink_speed, PRESS if slopes else math.inf)
         if stroke.brush is not Brush.LOWER:
             pressed = max(0.0, touch - stroke.tracking.press)
             lowest, after = way.pass_over_locked(stroke, x, y, pressed), RISING
