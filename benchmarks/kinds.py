@@ -77,13 +77,6 @@ BENCHMARKS = {
         "stiff.measure", "errors of the steppers in stiff and extreme cases", ("", "--full --out results"),
         {"--full": "also the adaptive stepper, which takes longer than all others"},
     ),
-    "precision": Benchmark(
-        "precision.measure",
-        "error against run time, beside SciPy's solvers",
-        ("--quick", "--out results", "--whole-bed --out results"),
-        {"--whole-bed": "also peers that integrate all cells, on the paper's bed (11 minutes more)"},
-        needs="scipy",
-    ),
     "peers": Benchmark(
         "pinbench.run.measure", "engines on eight problems, by their adapters: error against run time",
         ("", "mine.py --out results"),

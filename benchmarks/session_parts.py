@@ -22,7 +22,7 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.session.memory_limit import check_memory
 
 from .numpy_calls import list_calls, period_calls
-from .problems import Solution, solve, time_run
+from .replays import Solution, solve, time_run
 from .report import Report, Steps, tabulate
 
 #: Parts of a control period and what is in them.

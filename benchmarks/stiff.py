@@ -29,7 +29,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.accuracy import SHARE, reference_settings
 
 from .numpy_calls import period_calls
-from .problems import replaying
+from .replays import replaying
 from .report import Report, Row, Steps, tabulate
 
 Table = Mapping[str, Any]

@@ -22,7 +22,7 @@ from ..report import Curves, Report, Steps, tabulate
 from .problem import Problem, read_problems
 
 ADAPTERS = Path(__file__).parent / "adapters"
-NAMES = ("own", "numpy_runge_kutta", "scipy_solvers", "mujoco_force", "mujoco_contact")
+NAMES = ("own", "numpy_runge_kutta", "python_loop", "scipy_solvers", "mujoco_force", "mujoco_contact")
 #: Engine whose adapter is left out where its package is absent.
 OPTIONAL = {"mujoco_force": "mujoco", "mujoco_contact": "mujoco"}
 #: Problems and settings of a method with --quick.

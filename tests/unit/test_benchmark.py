@@ -25,18 +25,14 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import LEAST, make_bundles
 
-from benchmarks import method_figures, peers, processes, runs_together
+from benchmarks import method_figures, processes, runs_together
 from benchmarks.__main__ import main
 from benchmarks.kinds import BENCHMARKS
 from benchmarks.numpy_calls import Counted, Ledger, note_methods, period_calls
-from benchmarks.precision import best_ratio
-from benchmarks.problems import PROBLEMS, Work, problem, solve
 from benchmarks.report import Report
 from benchmarks.runs_together import STUDIES, study
 from benchmarks.session_parts import CORE, FILES, LONGER, PARTS, TERMS, without
 from tests.assemble import sample
-
-ONE = "one cell, load step"
 
 
 @pytest.fixture
@@ -125,43 +121,13 @@ def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(here, cap
     assert re.search(r"^  multiply +[\d.]+$", out, re.MULTILINE)
 
 
-def test_the_cheapest_run_is_the_fastest_that_is_exact_enough() -> None:
-    def run(method: str, error: float, seconds: float, *, peer: bool) -> Work:
-        return Work("p", method, 0.0, error, 0.0, seconds, 0, peer)
-
-    work = [
-        run("bernoulli", 1e-5, 1.0, peer=False), run("bernoulli", 1e-7, 3.0, peer=False),
-        run("LSODA", 1e-7, 60.0, peer=True), run("Python loop", 1e-9, 9.0, peer=True),
-    ]  # fmt: skip
-    ratios = [best_ratio(work, level) for level in (1e-5, 1e-6, 1e-8)]
-    assert ratios == [60.0, 20.0, None]
-
-
 def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(capsys, monkeypatch):
     for kind in BENCHMARKS:
         code, out = main([kind, "--help"]), capsys.readouterr().out
         assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (0, True)
     monkeypatch.setitem(sys.modules, "scipy", None)
-    assert main(["precision", "--quick"]) == 2
+    assert main(["peers", "--quick"]) == 2
     assert "pip install" in capsys.readouterr().err
-
-
-def test_scipys_physics_are_ours() -> None:
-    # LSODA at 1e-8 and Richardson's form at 0.1 ms are each within 1 nm of the exact solution.
-    task = problem(ONE)
-    theirs, _, evaluations = peers.peer(task, peers.SOLVERS["LSODA"], 1e-8)
-    assert task.solve("richardson", 1e-4).compare(theirs)[0] < 2e-9
-    assert evaluations > task.scene.periods
-
-
-def test_the_python_loop_is_the_closed_form_step_and_every_problem_has_contact_and_moving_pins() -> None:
-    for name in PROBLEMS:
-        task = problem(name)
-        solution = solve(task.scene, task.commands)
-        assert solution.forces.max() > 0.1, name
-        assert np.ptp(solution.heights) > 0.1e-3, name
-        if name == ONE:  # same formulas, same steps: rounding only
-            assert solution.compare(peers.loop(task, 1e-3)[0])[0] < 1e-12
 
 
 def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,17 +8,21 @@ import numpy as np
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.scene.toml_table import resolve
 
-from ...problems import run
+from ...replays import run
 
+STEPS = (5e-3, 2.5e-3, 1e-3, 5e-4)
 METHODS = {
-    "digiclay": (5e-3, 2.5e-3, 1e-3, 5e-4, 1e-4),
-    "digiclay richardson": (5e-3, 2.5e-3, 1e-3, 5e-4),
-    "digiclay runge_kutta_4": (5e-3, 2.5e-3, 1e-3, 5e-4),
+    "digiclay": (*STEPS, 1e-4),
+    "digiclay richardson": STEPS,
+    "digiclay runge_kutta_4": STEPS,
+    "digiclay heun": STEPS,
+    "digiclay euler": STEPS,
+    "digiclay adaptive": (1e-5, 1e-6, 1e-7),
 }
 
 
 def prepare(problem: Any, method: str, setting: float) -> Any:
-    """Return what integrates a problem once at a physics step, s."""
+    """Return what integrates a problem once at a physics step, s, or adaptive's tolerance, m."""
     scene = resolve(make_tables(problem.file, method.partition(" ")[2] or "bernoulli", setting))
     shape = problem.count, problem.places[0].size
     commands = np.broadcast_to(problem.commands, shape)
@@ -49,9 +53,8 @@ def make_tables(file: dict[str, Any], stepper: str, step: float) -> dict[str, An
     tables |= {"relaxation": file["relaxation"]} if "relaxation" in file else {}
     tables |= {"valve_lag": {"time_constant": file["lag"]}} if file.get("lag") else {}
     tables |= {"delay": {"dead_time": file["dead_time"]}} if file.get("dead_time") else {}
-    tables["simulation"] = {
-        "control_period": file["period"], "physics_step": step, "stepper": stepper,
-    }  # fmt: skip
+    chosen = {"tolerance": step} if stepper == "adaptive" else {"physics_step": step}
+    tables["simulation"] = {"control_period": file["period"], "stepper": stepper, **chosen}
     tables["trajectory"] = {
         "interpolation": "linear", "waypoints": [{"time": t, "position": xyz} for t, *xyz in file["path"]],
     }  # fmt: skip
