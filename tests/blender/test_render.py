@@ -205,7 +205,8 @@ def test_letters_have_a_size_that_can_be_read(size: tuple[int, int], letters: tu
 
 @pytest.mark.usefixtures("written")
 @pytest.mark.parametrize(
-    ("size", "explained"), [((320, 200), 0), ((640, 400), 0), ((800, 500), 8), ((960, 600), 8)]
+    ("size", "explained"),
+    [((320, 200), 0), ((640, 400), 0), ((800, 500), len(Mode)), ((960, 600), len(Mode))],
 )
 def test_modes_are_explained_where_it_can_be_read(size: tuple[int, int], explained: int) -> None:
     plane = front(*size)
