@@ -145,8 +145,10 @@ class FinishStrokes(Ticking, bpy.types.Operator):
         return {"PASS_THROUGH"}
 
     def execute(self, context: Any) -> set[str]:
-        """Finish them before anything else, as a script would have it."""
-        while tick.has_strokes():
+        """Finish them before anything else, as a script would have it; not what waits, for a hand say."""
+        before: list[int] = []
+        while tick.has_strokes() and before != (now := [one.state.period for one in running.list_sessions()]):
+            before = now
             self.advance(context, time.perf_counter())
         return {"FINISHED"}
 
