@@ -297,7 +297,7 @@ def test_a_bed_appended_from_an_older_file_is_made_whole_and_its_helpers_put_awa
     looked()
     done("Empty")
     bpy.ops.wm.append(directory=str(tmp_path / "older.blend" / "Object") + "/", filename=name)
-    assert len(bpy.context.scene.objects) == 1 + 26
+    assert len(bpy.context.scene.objects) == 1 + 27
     done("Append")
     assert whole(*beds())
     assert housings() == 1
