@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
+from digiclay.core.engine import simulation
 from digiclay.core.engine.simulation import periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
@@ -88,8 +89,10 @@ def calls(name: str) -> float:
     return stiff.calls_of(name, step=stiff.PERIOD)
 
 
+@pytest.mark.parametrize("threaded", [1, 10_000], ids=["a large bed", "a small one"])
 @pytest.mark.parametrize("stepper", EXPLICIT)
-def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(stepper: str) -> None:
+def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(stepper, threaded, monkeypatch):
+    monkeypatch.setattr(simulation, "THREADED", threaded)
     said = r"At 0\.\d+ s the height of cell \d+ became inf\. Use a shorter"
     with pytest.raises(DivergenceError, match=said):
         stiff.replayed(EASY, stepper, 20e-3, 20e-3)

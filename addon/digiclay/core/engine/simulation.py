@@ -18,6 +18,8 @@ from .system import System
 
 #: Control periods whose finger poses are worked out at a time.
 CHUNK = 256
+#: Numbers from which on numpy's library takes several threads for a dot product: more time than they save.
+THREADED = 10_000
 
 
 def begin(system: System) -> State:
@@ -48,13 +50,19 @@ def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
     Raises DivergenceError when a height, force or opening is no longer finite.
     """
     after = simulate_period(system, state, finger)
-    numbers = after.active.numbers
-    # NaN and infinity make the dot product non-finite.
-    if not math.isfinite(numbers.dot(numbers)):
+    if not _are_finite(after.active.numbers):
         error = find_divergence(system, after.active.cells, after.active.block, state.period)
         if error:
             raise error
     return after
+
+
+def _are_finite(numbers: Floats) -> bool:
+    """Return whether numbers (k,) are finite for certain: NaN and infinity remain in a dot product or sum."""
+    if numbers.size < THREADED:
+        return math.isfinite(numbers.dot(numbers))
+    with np.errstate(over="ignore", invalid="ignore"):
+        return math.isfinite(np.add.reduce(numbers))
 
 
 def simulate_period(system: System, state: State, finger: FingerPeriod | None) -> State:
