@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -14,20 +14,6 @@ from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import Replay
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Heights, (t, n), m, total force, (t,), N, and commands, (t, n), at the end of each period."""
-
-    heights: Floats
-    forces: Floats
-    commands: Floats
-
-    def compare(self, exact: Solution) -> tuple[float, float]:
-        """Return the largest errors of a height, m, and of the total force, N."""
-        height, force = self.heights - exact.heights, self.forces - exact.forces
-        return float(np.abs(height).max()), float(np.abs(force).max())
 
 
 def replaying(scene: Scene, commands: Floats) -> System:
@@ -42,13 +28,13 @@ def run(scene: Scene, commands: Floats | None = None) -> tuple[System, Iterator[
     return system, periods(system, scene.trajectories(), begin(system), scene.periods)
 
 
-def solve(scene: Scene, commands: Floats | None = None) -> Solution:
-    """Integrate with the scene's controller, or under commands, (t, n)."""
+def solve(scene: Scene, commands: Floats | None = None) -> list[Floats]:
+    """Return heights, (t, n), m, total force, (t,), N, and commands, (t, n), at the ends of the periods."""
     system, states = run(scene, commands)
     rows = [
         (state.row(0), state.row(system.rows.force).sum(), state.row(system.rows.command)) for state in states
     ]
-    return Solution(*(np.array(column) for column in zip(*rows, strict=True)))
+    return [np.array(column) for column in zip(*rows, strict=True)]
 
 
 def time_run(scene: Scene, commands: Floats | None = None) -> float:

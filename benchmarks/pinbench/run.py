@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.progress import table
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError
 
 from ..report import Curves, Report, Steps, tabulate
@@ -91,7 +90,7 @@ def list_adapters(others: Sequence[str] = ()) -> list[Adapter]:
 
 def solve(adapter: Adapter, problem: Problem, method: str, setting: float) -> Answer | None:
     """Return an answer, or None where the engine has no such pins; DigiclayError where it fails."""
-    shape = len(problem.judged), problem.pins.size
+    shape = len(problem.judged), 2, problem.pins.size
     try:
         run = adapter.prepare(problem, method, setting)
         if run is None:
@@ -101,24 +100,17 @@ def solve(adapter: Adapter, problem: Problem, method: str, setting: float) -> An
             warnings.simplefilter("ignore")  # what comes out is compared
             while len(seconds) < REPEATS and sum(seconds) < LONG:
                 started = time.process_time()
-                answer = run()
+                answer = np.asarray(run(), float)
                 seconds.append(time.process_time() - started)
-        heights, forces = (_check(values, shape) for values in answer)
+        if answer.shape != shape:
+            raise ValueError(f"heights and forces must have the shape {shape}, got {answer.shape}")
     except Exception as error:
         where = f"{adapter.name}, {method} at {setting:g} on {problem.name}"
         raise DigiclayError(f"peers: {where}: {_describe(error)}") from None
-    errors = problem.compare(heights, forces)
+    errors = problem.compare(answer[:, 0], answer[:, 1])
     period = statistics.median(seconds) / problem.count
     apart = method in adapter.apart
     return Answer(problem.name, adapter.name, method, f"{setting:g}", *errors, period, apart)
-
-
-def _check(values: Any, shape: tuple[int, int]) -> Floats:
-    """Return heights or forces as an array; ValueError if they are no (t, p)."""
-    array = np.asarray(values, float)
-    if array.shape != shape:
-        raise ValueError(f"heights and forces must have the shape {shape}, got {array.shape}")
-    return array
 
 
 def _describe(error: Exception) -> str:

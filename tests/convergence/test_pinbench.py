@@ -115,7 +115,7 @@ BROKEN = {
     "settings": "METHODS = {'mine': ()}\ndef prepare(problem, method, setting): pass\n",
     "SyntaxError": "METHODS = {\n",
     "ZeroDivisionError": "METHODS = {'mine': (1e-3,)}\ndef prepare(problem, method, setting): 1 / 0\n",
-    "shape (6, 24), got (3,)": "METHODS = {'mine': (1e-3,)}\n"
+    "shape (6, 2, 24), got (2, 3)": "METHODS = {'mine': (1e-3,)}\n"
     "def prepare(problem, method, setting): return lambda: ([1, 2, 3], [1, 2, 3])\n",
 }
 

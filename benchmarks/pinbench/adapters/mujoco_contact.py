@@ -40,7 +40,7 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
     )
     steps = round(law.period / setting)
 
-    def solve() -> tuple[Any, Any]:
+    def solve() -> Any:
         data, rows = mujoco.MjData(model), []
         data.qpos[:], model.dof_damping[:] = law.begin()[0], damping
         for i in range(1, problem.count * steps + 1):
@@ -51,8 +51,7 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
             mujoco.mj_step(model, data)
             if i % steps == 0 and i // steps in problem.judged:
                 rows.append((data.qpos[problem.pins], -damping * data.qvel[problem.pins]))
-        heights, forces = map(np.array, zip(*rows, strict=True))
-        return heights, forces
+        return rows
 
     return solve
 

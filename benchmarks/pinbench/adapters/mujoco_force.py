@@ -26,7 +26,7 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
     )
     steps, aged = round(law.period / setting), np.exp(-law.rates * setting)
 
-    def solve() -> tuple[Any, Any]:
+    def solve() -> Any:
         data, state, rows = mujoco.MjData(model), law.begin(), []
         data.qpos[:], model.dof_damping[:] = state[0], law.damping or 0.0
         tension, force = law.load(0.0, state)
@@ -48,7 +48,6 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
             tension, force = law.load(i * setting, state)
             if i % steps == 0 and i // steps in problem.judged:
                 rows.append((state[0, problem.pins], force[problem.pins]))
-        heights, forces = map(np.array, zip(*rows, strict=True))
-        return heights, forces
+        return rows
 
     return solve

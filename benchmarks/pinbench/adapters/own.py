@@ -27,7 +27,7 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
     shape = problem.count, problem.places[0].size
     commands = np.broadcast_to(problem.commands, shape)
 
-    def solve() -> tuple[Any, Any]:
+    def solve() -> Any:
         system, states = run(scene, commands)
         rows = []
         try:
@@ -35,9 +35,8 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
                 if period in problem.judged:
                     rows.append((state.row(0)[problem.pins], state.row(system.rows.force)[problem.pins]))
         except DivergenceError:
-            return (np.full((len(problem.judged), problem.pins.size), np.inf),) * 2
-        heights, forces = map(np.array, zip(*rows, strict=True))
-        return heights, forces
+            return np.full((len(problem.judged), 2, problem.pins.size), np.inf)
+        return rows
 
     return solve
 

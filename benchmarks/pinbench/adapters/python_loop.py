@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from ..problem import JOIN, ROOT, Law
 
 METHODS = {"Runge-Kutta 4, Python loop": (5e-3, 2.5e-3, 1e-3)}
@@ -41,7 +39,7 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
             speed = 0.0
         return [speed, *(n * (tension - z) for n, z in zip(nu, state[1:], strict=True))]
 
-    def solve() -> tuple[Any, Any]:
+    def solve() -> Any:
         states, rows = law.begin().T.tolist(), []
         for period in range(problem.count):
             for start, end, segment in law.pieces(period):
@@ -58,8 +56,8 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
                         s[:] = [v + h / 6 * (k + 2 * (m + n) + q) for v, k, m, n, q in rates]
                         s[0] = min(max(s[0], 0.0), top)
             if period + 1 in problem.judged:
-                rows.append([(states[p][0], load(states[p], p, law.pose(end))[1]) for p in judged])
-        heights, forces = np.moveaxis(np.array(rows), -1, 0)
-        return heights, forces
+                forces = [load(states[p], p, law.pose(end))[1] for p in judged]
+                rows.append(([states[p][0] for p in judged], forces))
+        return rows
 
     return solve
