@@ -253,9 +253,10 @@ def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | N
         speed = min(DRAG, SPAN * (device.finger.width / 2))
         if tracking:
             assert stroke.ground is not None
-            near = stroke.ground[device.grid.disc(x, y, tracking.radius)]
-            change = float(np.abs(near - z - tracking.sink).max(initial=0.0))
-            # The pins ahead come to its height in time.
+            change = 0.0
+            if tracking.slope:  # else pins ahead are there in time anyway
+                near = stroke.ground[device.grid.disc(x, y, tracking.radius)]
+                change = float(np.abs(near - z - tracking.sink).max(initial=0.0))
             speed = tracking.limit_drag(change, pressed=stroke.brush is Brush.LOWER)
         dragged = drag(stroke, device, x, y, speed * way.period)
         if dragged is None:
