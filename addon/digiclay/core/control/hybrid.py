@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Constants, Floats
+from ..base.arrays import Constants, Floats, count_true
 from ..base.quantity import quantity
 from ..model.contact import Contact
 from ..model.control_interface import Commands, Measurement, SetPoint
@@ -99,7 +99,7 @@ class Hybrid(ControlParameters):
         """How fast a fingertip may lead it: that goes with the skirt, which is there when a drag begins."""
         if not self.skirt_speed:
             return Pace()
-        return Pace(RADII, RADII, SKIRT * self.skirt_speed, ready=True, press=0.1, lift=0.7, gain=0.1)
+        return Pace(RADII, RADII, SKIRT * self.skirt_speed, ready=True, press=0.06, gain=0.1)
 
 
 #: Fastest drag, in radii of the blister a second, and as a share of the skirt's speed.
@@ -137,6 +137,9 @@ AWAY = 1.0
 #: Share of the set point by which the forces predicted may be off, rms over that many control periods: beyond
 #: it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has 0.28.
 DOUBTED, PERIODS = 0.4, 20.0
+#: Share of the set point from which on a single pin gives way, whatever is aimed at: under a fingertip that is
+#: followed none carries more than 0.4.
+OVER = 0.45
 
 
 class Coasting(NamedTuple):
@@ -322,6 +325,11 @@ class HybridControl:
             target = lead_heights(left, memory.top, region.drop, raised=region.raised)
             np.maximum(target, lowest, out=target)
             np.minimum(target, highest, out=target)
+        over = seen.force > OVER * self.parameters.force_setpoint
+        if count_true(over):
+            # Whoever presses a pin so hard alone is not where the fingertip is taken to be: it gives way.
+            low = np.maximum(coasting.heights + coasting.limits[0] * self.servo.span, 0.0)
+            left, target = np.where(over, low, left), np.where(over, low, target)
         np.subtract(target, left, out=lead)
         command = self.servo.serve(target - coasting.heights, coasting.limits, seen.force, speeds)
         return memory, Commands(target, mode, command)
