@@ -137,8 +137,8 @@ AWAY = 1.0
 #: Share of the set point by which the forces predicted may be off, rms over that many control periods: beyond
 #: it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has 0.28.
 DOUBTED, PERIODS = 0.4, 20.0
-#: Share of the set point from which on a single pin gives way, whatever is aimed at: under a fingertip that is
-#: followed none carries more than 0.4.
+#: Share of the set point from which on a single pin gives way, whatever is aimed at: under a fingertip that
+#: is followed none carries more than 0.4.
 OVER = 0.45
 
 
