@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.control.methods import ControlParameters, Pace
-from digiclay.core.engine.simulation import begin
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes
-from digiclay.sessions.sculpting import begin_session, follow_finger, set_recording
+from digiclay.sessions.sculpting import begin_session, follow_finger
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.tracking import find_tracking
 
@@ -85,20 +83,8 @@ def test_pins_stay_where_a_stroke_of_method_iii_has_left_them() -> None:
     assert later.max() <= scene.actuator.rest_height + 2e-6
 
 
-def test_a_stroke_along_the_flank_of_another_presses_no_finger_hard() -> None:
-    bed = BEDS["design"]
-    scene = make_scene(bed.preset, Layout(rows=34, columns=60, pitch=bed.pitch), bed.method, bed.share)
-    session, _ = begin_session(1, "", scene, np.array([0.0, 0.0, 0.05, *LEVEL]))
-    session = set_recording(session, on=True)
-    strokes = [
-        PointerStroke(
-            brush=brush, height=8e-3, depth=4e-3, path="line", moves=((0.0, -half, y), (1.0, half, y))
-        )
-        for brush, half, y in (("raise", 35e-3, 0.0), ("lower", 30e-3, 7e-3), ("lower", 30e-3, -5e-3))
-    ]
-    *_, session = play_strokes(session, tuple(strokes))
-    kept, system = session.recording, session.system
-    assert kept is not None
-    states = simulate_path(system, begin(system), kept.path, kept.orders)
-    # Felt on one side alone, the fingertip is taken to be elsewhere; without yielding this was 1 MN.
-    assert max(float(state.active.touched.force.sum()) for state in states) < 1.0
+def test_pins_give_way_under_a_fingertip_that_is_not_where_it_is_taken_to_be() -> None:
+    system = assemble(DESIGN)
+    # More than twice the stated speed through a valley 12 mm deep: without yielding 351 kN.
+    fast = replace(find_stated(DESIGN, system), push=0.25)
+    assert lead(DESIGN, system, fast, -12e-3).force < 50.0
