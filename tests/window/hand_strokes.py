@@ -268,19 +268,25 @@ def things(blender: Any) -> Iterator[float | None]:
     for name, recorded in drawn:
         note(blender, f"before {name}")
         for one in recorded.strokes:
-            choose(blender, one, usual)
-            yield from act(blender, follow(blender, one))
+            axes = one.length, one.width, one.thickness
+            size = [1e3 * given or other for given, other in zip(axes, usual, strict=True)]
+            if not np.allclose(bpy.context.window_manager.digiclay_finger, size):
+                # The fingertip has a size at a time; the strokes of one size are drawn while others wait.
+                yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
+                bpy.context.window_manager.digiclay_finger = size
+            choose(blender, one)
+            yield from done(blender, hand(follow(blender, one)))
+        yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
+        yield from blender.settle()
         blender.shot(f"thing_{name}")
         note(blender, name)
         yield from reset(blender)
 
 
-def choose(blender: Any, stroke: Any, usual: tuple[float, float, float]) -> None:
-    """Set the header of the tool for a recorded stroke; usual: length, width and height of a finger, mm."""
+def choose(blender: Any, stroke: Any) -> None:
+    """Set the header of the tool for a recorded stroke."""
     settings = brush(blender)
-    axes = stroke.length, stroke.width, stroke.thickness
-    size = tuple(1e3 * given or other for given, other in zip(axes, usual, strict=True))
-    bpy.context.window_manager.digiclay_finger = size
     settings.brush, settings.strength = stroke.kind.value, stroke.strength
     settings.path, settings.symmetry = stroke.path.upper(), stroke.symmetry.upper()
-    settings.depth, settings.height = 1e3 * stroke.depth, 1e3 * stroke.height
+    settings.radial, settings.depth = stroke.radial, 1e3 * stroke.depth
+    settings.height = 1e3 * stroke.height
