@@ -359,4 +359,5 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
         return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
     if stroke.phase == FINISHING:
         return finish(stroke, device, state.row(0), pose, count, period, arrived=arrived)
-    return *follow(stroke, device, state.row(0), pose, count, period), None
+    force = recent_trace.measure_total_force(running.system, state)
+    return *follow(stroke, device, state.row(0), pose, count, period, force), None

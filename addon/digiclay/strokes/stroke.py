@@ -180,6 +180,8 @@ class Stroke:
     tracking: Tracking | None = None
     #: How fast the fingertip rises with the blister, m/s.
     climb: float = 0.0
+    #: How fast the fingertip drags, m/s.
+    pace: float = 0.0
     #: (4,), orientation of the fingertip when it began, which it has again when it is done; None before.
     turn: Floats | None = None
     #: (n,), heights to which the valves drive pins after the fingertip has left, m, NaN: not driven.
