@@ -77,6 +77,7 @@ def queue(blender: Any) -> Iterator[float | None]:
     while process.poll() is None:
         yield 0.02
     ended, simulated = time.perf_counter(), session(blender).state.period
+    blender.shot("queue_ghost")
     blender.SEEN["left"] = len(session(blender).strokes)
     while session(blender).strokes:
         yield 0.02
@@ -95,9 +96,8 @@ def queue(blender: Any) -> Iterator[float | None]:
 def haste(blender: Any) -> Iterator[float | None]:
     """Have the strokes finished at once; then let Esc end that, and then again have them finished."""
     loop = blender.part("live.loop").LOOP
-    for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.7 key Escape")):
+    for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.1 key Escape")):
         yield from drawn(blender, *LINES)
-        blender.shot("queue_ghost")
         yield from done(blender, hand(keys))
         yield from blender.until(lambda: not loop.in_haste)
         note(blender, name)
