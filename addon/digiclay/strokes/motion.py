@@ -42,8 +42,8 @@ WIDER = 1.2
 #: coarse steps does not jerk it.
 TURN = 3.0
 #: Force above which a fingertip dragged on uneven ground waits for pins to give way, N, how long at most, s,
-#: for pins at their stops never do, and how fast it gains speed, m/s². On "design" one of 15 valleys of 6 mm
-#: that begin on the flank of another one takes more than 1 N; without these it was six, and up to 535 N.
+#: for pins at their stops never do, and how fast it gains speed, m/s². On "design" two of 15 valleys of 6 mm
+#: that begin on the flank of another one take more than 1 N, one of them 76 N; before, six did, up to 535 N.
 FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 
 
