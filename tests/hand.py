@@ -58,9 +58,18 @@ def go_on(session: Running, ticks: int) -> Running:
         if session.strokes and not session.paused:  # else the machine's speed would tell how far it comes
             periods = round((time - now) / PERIOD) - round((time - TICK - now) / PERIOD)
             session = replace(session, clock=replace(session.clock, seen=time), tick=session.tick + 1)
-            session = sculpting.follow_finger(session, session.pose, periods)
+            session = _follow_stroke(session, periods)
         else:
             session = sculpting.advance(session, session.pose, time, 100)
+    return session
+
+
+def _follow_stroke(session: Running, periods: int) -> Running:
+    """Simulate so many control periods of the first stroke, or to its end, or to where it waits."""
+    end, finished, before = session.state.period + periods, session.finished_strokes, -1
+    while before < session.state.period < end and session.finished_strokes == finished:
+        before = session.state.period
+        session = sculpting.follow_finger(session, session.pose, end - before)
     return session
 
 

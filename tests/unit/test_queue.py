@@ -70,16 +70,34 @@ def test_the_same_path_leaves_the_same_heights_whatever_the_ticks(brush: Brush) 
         np.testing.assert_allclose(play(brush, interval, moves, waits), formed, rtol=0, atol=5e-6)
 
 
-@pytest.mark.parametrize("periods", [1, 7, 64])
-def test_a_stroke_leaves_the_same_bits_however_many_periods_are_simulated_at_a_time(periods: int) -> None:
-    session, number = queue_stroke(begin("Method III"), 0.0, 0.0, 3e-3, make_images("X"), Brush.RAISE)
-    ring = lay_ring((4e-3, 0.0), (12e-3, 5e-3))
-    session = change_stroke(session, number, partial(lay_path, points=ring))
-    whole = replace(session, state=session.state.copy())
-    whole = finish(whole)
-    while session.strokes:
-        session = sculpting.follow_finger(session, session.pose, periods)
-    assert np.array_equal(heights(session), heights(whole))
+#: Strokes of one session: brush, height or depth, m, path, m, and images. The last valley is pressed with
+#: more than `motion.FIRM`, at which the fingertip waits for the pins.
+DRAWN = {
+    "a mirrored ring": [(Brush.RAISE, 3e-3, lay_ring((4e-3, 0.0), (12e-3, 5e-3)), "X")],
+    "a valley from the flank of another one": [
+        (Brush.RAISE, 12e-3, np.array([[11.5e-3, 4.9e-3], [-10.5e-3, 0.2e-3]]), "NONE"),
+        (Brush.LOWER, 8e-3, np.array([[-17.1e-3, 8.0e-3], [1.1e-3, 8.2e-3]]), "NONE"),
+        (Brush.LOWER, 8e-3, np.array([[-16.5e-3, 5.8e-3], [-5.2e-3, 0.0]]), "NONE"),
+    ],
+}
+
+
+@pytest.mark.parametrize("periods", [7, 64])
+@pytest.mark.parametrize("name", DRAWN)
+def test_strokes_leave_the_same_bits_however_many_periods_are_simulated_at_a_time(
+    name: str, periods: int
+) -> None:
+    scene, formed = make_scene("design", Layout(41, 41, 1.5e-3), "hybrid", 0.5), []
+    for count in (1, periods):
+        session, _ = sculpting.begin_session(7, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))
+        for brush, amount, path, symmetry in DRAWN[name]:
+            session, number = queue_stroke(session, *path[0], amount, make_images(symmetry), brush)
+            session = change_stroke(session, number, partial(lay_path, points=path))
+        while session.strokes:
+            session = sculpting.follow_finger(session, session.pose, count)
+        formed.append((session.state.period, heights(session)))
+    assert formed[0][0] == formed[1][0]
+    np.testing.assert_array_equal(formed[0][1], formed[1][1])
 
 
 #: Strokes of a queue by their bed: brush, amount, mm, path, mm, and symmetry.

@@ -117,16 +117,19 @@ def follow(
 ) -> tuple[Stroke, Floats]:
     """Advance the fingertip along a stroke that has begun; return it and the path (k + 1, 7), k <= count.
 
-    The path ends where the hand has not drawn further, where the fingertip has left the last image, and where
-    it comes down to one: it presses into the pins that stand there, `now` (n,), m. On uneven ground it is
-    dragged one period at a time: what it does depends on the force, N.
+    The path ends where the hand has not drawn further, and where the fingertip begins something else: it
+    comes down to the pins that stand there, `now` (n,), m. On uneven ground it is dragged one period at a
+    time: what it does depends on the force, N.
     """
     if stroke.phase == PRESSING and stroke.standing is None:
         stroke = replace(stroke, standing=now.copy())
-    if stroke.tracking and stroke.phase == DRAGGING and _is_uneven(stroke, device, pose, count * period):
-        if force > FIRM and stroke.waited * period < PATIENCE:
+    if stroke.tracking and stroke.phase == DRAGGING:
+        firm = force > FIRM and _is_uneven(stroke, device, pose)
+        if firm and stroke.waited * period < PATIENCE:
             return replace(stroke, waited=stroke.waited + 1, pace=0.0), np.array([pose, pose])
-        count, stroke = 1, stroke if force > FIRM else replace(stroke, waited=0)
+        stroke = stroke if firm else replace(stroke, waited=0)
+        # No farther than to where the force may count.
+        count = 1 if _is_uneven(stroke, device, pose, count * period) else count
     way, path = Way(device, period, find_safe(stroke, device)), [pose]
     while len(path) <= count and stroke.phase not in (FINISHING, DONE):
         step = _step(stroke, way, path[-1][:3].tolist())
@@ -137,16 +140,17 @@ def follow(
             way = replace(way, safe=find_safe(stroke, device))
         turn = _turn(stroke, path[-1][3:], place[2] >= way.safe - NEAR, period)
         path.append(np.array([*place, *turn]))
-        if stroke.phase == PRESSING and stroke.standing is None:
+        if stroke.phase != before.phase:
             break
     return stroke, np.array(path)
 
 
-def _is_uneven(stroke: Stroke, device: Device, pose: Floats, time: float) -> bool:
-    """Tell whether the ground is uneven that the blister comes over in a time, s."""
+def _is_uneven(stroke: Stroke, device: Device, pose: Floats, time: float = 0.0) -> bool:
+    """Tell whether the ground is uneven that the blister is over, or comes over in a time, s."""
     assert stroke.ground is not None
     assert stroke.tracking is not None
-    near = device.grid.disc(pose[0], pose[1], stroke.tracking.radius + DRAG * time)
+    fastest = max(stroke.tracking.drag, stroke.tracking.push)
+    near = device.grid.disc(pose[0], pose[1], stroke.tracking.radius + fastest * time)
     return near.size > 0 and bool(np.ptp(stroke.ground[near]) > UNEVEN)
 
 
@@ -200,7 +204,7 @@ def finish_image(stroke: Stroke) -> Stroke:
     if stroke.image + 1 < len(stroke.images):
         begun = replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, first=0, climb=0.0, pace=0.0)
         return replace(begun, ground=stroke.height, standing=None)
-    return replace(stroke, phase=FINISHING if stroke.tracking else DONE)
+    return replace(stroke, phase=FINISHING if stroke.tracking else DONE, waited=0)
 
 
 def _step(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None:
