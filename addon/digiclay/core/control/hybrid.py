@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Constants, Floats, count_true
+from ..base.arrays import Constants, Floats
 from ..base.quantity import quantity
 from ..model.contact import Contact
 from ..model.control_interface import Commands, Measurement, SetPoint
@@ -325,9 +325,10 @@ class HybridControl:
             target = lead_heights(left, memory.top, region.drop, raised=region.raised)
             np.maximum(target, lowest, out=target)
             np.minimum(target, highest, out=target)
-        over = seen.force > OVER * self.parameters.force_setpoint
-        if count_true(over):
-            # Whoever presses a pin so hard alone is not where the fingertip is taken to be: it gives way.
+        most = OVER * self.parameters.force_setpoint
+        if np.maximum.reduce(seen.force, initial=0.0) > most:
+            # A fingertip that presses a single pin so hard is not where it is taken to be: the pin gives way.
+            over = seen.force > most
             low = np.maximum(coasting.heights + coasting.limits[0] * self.servo.span, 0.0)
             left, target = np.where(over, low, left), np.where(over, low, target)
         np.subtract(target, left, out=lead)
