@@ -34,11 +34,13 @@ def draw(blender: Any, row: float, pressure: float, right: float, near: float) -
 
 
 def pressed(blender: Any, since: int) -> dict[str, Any]:
-    """Return how low the finger came in a recording since a period, mm, and its turns there, w first."""
+    """Return how high pins are where the finger was lowest since a period, mm, and its turns there."""
     (session,) = blender.sessions()
     poses = session.recording.path[since:, 0]
-    low = poses[:, 2].min()
-    return {"lowest": 1e3 * float(low), "inside": poses[poses[:, 2] < low + 1e-5, 3:].tolist()}
+    lowest = poses[poses[:, 2] < poses[:, 2].min() + 1e-5]
+    x, y = lowest[len(lowest) // 2, :2]
+    cell = session.system.grid.at(np.array([x]), np.array([y]))
+    return {"formed": 1e3 * float(session.state.row(0)[cell][0]), "inside": lowest[:, 3:].tolist()}
 
 
 def script(blender: Any) -> Iterator[float | None]:
