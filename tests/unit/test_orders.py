@@ -280,6 +280,8 @@ def lock(verb: Verb, x: float = 0.0, radius: float = 7e-3) -> Orders:
 @pytest.mark.parametrize("shape", [False, True])
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
 def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method: str, shape: bool) -> None:
+    if shape:
+        pytest.importorskip("PIL.Image", reason="the shape is a picture")
     system = bed(method=method, shape=shape)
     path = stay_away(160)
     path[:, 0, 2] = np.concatenate([np.linspace(46e-3, 36e-3, 81), np.linspace(36e-3, 60e-3, 80)])

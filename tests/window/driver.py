@@ -214,12 +214,13 @@ def select(thing: Any) -> None:
 
 
 def grab(
-    offset: tuple[float, float, float], axis: str, steps: int = 6, look_as: str = "", end: str = "LEFTMOUSE"
-) -> Iterator[float | None]:
+    offset: tuple[float, float, float], axis: str, steps: int = 6, look_as: str = "", end: str = "LEFTMOUSE",
+    periods: int = 0,
+) -> Iterator[float | None]:  # fmt: skip
     """Move what is selected with G along an axis, by an offset in mm, step by step, and confirm it.
 
-    Sessions follow each step before the next. With `look_as` what stands in the scene is written down
-    during the move, after each step.
+    Sessions follow each step before the next, for so many control `periods` at least. With `look_as` what
+    stands in the scene is written down during the move, after each step.
     """
     evaluate()
     start = bpy.context.view_layer.objects.active.matrix_world.translation.copy()
@@ -237,6 +238,7 @@ def grab(
         event("MOUSEMOVE", "NOTHING", key_at)
         yield None
         yield from settle(1)
+        yield from simulate(periods)
         if look_as:
             look(f"{look_as} {step}")
     key(end, key_at)
@@ -289,6 +291,17 @@ def settle(ticks: int = 3) -> Iterator[float | None]:
         if now >= start + ticks:
             return
     raise AssertionError("The session does not tick any more")
+
+
+def simulate(periods: int) -> Iterator[float | None]:
+    """Wait until every session has simulated so many control periods more; none of them may be paused."""
+    begun = {one.uid: one.state.period for one in part("sessions.running").list_sessions()}
+    for _ in range(200):
+        sessions = part("sessions.running").list_sessions()
+        if all(one.state.period >= begun.get(one.uid, 0) + periods for one in sessions):
+            return
+        yield 0.05
+    raise AssertionError("The session does not simulate any more")
 
 
 def look(name: str) -> None:

@@ -57,10 +57,10 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from leave_files(blender)
 
 
-def to_height(blender: Any, height: float, steps: int) -> Iterator[float | None]:
-    """Move the fingertip with G until its lowest point is at a height, mm."""
+def to_height(blender: Any, height: float, steps: int, periods: int = 0) -> Iterator[float | None]:
+    """Move the fingertip with G until its lowest point is at a height, mm; see `grab`."""
     now = 1e3 * blender.part("bridge").pose(blender.fingertip())[2]
-    yield from blender.grab((0, 0, height - now), "Z", steps=steps)
+    yield from blender.grab((0, 0, height - now), "Z", steps=steps, periods=periods)
     yield from blender.settle()
 
 
@@ -68,10 +68,13 @@ def ridge(blender: Any) -> Iterator[float | None]:
     """Press, lift slowly, and draw a ridge along."""
     yield from blender.grab((-16, 0, 0), "X", steps=2)
     yield from to_height(blender, 35.0, steps=4)
+    # Lifted while its pins still sink, a fingertip is lost.
+    yield from blender.simulate(100)
     note(blender, "pressed")
-    yield from to_height(blender, 47.0, steps=24)
+    # At 5 mm/s of the device's time, however slow the machine is.
+    yield from to_height(blender, 47.0, steps=24, periods=20)
     note(blender, "raised")
-    yield from blender.grab((30, 0, 0), "X", steps=10)
+    yield from blender.grab((30, 0, 0), "X", steps=15, periods=20)
     yield from blender.settle()
     note(blender, "ridge")
     blender.shot("takes_ridge")
