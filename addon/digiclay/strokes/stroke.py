@@ -142,7 +142,7 @@ class Sample:
     depth: float
     #: Share of the way from the surface to the level, or strength of the smoothing, from 0 to 1.
     share: float = 1.0
-    #: How far the fingertip leans towards x and y of the bed, rad; see `stroke_motion.lean_finger`.
+    #: How far the fingertip leans towards x and y of the bed, rad; see `pose.lean_finger`.
     lean: tuple[float, float] = (0.0, 0.0)
 
 

@@ -35,7 +35,7 @@ from ..base.arrays import Flags, Floats, any_true
 from ..base.modes import Mode
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement
-from ..model.layout import Disc, Grid, enclose_discs
+from ..model.layout import Disc, Grid, enclose_discs, widen_disc
 from ..model.null_parts import Uncontrolled
 from ..model.physics import Cell
 from .drive import Drive, DriveParameters, make_drive
@@ -318,7 +318,8 @@ def order_periods(
         if verb is Verb.PLACE:
             surface = orders.surfaces[int(x)]
             if int(x) not in circles:
-                circles[int(x)] = _enclose(grid, surface)
+                driven = grid.enclose(np.flatnonzero(~np.isnan(surface)))
+                circles[int(x)] = widen_disc(driven, 0.1 * plan.pitch)
             circle = circles[int(x)]
             yield PlacingControl(held, free, exact, cell.actuator, circle, surface) if circle else held
         elif radius == 0.0:
@@ -335,16 +336,6 @@ def order_periods(
             exchange = make_exchange(grid, strength * radius**2 / time, period)
             reach = (x, y, radius + margin)
             yield kind(held, free, drive, cell.actuator, reach, disc, strength, exchange)
-
-
-def _enclose(grid: Grid, surface: Floats) -> Disc | None:
-    """Return a disc about all pins that a surface (n,) drives; None when it drives none."""
-    driven = ~np.isnan(surface)
-    if not driven.any():
-        return None
-    x, y = grid.x[driven], grid.y[driven]
-    middle = float(x.min() + x.max()) / 2.0, float(y.min() + y.max()) / 2.0
-    return *middle, float(np.hypot(x - middle[0], y - middle[1]).max()) + 0.1 * grid.layout.pitch
 
 
 def find_fault(orders: Orders, periods: int, pins: int, stroke: float) -> str:

@@ -147,7 +147,7 @@ class MasterCell:
         if self.laminar:
             speed: float = self.flow.laminar_conductance(opening) * drive
             return speed
-        return float(self.flow.conductance(np.array([opening]), np.array([drive * self.area]))[0]) * drive
+        return float(self.flow.conductance(np.array(opening), np.array(drive * self.area))) * drive
 
 
 def make_master_cell(cell: Cell, period: float) -> MasterCell:

@@ -62,9 +62,10 @@ class OrificeAndConduit(Flow):
         ra = self.resistance * turbulent
         root = 4.0 * np.abs(drop)
         root += ra * ra
-        np.sqrt(root, root)
+        root = np.sqrt(root)
         root += ra
         root += TINY
         turbulent *= 2.0
-        turbulent = turbulent / root
-        return np.minimum(self.laminar_conductance(opening), turbulent, out=turbulent)
+        turbulent /= root
+        laminar: Floats = self.laminar_conductance(opening)
+        return np.minimum(laminar, turbulent)

@@ -141,6 +141,14 @@ class Grid:
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + RELATIVE_TOLERANCE)]
 
+    def enclose(self, cells: Cells) -> Disc | None:
+        """Return a disc that holds the axes of some cells, m; None without any."""
+        if not cells.size:
+            return None
+        x, y = self.x[cells], self.y[cells]
+        at_x, at_y = float(x.min() + x.max()) / 2, float(y.min() + y.max()) / 2
+        return at_x, at_y, float(np.hypot(x - at_x, y - at_y).max())
+
     def covered(self, discs: Discs | None) -> Flags:
         """Return which cells are in the discs of b runs, shape (n, b); (n, 1) without discs."""
         if discs is None:

@@ -89,12 +89,7 @@ class Replay:
     @cached_property
     def disc(self) -> Disc | None:
         """The disc that holds every cell that is ever commanded: x, y, radius, m."""
-        cells = np.flatnonzero(self.commands.any(axis=0))
-        if not cells.size:
-            return None
-        x, y = self.grid.x[cells], self.grid.y[cells]
-        at_x, at_y = float(x.min() + x.max()) / 2, float(y.min() + y.max()) / 2
-        return at_x, at_y, float(np.hypot(x - at_x, y - at_y).max())
+        return self.grid.enclose(np.flatnonzero(self.commands.any(axis=0)))
 
     def begin(self) -> int:
         """Return the number of periods played."""
