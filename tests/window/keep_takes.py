@@ -71,8 +71,8 @@ def ridge(blender: Any) -> Iterator[float | None]:
     # Lifted while its pins still sink, a fingertip is lost.
     yield from blender.simulate(100)
     note(blender, "pressed")
-    # At 5 mm/s of the device's time, however slow the machine is.
-    yield from to_height(blender, 47.0, steps=24, periods=20)
+    # At 5 mm/s of the device's time, however slow the machine is; a quick tick takes a step at once.
+    yield from to_height(blender, 47.0, steps=60, periods=8)
     note(blender, "raised")
     yield from blender.grab((30, 0, 0), "X", steps=15, periods=20)
     yield from blender.settle()
