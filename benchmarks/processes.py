@@ -47,6 +47,8 @@ CASES: dict[str, tuple[str, ...]] = {
     "Method II": ("control.method=cell_states",),
     "Method III": ("control.method=hybrid",),
 }
+#: The last case: a command as a whole, bytecode kept.
+START = "digiclay run tap --quiet --overwrite"
 #: Run at both commits: prints the least processor time of a control period in each case, s.
 PROGRAM = """
 import json, sys, time
@@ -77,43 +79,55 @@ def measure_commits(arguments: argparse.Namespace, steps: Steps) -> Report:
     with tempfile.TemporaryDirectory() as scratch:
         trees = [extract(name, Path(scratch) / str(number)) for number, name in enumerate(names)]
         jobs = steps.through([*zip(trees, names, strict=True)] * turns, lambda job: str(job[1]))
-        times = np.array([run_commit(tree, name, count) for tree, name in jobs])
-    before, after = 1e6 * times[::2], 1e6 * times[1::2]
+        times = 1e6 * np.array([run_commit(tree, name, count) for tree, name in jobs])
+    before, after = times[::2], times[1::2]
     figures = [np.median(before, 0), np.median(after, 0)]
     figures += [reduce(after / before, axis=0) for reduce in (np.median, np.min, np.max)]
-    keys = ("case", "old_us", "new_us", "ratio", "least", "largest")
-    rows = [dict(zip(keys, row, strict=True)) for row in zip(CASES, *figures, strict=True)]
+    figures.append([*np.median(after[:, :-1] / after[:, :1], 0), None])
+    keys = ("case", "old_us", "new_us", "ratio", "least", "largest", "to_first")
+    rows = [dict(zip(keys, row, strict=True)) for row in zip([*CASES, START], *figures, strict=True)]
     columns = {
-        "case": "case", f"old, {names[0]} (µs)": "old_us .1f", f"new, {names[1]} (µs)": "new_us .1f",
-        **{key: f"{key} .2f" for key in keys[3:]},
+        "case": "case", f"old, {names[0]} (µs)": "old_us .0f", f"new, {names[1]} (µs)": "new_us .0f",
+        **{key: f"{key} .2f" for key in keys[3:-1]}, f"new, to {next(iter(CASES))}": "to_first .2f",
     }  # fmt: skip
-    title = f"\nprocessor time of a control period, medians of {turns} turns\n"
+    title = f"\nprocessor time of a control period, and of a command; medians of {turns} turns\n"
     return Report([title, *tabulate(rows, columns)], rows)
 
 
 def extract(commit: str, folder: Path) -> Path:
-    """Unpack the extension's package at a commit into a folder, and return the folder of its imports."""
-    git = ["git", "-c", "safe.directory=*", "archive", commit, "addon"]
+    """Unpack a commit into a folder, and return that."""
+    git = ["git", "-c", "safe.directory=*", "archive", commit]
     done = subprocess.run(git, cwd=ROOT, capture_output=True, timeout=LONGEST, check=False)
     if done.returncode:
         raise DigiclayError(f"commits: {commit} must be a commit, branch or tag of this checkout.")
     with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
         archive.extractall(folder, filter="data")
-    return folder / "addon"
+    return folder
 
 
 def run_commit(tree: Path, commit: str, count: int) -> list[float]:
-    """Return the time of a control period in each of `CASES`, s, by the package in a folder."""
-    environment = {**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
-    words = [sys.executable, "-c", PROGRAM, json.dumps(list(CASES.values())), str(count)]
-    done = subprocess.run(
-        words, cwd=tree, env=environment, capture_output=True, text=True, timeout=LONGEST, check=False
-    )
-    if done.returncode:
-        why = done.stderr.strip().rpartition("\n")[2]
-        raise DigiclayError(f"commits: {commit} cannot be timed: {why}.")
-    times: list[float] = json.loads(done.stdout)
-    return times
+    """Return the time of a control period in each of `CASES`, s, and of `START`, by the code in a folder."""
+    from resource import RUSAGE_CHILDREN, getrusage  # Windows has none
+
+    environment = {
+        **os.environ, "PYTHONPATH": os.pathsep.join([str(tree / "addon"), str(tree)]),
+        "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "",
+    }  # fmt: skip
+
+    def run(*words: str) -> tuple[str, float]:
+        before = getrusage(RUSAGE_CHILDREN)
+        done = subprocess.run(
+            [sys.executable, *words], cwd=tree, env=environment, capture_output=True, text=True,
+            timeout=LONGEST, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            why = done.stderr.strip().rpartition("\n")[2]
+            raise DigiclayError(f"commits: {commit} cannot be timed: {why}.")
+        after = getrusage(RUSAGE_CHILDREN)
+        return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    times: list[float] = json.loads(run("-c", PROGRAM, json.dumps(list(CASES.values())), str(count))[0])
+    return [*times, min(run("-m", "digiclay", *START.split()[1:])[1] for _ in range(5))]
 
 
 # Workers of a Dask cluster

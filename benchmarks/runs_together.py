@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from dataclasses import replace
+from threading import Semaphore, Thread
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,12 @@ from .report import Curves, Report, Row, Steps, tabulate
 COUNTS = (1, 4, 16, 32, 64, 128)
 #: Simulated time of a run, s.
 DURATION = 4.0
-#: Time between two measurements, s: the linear algebra library keeps its threads busy for a while.
-REST = 0.15
+#: Control periods after which the other work has its turn.
+TURN = 10
 #: Goal of the runs a second, over those of one run at a time.
-GOAL = 6.0
+GOAL = 8.0
+#: Some work, which asks after each control period whether to stop.
+Work = Callable[[Callable[[], bool]], object]
 #: What varies from run to run: section, key, and from which to which share of its value. The first leaves the
 #: cells alike, the second does not.
 STUDIES: dict[str, tuple[str, str, float, float]] = {
@@ -45,38 +48,68 @@ def study(scene: Scene, name: str, count: int) -> list[Scene]:
     return [scene.with_sections(**{section: replace(part, **{key: getattr(part, key) * s})}) for s in shares]
 
 
-def _time(work: Callable[[], Any]) -> float:
-    """Return the CPU time of some work, s, once what was before it has come to rest."""
-    time.sleep(REST)
-    started = time.process_time()
-    work()
-    return time.process_time() - started
+def time_in_turns(*works: Work) -> list[float]:
+    """Return the processor time of two works, s, in turns: what else the machine does befalls both alike."""
+    spent, batons, under_way = [0.0, 0.0], (Semaphore(0), Semaphore(0)), {0, 1}
+
+    def carry_out(place: int) -> None:
+        other, asked, since = 1 - place, 0, 0.0
+
+        def hand_on() -> bool:
+            nonlocal asked, since
+            asked += 1
+            if asked % TURN == 0 and other in under_way:
+                spent[place] += thread_time() - since
+                batons[other].release()
+                batons[place].acquire()
+                since = thread_time()
+            return False
+
+        batons[place].acquire()
+        since = thread_time()
+        try:
+            works[place](hand_on)
+        finally:
+            spent[place] += thread_time() - since
+            under_way.remove(place)
+            batons[other].release()
+
+    threads = [Thread(target=carry_out, args=[place]) for place in (0, 1)]
+    for thread in threads:
+        thread.start()
+    batons[0].release()
+    for thread in threads:
+        thread.join()
+    return spent
 
 
 def _compare(scene: Scene, name: str, count: int, repeats: int) -> list[Row]:
-    """Run a study; return the runs a second of each kind of work, medians of the repeats.
-
-    One run alone and all in one call take turns, so that what else the machine does befalls both alike.
-    """
+    """Run a study; return the runs a second of each kind of work, one run alone and all in one call."""
     scenes = study(scene, name, count)
     plain = study(replace(scene, recorder=None), name, count)
     middle, bare = scenes[count // 2], plain[count // 2]
-    works: dict[str, tuple[Callable[[], object], Callable[[], object]]] = {
-        "simulated": (lambda: run(bare), lambda: list(run_together(plain))),
-        "recorded and judged": (lambda: evaluate(middle), lambda: list(measure_together(scenes))),
+    works: dict[str, tuple[Work, Work]] = {
+        "simulated": (
+            lambda stopped: run(bare, stopped=stopped),
+            lambda stopped: list(run_together(plain, stopped=stopped)),
+        ),
+        "recorded and judged": (
+            lambda stopped: evaluate(middle, stopped),
+            lambda stopped: list(measure_together(scenes, stopped=stopped)),
+        ),
         "errors estimated too": (
-            lambda: evaluate(middle, errors=True), lambda: list(measure_together(scenes, errors=True))
+            lambda stopped: evaluate(middle, stopped, errors=True),
+            lambda stopped: list(measure_together(scenes, errors=True, stopped=stopped)),
         ),
     }  # fmt: skip
-    rates: dict[str, list[tuple[float, float]]] = {what: [] for what in works}
-    for _ in range(repeats):
-        for what, (alone, together) in works.items():
-            rates[what].append((1.0 / _time(alone), count / _time(together)))
-    medians = {what: np.median(pairs, 0).tolist() for what, pairs in rates.items()}
-    return [
-        {"study": name, "runs": count, "what": what, "alone": one, "together": many, "times": many / one}
-        for what, (one, many) in medians.items()
-    ]
+    rows: list[Row] = []
+    for what, pair in works.items():
+        times = np.median([time_in_turns(*pair) for _ in range(repeats)], 0)
+        one, many = (1.0 / times[0]).item(), (count / times[1]).item()
+        rows.append(
+            {"study": name, "runs": count, "what": what, "alone": one, "together": many, "times": many / one}
+        )
+    return rows
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
@@ -84,7 +117,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     scene, _ = scene_of(arguments)
     duration = min(scene.simulation.duration, 1.0 if arguments.quick else DURATION)
     scene = replace(scene, simulation=replace(scene.simulation, duration=duration))
-    counts, repeats = (COUNTS[:3], 1) if arguments.quick else (COUNTS, 5)
+    counts, repeats = (COUNTS[:3], 1) if arguments.quick else (COUNTS, 3)
     jobs = [(name, count) for name in STUDIES for count in counts]
     rows = [
         row

@@ -8,6 +8,7 @@ from digiclay.core.engine.simulation import begin, step
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.touch import trace_finger
+from digiclay.core.model.trajectory import interpolate_poses
 
 from tests.assemble import make_system, path, record
 
@@ -31,6 +32,18 @@ def test_undersides_of_several_periods_at_a_time_are_those_of_each_to_the_last_b
     # Other places in mid way have their own undersides.
     other = bed.compute_basis(np.arange(50))
     assert np.array_equal(whole.at(40).under(other), alone[40].at(40).under(other))
+
+
+@pytest.mark.parametrize("turn", [LEVEL, (0.8, 0.0, 0.6, 0.0), (0.5, -0.5, 0.5, 0.5), (-0.6, 0.1, 0.0, 0.8)])
+def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones(turn: object) -> None:
+    tip, rng = Fingertip(length=12e-3), np.random.default_rng(3)
+    poses = np.concatenate([rng.normal(0.0, 0.02, (6, 3)), np.tile(turn, (6, 1))], axis=1)
+    among = np.concatenate([poses, [[0.0, 0.0, 0.0, 0.6, 0.0, 0.0, 0.8]]])
+    for other in (tip, Fingertip(), tip):  # each keeps its own
+        assert (other.outline(poses) == other.outline(among)[:-1]).all()
+    parts = np.linspace(0.0, 1.0, 4)
+    together, alone = interpolate_poses(among[:, None], parts), interpolate_poses(poses[:, None], parts)
+    assert (together[:5] == alone).all()
 
 
 def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import shutil
 import time
 from collections.abc import Iterator, Sequence
@@ -121,6 +120,8 @@ def format_command(arguments: Sequence[str]) -> str:
     """Return a command of this program as it is typed into a terminal."""
     words = ["digiclay", *arguments]
     if os.name != "nt":
+        import shlex
+
         return shlex.join(words)
     from subprocess import list2cmdline
 

@@ -8,7 +8,6 @@ Blender's properties are all made from these declarations.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import operator
 import re
@@ -201,4 +200,6 @@ def parse(text: str, unit: str) -> float:
 
 def find_nearest_name(name: str, known: list[str], alike: float = 0.5) -> str:
     """Return the name a misspelt one is nearest to, or ``""``; `alike`, 0 to 1: least share in common."""
+    import difflib  # of which no command without a mistake has need
+
     return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=alike)), "")

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -77,20 +78,30 @@ class Fingertip(Parameters):
         Center x, y, z, m; matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; tilt of the mid
         surface t_x, t_y; half thickness over the center, m; smaller eigenvalue of S, 1/m².
         """
-        rotation = make_matrices(poses[:, 3:])
+        turns, outline = poses[:, 3:], np.empty((len(poses), 10))
+        still = len(poses) > 0 and (turns == turns[0]).all()
+        outline[:] = _outline_still(self, turns[0].tobytes()) if still else self._outline_turned(turns)
+        outline[:, :3] += poses[:, :3]
+        return outline
+
+    def _outline_turned(self, turns: Floats) -> Floats:
+        """Return the outlines (k, 10) of a fingertip at the origin, turned by unit quaternions (k, 4)."""
+        rotation = make_matrices(turns)
         axes = np.array([self.length, self.width, self.height])
         inverse = np.einsum("kij,j,klj->kil", rotation, axes**2, rotation)
         form = np.einsum("kij,j,klj->kil", rotation, axes**-2.0, rotation)
         lowest = inverse[:, :, 2] / np.sqrt(inverse[:, 2, 2])[:, None]
         tilt = form[:, :2, 2] / form[:, 2, 2][:, None]
         schur = form[:, :2, :2] - tilt[:, :, None] * form[:, 2, None, :2]
-        outline = np.empty((len(poses), 10))
-        outline[:, :3] = poses[:, :3] + lowest
-        outline[:, 3], outline[:, 4], outline[:, 5] = schur[:, 0, 0], schur[:, 0, 1], schur[:, 1, 1]
-        outline[:, 6:8] = tilt
-        outline[:, 8] = form[:, 2, 2] ** -0.5
-        outline[:, 9] = _smaller_eigenvalue(schur)
-        return outline
+        half = form[:, 2, 2] ** -0.5
+        parts = lowest, schur[:, 0], schur[:, 1, 1], tilt, half, _smaller_eigenvalue(schur)
+        return np.column_stack(parts)
+
+
+@lru_cache(64)
+def _outline_still(fingertip: Fingertip, turn: bytes) -> Floats:
+    """Return the outline (1, 10) of a fingertip at the origin; most do not turn from period to period."""
+    return fingertip._outline_turned(np.frombuffer(turn)[None])
 
 
 def compute_reaches(outline: Floats) -> Floats:
@@ -126,16 +137,20 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
     rows of the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
     """
     x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = np.moveaxis(outline, -1, 0)
-    zero = np.zeros_like(x)
+    count = outline.shape[-2]
+    rows = np.zeros((*outline.shape[:-2], 2 * count, 6))
+    inward, tangent = rows[..., :count, :], rows[..., count:, :]
     square = xx * x * x + 2.0 * xy * x * y + yy * y * y
-    inward = np.stack(
-        [1.0 - square, 2.0 * (xx * x + xy * y), 2.0 * (xy * x + yy * y), -xx, -2.0 * xy, -yy], -1
-    )
-    middle = np.stack([z + tilt_x * x + tilt_y * y, -tilt_x, -tilt_y, zero, zero, zero], -1)
+    inward[..., 0] = 1.0 - square
+    inward[..., 1] = 2.0 * (xx * x + xy * y)
+    inward[..., 2] = 2.0 * (xy * x + yy * y)
+    inward[..., 3], inward[..., 4], inward[..., 5] = -xx, -2.0 * xy, -yy
+    tangent[..., 0] = z + tilt_x * x + tilt_y * y
+    tangent[..., 1], tangent[..., 2] = -tilt_x, -tilt_y
     slope, join = (_SLOPE * half)[..., None], (0.5 * _ROOT * half)[..., None]
-    tangent = middle - slope * inward
+    tangent -= slope * inward
     tangent[..., 0] -= join[..., 0]
-    rows = np.concatenate([inward * (join / (1.0 - JOIN)), tangent], -2)
+    inward *= join / (1.0 - JOIN)
     return rows, np.stack([join, np.sqrt(join)], -3)
 
 

@@ -158,6 +158,8 @@ def interpolate_poses(path: Floats, parts: Floats) -> Floats:
 def _interpolate_turns(start: Floats, end: Floats, part: Floats) -> Floats:
     """Turn unit quaternions (k, 4) along the shortest arc, by the share `part` (k, 1) of the way."""
     cosine = np.einsum("ij,ij->i", start, end)[:, None]
+    if (np.abs(cosine) >= 1.0).all():  # as mostly: no turn at all
+        return np.asarray(start / np.linalg.norm(start, axis=1, keepdims=True))
     end = np.where(cosine < 0.0, -end, end)
     angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
     sine = np.sin(angle)
