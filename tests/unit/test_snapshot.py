@@ -161,6 +161,14 @@ def test_numbers_no_state_or_device_can_have_are_refused(name: str, index: Any, 
         snapshot.load(system, snapshot.dump(system, state))
 
 
+def test_a_cell_of_which_a_controller_remembers_no_number_of_the_world_is_refused() -> None:
+    system = system_of("hybrid")
+    state = run(system, begin(system), 70)
+    state.active.block[system.rows.controlled, 1] = -1e91  # pulp of Method III: the logarithm is NaN
+    with pytest.raises(StateError, match="no state has"):
+        snapshot.load(system, snapshot.dump(system, state))
+
+
 def test_pins_at_their_ends_and_valves_fully_open_are_taken_up() -> None:
     system, data = kept()
     state = snapshot.load(system, data)

@@ -190,6 +190,7 @@ def _check_limits(system: System, kept: Snapshot) -> None:
         values = kept.arrays[name]
         height, valves = values[0], (values[system.cell.lag_rows], values[rows.commands])
         wide = any((np.abs(opening) > 1.0 + SLACK).any() for opening in valves)
+        wide |= (np.abs(values[rows.controlled]) > LARGEST_KEPT).any()
         if wide or ((height < -SLACK) | (height > top)).any():
             raise _make_error("holds numbers that no state has")
 
