@@ -69,8 +69,8 @@ def _begin_at_rest(scene: Scene, system: System, limits: Limits) -> Session:
     state = begin(system)
     first = sample_poses(scene.trajectories(), np.zeros(1))[0, 0]
     pose = clamp_pose(first, system.cell.actuator.stroke)
-    kept = Moment(0, snapshot.dump(system, state), pose)
-    return Session(scene=scene, system=system, state=state, pose=pose, kept=kept, limits=limits)
+    kept = Moment(0, snapshot.dump(system, state), pose[None])
+    return Session(scene=scene, system=system, state=state, poses=pose[None], kept=kept, limits=limits)
 
 
 def follow(session: Session, target: Floats, number: int, count: int) -> Session:
@@ -89,10 +89,10 @@ def follow(session: Session, target: Floats, number: int, count: int) -> Session
     start, stop = session.pose[None], end[None]
     path = np.array([start, stop]) if count == 1 else interpolate_path(start, stop, count)
     try:
-        after = follow_path(session, path[:, 0])
+        after = follow_path(session, path)
     except DivergenceError:
         return replace(go_back(session, session.kept), diverged=session.diverged + 1, refused=target)
-    after = replace(after, pose=end, number=number, behind=end is not goal)
+    after = replace(after, poses=end[None], number=number, behind=end is not goal)
     if after.state.period - session.kept.period < KEEP / system.period:
         return after
     return replace(after, kept=_keep(after))
@@ -100,7 +100,7 @@ def follow(session: Session, target: Floats, number: int, count: int) -> Session
 
 def _keep(session: Session) -> Moment:
     """Return the present moment of a session."""
-    return Moment(session.state.period, snapshot.dump(session.system, session.state), session.pose)
+    return Moment(session.state.period, snapshot.dump(session.system, session.state), session.poses)
 
 
 def _limit_way(start: Floats, goal: Floats, most: float) -> Floats:

@@ -85,7 +85,7 @@ def test_commands_are_openings_and_an_untouched_bed_at_rest_is_left_alone(method
     wild = [chance.uniform(low, high, 25) for low, high in ((-40, 60), (0, 500), (-40, 60))]
     assert np.all(np.abs(orders(behavior, seen(behavior, *wild)).command) <= 1.0)
     untouched = seen(behavior)
-    nobody = Measurement(*(values[..., :0] for values in untouched[:-1]))  # all but the number of cells
+    nobody = Measurement(*(values[..., :0] for values in untouched[:-3]))  # arrays alone
     memory, disc = behavior.locate(behavior.begin(), nobody)
     given = behavior.command(memory, untouched)[1]
     if method != "shape_display":

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.batch.packing import begin, extend_path, make_batch
+from digiclay.core.batch.packing import extend_path
 from digiclay.core.engine.simulation import simulate_period
 from digiclay.core.model.fingertip import Fingertip, compute_reach
 from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.columns import begin, make_batch
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import (

@@ -169,7 +169,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
             session, pose, now, most, view.picked_pins(bed), loop.find_interval(context)
         )
     except (DivergenceError, MethodError) as error:
-        back = sculpting.restore(session, session.snapshot, session.pose)
+        back = sculpting.restore(session, session.snapshot, session.poses)
         later = replace(drop_strokes(back), paused=True)
         yield Note("ERROR", localize("The session of {} is paused: {}", bed.name, error), session.uid)
     running.put(later)
@@ -204,7 +204,7 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
             session = replace(session, settings=settings)
         if session.stale:
             pose = beds.read_pose(bed)
-            pose = session.pose if pose is None else pose
+            pose = session.poses if pose is None else pose
             back = sculpting.restore(session, beds.read_snapshot(bed), pose, beds.read_tick(bed))
             if session.recording is not None and back.recording is None:
                 words = localize(

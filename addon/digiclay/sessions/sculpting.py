@@ -15,7 +15,6 @@ from ..core.control.orders import Orders
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
 from ..core.engine.system import System
-from ..core.model.fingertip import wrap_one
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
@@ -54,12 +53,12 @@ def begin_session(
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost."""
     system = assemble(scene)
     state, lost = _load_state(system, kept)
-    pose = live_session.clamp_pose(pose, system.cell.actuator.stroke)
+    poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
-        scene=scene, system=system, state=state, pose=pose, uid=uid, name=name, snapshot=now, tick=tick + 1,
+        scene=scene, system=system, state=state, poses=poses, uid=uid, name=name, snapshot=now, tick=tick + 1,
         clock=live_session.Clock(), trace=recent_trace.start(system.period), monitor=accuracy.start(scene),
-        next_gesture=live_session.Moment(state.period, now, pose),
+        next_gesture=live_session.Moment(state.period, now, poses),
     )  # fmt: skip
     return running, lost
 
@@ -123,19 +122,24 @@ def request_step(running: Running) -> Running:
 
 
 def follow_finger(running: Running, pose: Floats, count: int) -> Running:
-    """Simulate control periods while the fingertip moves along its strokes, or else to a pose (7,)."""
+    """Simulate control periods while fingertips move along strokes, or else to poses (f, 7) or one (7,)."""
     if running.strokes:
         return _pack(_follow_stroke(running, count))
-    pose = live_session.clamp_pose(pose, running.system.cell.actuator.stroke)
-    running = _mark_gesture_start(running, pose, count)
-    path = live_session.interpolate_path(running.pose[None], pose[None], count)[:, 0]
+    poses = live_session.clamp_pose(pose.reshape(-1, 7), running.system.cell.actuator.stroke)
+    running = _mark_gesture_start(running, poses, count)
+    path = live_session.interpolate_path(running.poses, poses, count)
     return _pack(_follow(running, path, None, accuracy.PAUSE))
 
 
 def _follow_stroke(running: Running, count: int) -> Running:
     """Simulate at most so many control periods of the first stroke; none where it waits for the hand."""
     running, path, orders = take_path(running, count)
-    return _follow(running, path, orders, PAUSE) if len(path) > 1 else running
+    if len(path) == 1:
+        return running
+    # The other fingers stay where they are.
+    paths = np.repeat(running.poses[None], len(path), axis=0)
+    paths[:, 0] = path
+    return _follow(running, paths, orders, PAUSE)
 
 
 def estimate_time(running: Running) -> float:
@@ -156,16 +160,16 @@ def _pack(running: Running) -> Running:
 
 
 def _follow(running: Running, path: Floats, orders: Orders | None, pause: int) -> Running:
-    """Simulate the control periods of a path (k + 1, 7); `pause` of them are between two error estimates."""
+    """Simulate control periods of a path (k + 1, f, 7), `pause` of them between two error estimates."""
     system, monitor = running.system, running.monitor
-    rows, first, trace, paths = [], running.state.period + 1, running.trace, wrap_one(path)
+    rows, first, trace = [], running.state.period + 1, running.trace
     started = time.perf_counter()
     monitor = monitor and accuracy.begin_stretch(monitor, running.state, pause)
 
     def watch(state: State) -> None:
         nonlocal monitor
         index = state.period - first
-        monitor = monitor and accuracy.note(monitor, state, paths[index : index + 2], pause)
+        monitor = monitor and accuracy.note(monitor, state, path[index : index + 2], pause)
         if state.period % trace.every == 0:
             rows.append(recent_trace.sample(system, state, running.scene.set_point, trace.pins))
 
@@ -180,14 +184,14 @@ def _follow(running: Running, path: Floats, orders: Orders | None, pause: int) -
     return _count_gesture(gone, ordered=orders is not None and orders.given)
 
 
-def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
+def _mark_gesture_start(running: Running, poses: Floats, count: int) -> Running:
     """Mark where a gesture begins: when the fingertip moves after a rest, or does not touch."""
-    moved = float(np.abs(pose - running.pose).max()) > STILL
+    moved = float(np.abs(poses - running.poses).max()) > STILL
     rest_time = 0.0 if moved else running.rest_time + count * running.system.period
     next_gesture = running.next_gesture
     free = next_gesture is None and recent_trace.measure_total_force(running.system, running.state) == 0.0
     if free or (moved and running.rest_time >= REST):
-        next_gesture = live_session.Moment(running.state.period, running.snapshot, running.pose)
+        next_gesture = live_session.Moment(running.state.period, running.snapshot, running.poses)
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
@@ -200,7 +204,7 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
     return replace(running, gestures=(*running.gestures, running.next_gesture)[-room:], next_gesture=None)
 
 
-def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None = None) -> Running:
+def restore(running: Running, kept: bytes | None, poses: Floats, tick: int | None = None) -> Running:
     """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends."""
     state, _ = _load_state(running.system, kept)
     now = snapshot.dump(running.system, state)
@@ -211,10 +215,10 @@ def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None
     free = recent_trace.measure_total_force(running.system, state) == 0.0
     return replace(
         running, state=state, snapshot=now, clock=running.clock.stopped(), stale=0,
-        pose=live_session.clamp_pose(pose, running.system.cell.actuator.stroke),
+        poses=live_session.clamp_pose(poses.reshape(-1, 7), running.system.cell.actuator.stroke),
         monitor=running.monitor and accuracy.reset(running.monitor),
         recording=keep, gestures=gestures, tick=running.tick + 1, rest_time=0.0,
-        next_gesture=live_session.Moment(state.period, now, pose) if free else None,
+        next_gesture=live_session.Moment(state.period, now, poses.reshape(-1, 7)) if free else None,
     )  # fmt: skip
 
 
@@ -223,7 +227,7 @@ def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
     if scene == running.scene:
         return running, ""
     other, lost = begin_session(
-        running.uid, running.name, scene, running.pose, running.snapshot, running.tick
+        running.uid, running.name, scene, running.poses, running.snapshot, running.tick
     )
     names = ["clock", "paused", "blocking_reason", "finished_strokes", "last_place"]
     names += [] if lost else ["gestures", "strokes", "stroke_start"]
@@ -259,7 +263,7 @@ def withdraw_stroke(running: Running) -> Running:
 
 def restore_gesture(running: Running, gesture: live_session.Moment) -> Running:
     """Bring state, fingertip and recording back to where a gesture of the session began."""
-    back = restore(replace(running, recording=None), gesture.snapshot, gesture.pose)
+    back = restore(replace(running, recording=None), gesture.snapshot, gesture.poses)
     keep = running.recording
     # The gesture a reset leaves behind has periods of another count.
     if keep is not None:
@@ -273,10 +277,10 @@ def restore_gesture(running: Running, gesture: live_session.Moment) -> Running:
 def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the fingertip off it; this can be rewound like a gesture."""
     # Before period 0, at which the first gesture after the reset may begin.
-    before = live_session.Moment(-1, running.snapshot, running.pose)
-    pose = running.pose.copy()
-    pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
-    back = restore(replace(drop_strokes(running), gestures=()), None, pose, tick=-1)
+    before = live_session.Moment(-1, running.snapshot, running.poses)
+    poses = running.poses.copy()
+    poses[:, 2] = np.maximum(poses[:, 2], running.system.cell.actuator.rest_height + CLEARANCE)
+    back = restore(replace(drop_strokes(running), gestures=()), None, poses, tick=-1)
     return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
 
 
@@ -312,9 +316,10 @@ def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stro
 
 def drop_strokes(running: Running) -> Running:
     """Return the session without unfinished strokes; the fingertip stays there, upright."""
-    pose, turn = running.pose, running.strokes[0].turn if running.strokes else None
-    pose = pose if turn is None else np.concatenate([pose[:3], turn])
-    return replace(running, strokes=(), stroke_start=None, pose=pose)
+    poses, turn = running.poses.copy(), running.strokes[0].turn if running.strokes else None
+    if turn is not None:
+        poses[0, 3:] = turn
+    return replace(running, strokes=(), stroke_start=None, poses=poses)
 
 
 def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | None]:
@@ -323,7 +328,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     The path ends where the stroke waits for the hand: there the clay stands still.
     """
     if running.strokes[0].height is None:
-        begun = live_session.Moment(running.state.period, running.snapshot, running.pose)
+        begun = live_session.Moment(running.state.period, running.snapshot, running.poses)
         running = replace(running, next_gesture=begun, stroke_start=begun)
     stroke, path, orders = _advance(running, running.strokes[0], count)
     left = (stroke, *running.strokes[1:])

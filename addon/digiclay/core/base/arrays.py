@@ -65,6 +65,16 @@ def count_true(test: NDArray[np.bool_]) -> Any:
     return test.tobytes().count(1) if test.ndim == 1 else np.count_nonzero(test, axis=0).tolist()
 
 
+def find_copies(cells: Cells) -> tuple[Cells, Cells]:
+    """Return cells (g,) that occur more than once, and where, (c, g), the first place repeated."""
+    order = np.argsort(cells, kind="stable")
+    unique, first, count = np.unique(cells[order], return_index=True, return_counts=True)
+    several = count > 1
+    most = int(count.max(initial=1))
+    step = np.arange(most)[:, None]
+    return unique[several], order[first[several] + np.where(step < count[several], step, 0)]
+
+
 def per_row(values: Floats, dimensions: int) -> Floats:
     """Return numbers (r,), (r, 1) or (r, b) such that rows (r, n) or (r, n, b) combine with them."""
     return values.reshape(len(values), *(1,) * (dimensions - 2), -1)

@@ -22,12 +22,14 @@ from ..model.layout import Grid
 from ..model.touch import FingerPath, FingerPeriod
 from ..model.trajectory import Trajectory
 from ..scene.assembly import assemble
+from ..scene.columns import Batch, begin, make_batch
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
+from ..session import run_scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_scene import Ended, Result, evaluate, report
-from .packing import Batch, begin, extend_path, find_diverged, make_batch, make_divergence_error, select_runs
+from .packing import extend_path, find_diverged, make_divergence_error, select_runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +269,9 @@ def _run(
     errors: bool = False,
 ) -> Iterator[tuple[int, Outcome]]:
     """Yield the numbers of the scenes as they come to their ends, and what an observer makes of them."""
+    if any(len(scene.fingers) != 1 for scene in scenes):
+        yield from _run_one_by_one(scenes, stopped, errors=errors)
+        return
     systems: dict[int, System] = {}
     for number, scene in enumerate(scenes):
         try:
@@ -293,6 +298,20 @@ def _run(
             if monitor:
                 result = result.with_errors(Errors.estimate(monitor.largest[:, index]))
             yield run, result
+
+
+def _run_one_by_one(
+    scenes: Sequence[Scene], stopped: Callable[[], bool] | None, *, errors: bool
+) -> Iterator[tuple[int, Outcome]]:
+    """Yield what becomes of scenes of several fingers, of which each is a batch of its own."""
+    for number, scene in enumerate(scenes):
+        try:
+            result = run_scene.run(scene, stopped=stopped)
+            if stopped and stopped():
+                return
+            yield number, (result.estimate_errors(stopped=stopped) or result) if errors else result
+        except DigiclayError as error:
+            yield number, error
 
 
 def run_together(

@@ -80,6 +80,11 @@ class Patch(NamedTuple):
     felt: bool = False
     losses: int = 0
 
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Where the fingertip is, m; None: none is felt."""
+        return (self.x, self.y) if self.felt else None
+
 
 @dataclass(frozen=True)
 class CellStates(Tracking):

@@ -260,6 +260,13 @@ class HybridControl:
         error = abs(force - self.parameters.force_setpoint)
         return error <= NEAR * self.parameters.force_setpoint and math.hypot(vx, vy, vz) <= SLOW
 
+    def predict_under(self, memory: Follower, basis: Floats) -> Floats | None:
+        """Return the predicted underside over cells, (m,), m; None: no fingertip is predicted."""
+        if memory.phase is Phase.IDLE or memory.master.phase is not Phase.IDLE:
+            return None
+        x, y, z, *_ = memory.estimate.mean.tolist()
+        return self.finger.find_underside((x, y, z), memory.estimate, basis)
+
     def _has_jumped(self, guess: Estimate, position: Floats) -> bool:
         """Tell whether no touched cell, at (2, m), m, is where the fingertip can be."""
         place, (x, y) = guess.mean.tolist()[:2], position.tolist()

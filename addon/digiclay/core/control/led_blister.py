@@ -80,6 +80,14 @@ class Follower(NamedTuple):
     master: Master = Master()
     """Memory of Method I while it takes over; IDLE: it does not."""
 
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Where the fingertip is, m; None: none is followed."""
+        if self.phase is Phase.IDLE or self.master.phase is not Phase.IDLE:
+            return self.master.place
+        x, y, *_ = self.estimate.mean.tolist()
+        return x, y
+
 
 #: Surface from which the blister rises.
 GROUND = EdgeGround()

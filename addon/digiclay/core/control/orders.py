@@ -35,7 +35,7 @@ from ..base.arrays import Flags, Floats, any_true
 from ..base.modes import Mode
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement
-from ..model.layout import Disc, Grid, enclose_discs, widen_disc
+from ..model.layout import Disc, Grid, add_disc, widen_disc
 from ..model.null_parts import Uncontrolled
 from ..model.physics import Cell
 from .drive import Drive, DriveParameters, make_drive
@@ -140,7 +140,7 @@ class DrivingControl(Around):
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
         """Request the order's disc, and the method's; see `Controller`."""
         memory, disc = self.method.locate(memory, touched)
-        return memory, self.reach if disc is None else enclose_discs(disc, self.reach)
+        return memory, add_disc(disc, self.reach)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Drive the pins of the order, and those still on their way; the method commands all others."""
@@ -261,7 +261,7 @@ class LockingControl(Around):
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
         """Request the disc, and the method's; see `Controller`."""
         memory, disc = self.method.locate(memory, self._mask(touched))
-        return memory, disc if self.disc is None else enclose_discs(disc or self.disc, self.disc)
+        return memory, disc if self.disc is None else add_disc(disc, self.disc)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Shut the valves of locked pins; the method commands all others. See `Controller`."""

@@ -339,9 +339,9 @@ def describe_failure(error: BaseException, file: str) -> str:
 
 def _copy_read_only(seen: Measurement) -> Measurement:
     """Return copies, so that no view leads to the bed's own arrays; read-only but the controller's rows."""
-    arrays: Any = seen[:-1]  # a method of unknown code is called for one run at a time
+    arrays: Any = seen[:-3]  # a method of unknown code is called for one run at a time
     given = Measurement(*(array.copy() for array in arrays))
-    for array in given[:-1]:
+    for array in given[:-3]:
         array.flags.writeable = array is given.own
     return given
 

@@ -98,6 +98,11 @@ class Master(NamedTuple):
     losses: int = 0
     """How often the fingertip was lost while shaping."""
 
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Where the fingertip is, m; None: none is followed."""
+        return None if self.phase is Phase.IDLE else (self.x, self.y)
+
     # What changes every period is written out: `_replace` takes nearly twice as long.
 
     def move_to(self, x: float, y: float, heading: Heading) -> Master:

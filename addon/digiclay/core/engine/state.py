@@ -28,14 +28,15 @@ class Rows:
 
     The first `physics` rows (height first, m) are the continuous state of `physics.Cell`;
     then come the commands on their way to the valve, oldest first; the height a cell is
-    commanded to, m; the force on it at the end of the last period, N; and what the
-    controller and the sensors remember of each cell.
+    commanded to, m; the force on it at the end of the last period, N; what the
+    controller and the sensors remember of each cell; and the forces of several fingers, N.
     """
 
     physics: int
     queue: int
     control: int = 0
     sensors: int = 0
+    fingers: int = 0
 
     @cached_property
     def driven(self) -> slice:
@@ -65,7 +66,7 @@ class Rows:
     @cached_property
     def count(self) -> int:
         """Number of rows."""
-        return self.force + 1 + self.control + self.sensors
+        return self.force + 1 + self.control + self.sensors + self.fingers
 
     @cached_property
     def controlled(self) -> slice:
@@ -75,7 +76,12 @@ class Rows:
     @cached_property
     def sensed(self) -> slice:
         """Rows the sensors own."""
-        return slice(self.force + 1 + self.control, self.count)
+        return slice(self.force + 1 + self.control, self.count - self.fingers)
+
+    @cached_property
+    def pressing(self) -> slice:
+        """Rows of the forces of several fingers; of a single one it is the force."""
+        return slice(self.count - self.fingers, self.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +139,7 @@ class ActiveSet:
             block[rows.command],
             block[rows.sensed],
             tuple(present),
+            *((self.control, block[rows.pressing]) if rows.fingers else (None, None)),
         )
 
     @cached_property
@@ -203,6 +210,13 @@ class State(NamedTuple):
         values: Floats = self.rows[index].copy()
         values.reshape(-1)[self.active.flat] = self.active.block[index]
         return values
+
+    def finger_forces(self) -> Floats:
+        """Return the total force of each finger, (f,), N."""
+        rows = self.active.rows
+        own = slice(rows.force, rows.force + 1) if not rows.fingers else rows.pressing
+        forces: Floats = self.active.block[own].sum(axis=1)
+        return forces
 
     def mode(self) -> NDArray[np.int8]:
         """Return the control modes of all cells, shape (n,) or (n, b), as a new array."""

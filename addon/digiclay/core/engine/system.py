@@ -46,6 +46,11 @@ class System:
     height_floor: float
     """Distance from which on a height that is read is not the true one, m."""
 
+    @property
+    def fingers(self) -> int:
+        """Number of fingers."""
+        return 1
+
     def move(self, active: ActiveSet, finger: FingerPeriod | None) -> None:
         """Move active cells through a control period under their queued commands, in place."""
         movement = active.movements.get(self.plan)

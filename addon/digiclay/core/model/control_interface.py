@@ -36,6 +36,10 @@ class Measurement(NamedTuple):
     """(rows, m): What the sensors remember of each cell."""
     present: tuple[int, ...] = ()
     """In a batch how many of the cells, the first, take part in each run; empty: all do."""
+    discs: Any = None
+    """With several fingers x, y and radius, m, (f,) each, of the discs of their active cells."""
+    pressing: Any = None
+    """(f, m): Then also the force of each finger, N; no more than a name for who presses, see `hands`."""
 
 
 class Commands(NamedTuple):

@@ -38,7 +38,7 @@ _SLOPE = 0.5 / _ROOT
 def require_one(fingers: Sequence[Item]) -> Item:
     """Return the only item of a list of one a finger, or raise ParameterError; see docs/architecture.md."""
     if len(fingers) != 1:
-        rule = "must be one: the physics carries exactly one finger"
+        rule = "must be one here: this is of a single finger"
         raise ParameterError("scene", "fingers", rule, str(len(fingers)))
     (only,) = fingers
     return only

@@ -201,6 +201,13 @@ def find_neighbors(rows: int, columns: int, shift: float, *, corners: bool) -> C
     return np.where(on_bed, beside * columns + along, -1).astype(np.intp)
 
 
+def add_disc(discs: Any, other: Disc) -> Any:
+    """Return the least disc that holds two; beside those of several fingers, a list, one more."""
+    if isinstance(discs, list):
+        return [*discs, other]
+    return enclose_discs(discs or other, other)
+
+
 def enclose_discs(one: Disc, other: Disc) -> Disc:
     """Return the least disc, x, y and radius in m, that holds two."""
     (x, y, radius), (other_x, other_y, other_radius) = one, other

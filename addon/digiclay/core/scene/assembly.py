@@ -5,10 +5,11 @@ Modules of parts that a scene may leave out are imported where the part is put i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 from ..base.arrays import Floats
+from ..base.errors import ParameterError
 from ..control.methods import find_method
 from ..engine.active_set import Selection
 from ..engine.state import Rows
@@ -16,14 +17,21 @@ from ..engine.system import System, make_segments
 from ..model.control_interface import Controller
 from ..model.delay import Queue, split_delay
 from ..model.fingertip import require_one
-from ..model.interfaces import Flow, Sensors, Stepper
+from ..model.interfaces import Flow, Segment, Sensors, Stepper
 from ..model.laws import import_part, select_law
 from ..model.layout import Grid, make_grid
 from ..model.null_parts import InstantValve, PerfectSensors, Uncontrolled, Unrelaxed
 from ..model.physics import Cell, find_speeds
 from ..model.touch import Touch
 from ..model.valve import Orifice
-from .schema import STEPPERS, Scene
+from .schema import STEPPERS, Finger, Scene
+
+if TYPE_CHECKING:
+    from ..control.device_info import DeviceInfo
+
+
+#: The steppers that know how to move cells whose numbers differ from column to column.
+CLOSED_FORM = ("bernoulli", "richardson")
 
 
 @dataclass(frozen=True)
@@ -36,6 +44,7 @@ class Motion:
     stepper: Stepper
     plan: Any
     """The stepper's."""
+    steps: tuple[Segment, ...]
     instants: Floats
     """See `engine.system.make_segments`."""
 
@@ -51,7 +60,7 @@ def make_motion(scene: Scene) -> Motion:
     # An opening that lags has a kink where the next command comes through; one that does not, a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
     steps, instants = make_segments(stepper, cut, period, scene.simulation.steps)
-    return Motion(cell, line, stepper, stepper.plan(cell, line, steps), instants)
+    return Motion(cell, line, stepper, stepper.plan(cell, line, steps), steps, instants)
 
 
 def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
@@ -61,13 +70,15 @@ def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
 
 def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, Sensors, Rows]:
     """Build the control method and the sensors, and count the rows of each part's memory."""
-    controller = _make_controller(scene, bed, motion.cell)
+    controller = _make_controller(scene, bed, (motion.cell,))
     sensors = _make_sensors(scene, motion.cell, motion.line)
     return controller, sensors, Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows)
 
 
 def assemble(scene: Scene) -> System:
     """Build the system of a scene."""
+    if len(scene.fingers) != 1:
+        return _assemble_hands(scene)
     motion, period = make_motion(scene), scene.simulation.control_period
     bed = make_grid(scene.layout)
     controller, sensors, rows = _make_control(scene, bed, motion)
@@ -91,6 +102,59 @@ def assemble(scene: Scene) -> System:
         latency=latency + (scene.sensors.delay * period if scene.sensors else 0.0),
         height_floor=scene.sensors.height_floor if scene.sensors else 0.0,
     )
+
+
+def _assemble_hands(scene: Scene) -> System:
+    """Build the system of a scene with several fingers."""
+    from ..engine.pairs import HandSelection, HandSystem
+    from ..model.fingers import MOST_FINGERS, join_touches
+    from ..steppers.press_together import plan_together
+
+    if not 0 < len(scene.fingers) <= MOST_FINGERS:
+        raise ParameterError("scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(len(scene.fingers)))
+    scene = replace(scene, fingers=_pad_relaxations(scene.fingers))
+    made: dict[Any, tuple[Motion, System]] = {}
+    for finger in scene.fingers:
+        parts = finger.fingertip, finger.contact, finger.relaxation
+        if parts not in made:
+            alone = replace(scene, fingers=(finger,))
+            made[parts] = make_motion(alone), assemble(replace(alone, control=None, shape=None))
+    motions = [made[finger.fingertip, finger.contact, finger.relaxation][0] for finger in scene.fingers]
+    first, system = motions[0], next(iter(made.values()))[1]
+    touches = [motion.cell.touch for motion in motions]
+    kept = [touch for touch in touches if touch]
+    if 0 < len(kept) < len(touches):
+        rule = "must all have a fingertip, or none of them"
+        raise ParameterError("scene", "fingers", rule, f"{len(kept)} of {len(touches)} with one")
+    cell = replace(first.cell, touch=join_touches(kept) if kept else None)
+    cells = tuple(motion.cell for motion in motions)
+    controller = _make_controller(scene, system.grid, cells)
+    rows = Rows(cell.rows, first.line.length, controller.rows, system.sensors.rows, len(cells))
+    common = {field.name: getattr(system, field.name) for field in fields(system)}
+    selection = HandSelection(system.grid, rows, cell, system.period, system.fastest)
+    by_set = system.by_set or bool(scene.control and find_method(scene.method).by_set)
+    own = {"cell": cell, "controller": controller, "selection": selection, "rows": rows, "by_set": by_set}
+    together = plan_together(cells, first.line, first.steps) if kept else None
+    plans = tuple(motion.plan for motion in motions)
+    return HandSystem(**common | own, cells=cells, plans=plans, press_together=together)
+
+
+def _pad_relaxations(fingers: tuple[Finger, ...]) -> tuple[Finger, ...]:
+    """Return fingers whose pulps have as many filters each; those that are added lose no force."""
+    most = max(len(finger.relaxation.times) if finger.relaxation else 0 for finger in fingers)
+    if not most:
+        return fingers
+    from ..model.relaxation import Relaxation
+
+    padded = []
+    for finger in fingers:
+        times, weights = (
+            ((), (1.0,)) if not finger.relaxation else (finger.relaxation.times, finger.relaxation.weights)
+        )
+        more = most - len(times)
+        relaxation = Relaxation((*times, *(1.0,) * more), (*weights, *(0.0,) * more))
+        padded.append(replace(finger, relaxation=relaxation))
+    return tuple(padded)
 
 
 def _make_flow(scene: Scene) -> Flow:
@@ -133,8 +197,9 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
     return sensors
 
 
-def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
-    """Return the control method, before it the display of a shape."""
+def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Controller:
+    """Return the control method for the cells of all fingers, before it the display of a shape."""
+    cell = cells[0]
     if scene.control is None and scene.shape is None:
         return Uncontrolled()
     from ..control.device_info import DeviceInfo
@@ -149,7 +214,7 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
         device = replace(device, heights=fit_shape(scene.shape, bed, cell.actuator).heights)
     controller: Controller | None = None
     if scene.control:
-        controller = find_method(scene.method).build(scene.control, device)
+        controller = _build_method(scene, [replace(device, cell=own) for own in cells])
     if scene.shape and not (controller and scene.method == "shape_display"):
         from ..control.displays import make_handover
 
@@ -157,3 +222,21 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
         controller = make_handover(scene.shape, device, controller, recovers=recovers)
     assert controller is not None
     return controller
+
+
+def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
+    """Return the control method for the devices of all fingers."""
+    method = find_method(scene.method)
+    controllers: list[Controller] = [method.build(scene.control, device) for device in devices]
+    touches = [device.cell.touch for device in devices]
+    if len(controllers) == 1 or not all(touches):
+        return controllers[0]
+    from ..control.hands import follows_finger, join_fingers
+    from .columns import join_controllers
+
+    if not follows_finger(controllers[0]):
+        return controllers[0]
+    sizes = [max(touch.fingertip.length, touch.fingertip.width) for touch in touches if touch]
+    skirt = scene.blister.edge_radius - scene.blister.radius if scene.blister else 0.0
+    felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
+    return join_fingers(controllers, join_controllers(controllers), sizes, skirt, felt)

@@ -140,11 +140,24 @@ class RunRecording(Recording):
         self._history = HistoryWriter(recorder.rows(periods), state.rows.shape[1])
         self._history.begin(state.row(0), state.mode())
         super().__init__(recorder, rows, self._history.write)
+        self._pressing = [np.zeros(rows.fingers)]
+        self._last = state
+
+    def observe(self, state: State) -> None:
+        """Take in the state after a control period; of several fingers also the force of each."""
+        super().observe(state)
+        self._last = state
+        if state.active.rows.fingers and state.period % self.every == 0:
+            self._pressing.append(state.finger_forces())
 
     def finish(self, period: int) -> dict[str, NDArray[Any]]:
         """Return the rows up to the period the session ended with, see `HistoryWriter.finish`."""
         self.flush()
-        return self._history.finish(period, self.every)
+        rows = self._history.finish(period, self.every)
+        if self._last.active.rows.fingers:
+            forces = [*self._pressing, self._last.finger_forces()]
+            rows["finger_force"] = np.array(forces[: len(rows["period"])])
+        return rows
 
 
 def write(history: dict[str, NDArray[Any]], path: Path) -> None:

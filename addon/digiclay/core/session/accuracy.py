@@ -101,7 +101,7 @@ class Replay:
 
     def command(self, memory: int, seen: Measurement) -> tuple[int, Commands]:
         """Return the commands of the period."""
-        command = np.zeros(seen.height.size)
+        command = np.zeros(seen.height.shape)
         if memory < len(self.commands):
             command = self.commands[memory, seen.cells]
         return memory + 1, Commands(seen.target, seen.mode, command)

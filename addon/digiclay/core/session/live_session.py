@@ -116,12 +116,12 @@ def interpolate_path(start: Floats, end: Floats, count: int) -> Floats:
 
 
 def clamp_pose(pose: Floats, stroke: float) -> Floats:
-    """Return the pose (7,), kept above the bed's floor and within a thousand strokes, m, of the bed."""
+    """Return poses (..., 7), kept above the bed's floor and within a thousand strokes, m, of the bed."""
     # Pins bottom out at the floor: below it the force would exceed what floating-point numbers hold.
     far = 1e3 * stroke
     inside = pose.copy()
-    inside[:2] = np.clip(pose[:2], -far, far)
-    inside[2] = min(max(float(pose[2]), 0.0), far)
+    inside[..., :2] = np.clip(pose[..., :2], -far, far)
+    inside[..., 2] = np.clip(pose[..., 2], 0.0, far)
     return inside
 
 
@@ -241,11 +241,11 @@ def _add_surfaces(kept: tuple[Floats, ...], more: tuple[Floats, ...]) -> tuple[t
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Moment a session can go back to: period, snapshot, and pose of the fingertip (7,)."""
+    """Moment a session can go back to: period, snapshot, and poses of the fingertips (f, 7)."""
 
     period: int
     snapshot: bytes
-    pose: Floats
+    poses: Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -256,10 +256,16 @@ class LiveSession:
     system: System
     state: State
     """Used up by the next control period: nothing of it may be stored."""
-    pose: Floats
-    """(7,): The fingertip's, up to which the session has followed it."""
+    poses: Floats
+    """(f, 7): The fingertips', up to which the session has followed them."""
     recording: Recording | None = None
     """Of the fingertip path."""
+
+    @property
+    def pose(self) -> Floats:
+        """Pose of the first fingertip, (7,)."""
+        first: Floats = self.poses[0]
+        return first
 
 
 Session = TypeVar("Session", bound=LiveSession)
@@ -272,20 +278,20 @@ def follow_path(
     tick: int = 0,
     watch: Callable[[State], None] | None = None,
 ) -> Session:
-    """Simulate and record the control periods of a fingertip path (t + 1, 7); DivergenceError uses it up."""
-    system, state, fingers = session.system, session.state, path[:, None]
+    """Simulate and record the control periods of a path (t + 1, f, 7); DivergenceError uses it up."""
+    system, state = session.system, session.state
     # The force of a pressed pin grows exponentially; the session itself reports what exceeds all floats.
     with np.errstate(over="ignore", invalid="ignore"):
-        for state in simulate_path(system, session.state, fingers, orders):
+        for state in simulate_path(system, session.state, path, orders):
             if watch:
                 watch(state)
-    recording = session.recording and session.recording.extend(fingers[1:], tick, orders)
-    return replace(session, state=state, pose=path[-1], recording=recording)
+    recording = session.recording and session.recording.extend(path[1:], tick, orders)
+    return replace(session, state=state, poses=path[-1], recording=recording)
 
 
 def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:
     """Begin to record; `now` is the snapshot of the state, `room` the periods with memory from the start."""
-    begun = Recording.begin(now, session.state.period, session.pose[None], tick, room + 1)
+    begun = Recording.begin(now, session.state.period, session.poses, tick, room + 1)
     return replace(session, recording=begun)
 
 
@@ -293,4 +299,4 @@ def go_back(session: Session, moment: Moment) -> Session:
     """Return the session at an earlier moment; what was recorded since is cut off."""
     recording = session.recording and session.recording.cut_at_period(moment.period)
     state = snapshot.load(session.system, moment.snapshot)
-    return replace(session, state=state, pose=moment.pose, recording=recording)
+    return replace(session, state=state, poses=moment.poses, recording=recording)

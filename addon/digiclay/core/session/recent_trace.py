@@ -84,6 +84,8 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
     """Return whether the contact law does not hold, of the fingertip at a pose (7,): `touch.is_beyond`."""
     if system.cell.touch is None:
         return False
+    if system.fingers > 1:
+        return bool(state.finger_forces().max() > MOST_FORCE)
     near, fingertip = state.active.touched, system.cell.touch.fingertip
     force, felt = near.force.sum(), near.force > 0.0
     if force > MOST_FORCE:

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
+from ..base.modes import Mode
 from ..engine.simulation import begin, periods
 from ..engine.system import System
 from ..metrics.metric_table import ERRORS, METRICS, RUN
 from ..metrics.summary import compute_metrics
-from ..model.fingertip import require_one
 from ..model.touch import describe_excess, find_indentations, is_beyond
+from ..model.trajectory import sample_poses
 from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
@@ -120,21 +121,51 @@ def evaluate(
     if not rows:
         return report(scene, ended, {}, versions)
     moments = rows.pop("period") * scene.simulation.control_period
+    poses = sample_poses(scene.trajectories(), moments)
     history = {
         "time": moments,
         **rows,
-        "fingertip": require_one(scene.trajectories()).poses(moments),
+        "fingertip": poses[:, 0] if system.fingers == 1 else poses,
         "total_force": rows["force"].sum(axis=1),
         "position": system.grid.positions,
     }
-    metrics: dict[str, Any] = compute_metrics(history, scene.set_point)
+    own = split_fingers(history)
+    each = [compute_metrics(one, scene.set_point) for one in own]
+    # Of several fingers the largest of each: a sum would hide that one is lost.
+    metrics: dict[str, Any] = {
+        name: max((value for one in each if (value := one[name]) is not None), default=None)
+        for name in each[0]
+    }
+    if system.fingers > 1:
+        metrics["fingers"] = each
+    tips = [finger.fingertip for finger in scene.fingers]
     if system.cell.touch is not None:
-        depth = find_indentations(system.cell.touch.fingertip, history)
+        pairs = zip(tips, own, strict=True)
+        depth = np.max([find_indentations(tip, one) for tip, one in pairs if tip], axis=0)
         metrics["max_indentation"] = float(depth.max())
         metrics["beyond_a_finger"] = describe_excess(metrics["max_total_force"], metrics["max_indentation"])
         if metrics["beyond_a_finger"]:
             history["beyond_a_finger"] = is_beyond(history["total_force"], depth)
     return replace(report(scene, ended, metrics, versions), history=history)
+
+
+def split_fingers(history: History) -> list[History]:
+    """Return the history of each finger; a pin's force counts for the nearest, where two press it."""
+    if "finger_force" not in history:
+        return [history]
+    tips, (x, y) = history["fingertip"], history["position"].T
+    apart = [(x - tip[:, :1]) ** 2 + (y - tip[:, 1:2]) ** 2 for tip in tips[..., :2].transpose(1, 0, 2)]
+    nearest = np.argmin(apart, axis=0)
+    parts = []
+    for finger, total in enumerate(history["finger_force"].T):
+        own = nearest == finger
+        force = np.where(own, history["force"], 0.0)
+        found = force.sum(axis=1)
+        # All of a finger together are exact.
+        force *= np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
+        rows = {"force": force, "mode": np.where(own, history["mode"], np.int8(Mode.REST))}
+        parts.append({**history, **rows, "total_force": total, "fingertip": tips[:, finger]})
+    return parts
 
 
 def report(

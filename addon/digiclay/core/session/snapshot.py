@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -18,12 +19,12 @@ from numpy.typing import NDArray
 
 from ..base.errors import StateError
 from ..base.modes import Mode
+from ..control.hands import Hands
 from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
 from ..engine.system import System
 from ..files.formats import read_count
-from ..model.fingertip import require_one
-from ..model.layout import Disc
+from ..model.layout import Disc, join_discs
 
 #: No number a controller remembers is larger, but those that may be infinite.
 LARGEST_KEPT = 1e75
@@ -118,15 +119,15 @@ def dump(system: System, state: State) -> bytes:
     memory = flatten(state.memory, arrays)
     header = {
         "cells": system.grid.count,
-        "rows": [rows.physics, rows.queue, rows.control, rows.sensors],
+        "rows": _list_rows(rows),
         "control_period": system.period,
         "period": state.period,
         "peak": state.peak,
         "gathered": {
             "cells": active.cells.size,
             "near": active.near,
-            "fingers": [{"reach": active.reach}],
-            "control": active.control,
+            "fingers": [{"reach": reach} for reach in _list_discs(active.reach, system.fingers)],
+            "control": active.control if system.fingers == 1 else _list_discs(active.control, system.fingers),
             "peak": active.peak,
             "until": active.until,
         },
@@ -145,13 +146,14 @@ def load(system: System, data: bytes) -> State:
     """Return the state that bytes hold, bit for bit; StateError when they are damaged or of another bed."""
     kept = _read(data)
     header, arrays, rows = kept.header, kept.arrays, system.rows
-    here = [rows.physics, rows.queue, rows.control, rows.sensors]
+    here = _list_rows(rows)
     _check_same("number of cells", header["cells"], system.grid.count)
     _check_same("rows of a cell", header["rows"], here)
     _check_same("control period", header["control_period"], system.period)
-    _check_same("number of fingers", len(header["gathered"]["fingers"]), 1)
+    _check_same("number of fingers", len(header["gathered"]["fingers"]), system.fingers)
     _check_limits(system, kept)
     gathered = header["gathered"]
+    reaches, controls = _read_discs(gathered)
     cells = arrays["cells"].astype(np.intp)
     active = ActiveSet(
         rows,
@@ -160,8 +162,8 @@ def load(system: System, data: bytes) -> State:
         arrays["block"],
         arrays["mode"],
         system.grid.compute_basis(cells),
-        _read_disc(require_one(gathered["fingers"])["reach"]),
-        _read_disc(gathered["control"]),
+        reaches[0] if system.fingers == 1 else join_discs(reaches),
+        controls[0] if system.fingers == 1 else join_discs(controls),
         gathered["peak"],
         gathered["until"],
     )
@@ -215,8 +217,7 @@ def _read(data: bytes) -> Snapshot:
             raise _make_error(f"must have {end} bytes and has {len(data)}")
         numbers = [header["peak"], gathered["peak"], header["control_period"]]
         numbers += [read_count(value) for value in (header["period"], gathered["until"], gathered["near"])]
-        discs = [gathered["control"], *(finger["reach"] for finger in gathered["fingers"])]
-        numbers += [number for disc in discs for number in _read_disc(disc) or ()]
+        numbers += [number for discs in _read_discs(gathered) for disc in discs for number in disc or ()]
         kept = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
         # A memory of nothing is None; one that is not there at all is damage.
         sound = "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
@@ -251,6 +252,65 @@ def _is_sound(kept: Snapshot, count: int) -> bool:
         and ((cells >= 0) & (cells < count)).all()
         and np.unique(cells).size == cells.size
     )
+
+
+def _list_rows(rows: Rows) -> list[int]:
+    """Return the numbers of rows; those of forces of several fingers where there are any."""
+    own = [rows.physics, rows.queue, rows.control, rows.sensors, rows.fingers]
+    return own if rows.fingers else own[:-1]
+
+
+def _list_discs(discs: Any, fingers: int) -> list[Any]:
+    """Return the disc of one finger, or those of several out of arrays (f,); None: no disc."""
+    if fingers == 1 or discs is None:
+        return [discs] * fingers
+    return [None if disc[2] < 0.0 else disc for disc in np.transpose(discs).tolist()]
+
+
+def _read_discs(gathered: dict[str, Any]) -> tuple[list[Disc | None], list[Disc | None]]:
+    """Return the discs that the fingers may touch, and those that are controlled."""
+    fingers = gathered["fingers"]
+    controls = gathered["control"] if len(fingers) > 1 else [gathered["control"]]
+    return [_read_disc(finger["reach"]) for finger in fingers], [_read_disc(disc) for disc in controls]
+
+
+def change_fingers(former: System, system: System, state: State, kept: Sequence[int | None]) -> State:
+    """Return a state for another number of fingers, of beds and methods that are otherwise the same.
+
+    `kept`: which of the former fingers each one was; None: it is new. `state` is used up.
+    """
+    former.selection.release(state)
+    fresh, old, new = begin(system), former.rows, system.rows
+    rows = fresh.rows
+    rows[0] = state.rows[0]
+    rows[system.cell.lag_rows] = state.rows[former.cell.lag_rows]
+    rows[new.commands.start : new.force] = state.rows[old.commands.start : old.force]
+    pressing = state.rows[old.pressing] if old.fingers else state.rows[old.force][None]
+    rows[new.force] = sum(pressing[was] for was in kept if was is not None)
+    rows[new.sensed] = state.rows[old.sensed]
+    memories = list(state.memory.fingers) if isinstance(state.memory, Hands) else [state.memory]
+    followed = isinstance(fresh.memory, Hands) or isinstance(state.memory, Hands)
+    parts = [((system.cell.pulp_rows, system.fingers), (former.cell.pulp_rows, former.fingers))]
+    if followed:
+        parts.append(((new.controlled, system.fingers), (old.controlled, former.fingers)))
+    else:
+        rows[new.controlled] = state.rows[old.controlled]
+    for (to, count), (source, before) in parts:
+        width = (to.stop - to.start) // count
+        into = rows[to].reshape(count, width, system.grid.count)
+        of = state.rows[source].reshape(before, width, system.grid.count)
+        for finger, was in enumerate(kept):
+            if was is not None:
+                into[finger] = of[was]
+    memory = memories[0]
+    if followed:
+        begun = fresh.memory.fingers if isinstance(fresh.memory, Hands) else (fresh.memory,)
+        own = tuple(one if was is None else memories[was] for one, was in zip(begun, kept, strict=True))
+        memory = fresh.memory._replace(fingers=own) if isinstance(fresh.memory, Hands) else own[0]
+    # What is pressed and what still moves goes on.
+    chosen = replace(fresh.active, cells=state.active.cells, near=state.active.near)
+    bed = State(state.period, rows, state.modes, state.aged, float(rows[0].max()), chosen, memory)
+    return bed._replace(active=system.selection.take(bed, chosen))
 
 
 def _read_disc(values: Any) -> Disc | None:

@@ -152,7 +152,7 @@ class StepStart:
 
 
 def find_loaded_path(
-    m: Floats | float, to_load: Floats | float, share: float, start: StepStart
+    m: Floats | float, to_load: Floats | float, share: Floats | float, start: StepStart
 ) -> tuple[Floats, Floats, Floats]:
     """Return the paths of cells over a step in which some of them are near overflow.
 

@@ -1,0 +1,295 @@
+"""Control of several fingers: a method's controller for each of them, on one bed.
+
+What is measured of a pin is its force, not which finger presses it. So each pressed pin belongs to one of
+the fingers that are followed: the nearest, or the one whose underside is predicted lowest; where none is near
+a new one begins. Each controller sees the pins around its finger, without the forces on those of the others;
+of two that command one pin, the one that moves it farthest off its ground is obeyed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Cells, Floats, find_copies
+from ..model.control_interface import Commands, Controller, Measurement
+from ..model.layout import RELATIVE_TOLERANCE, Disc
+from .servo import BatchControl
+
+#: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
+CAPTURE = 1.2
+#: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
+BEYOND = 1e3
+#: No finger.
+NOBODY = -1
+NO_DISC: Disc = (0.0, 0.0, -1.0)
+
+
+class Hands(NamedTuple):
+    """Memory of the controllers, and the discs they control, m; a negative radius: none."""
+
+    fingers: tuple[Any, ...]
+    discs: tuple[Disc, ...]
+
+    @property
+    def losses(self) -> int:
+        """How often a finger was lost."""
+        return sum(getattr(one, "losses", 0) for one in self.fingers)
+
+
+class Columns:
+    """The active cells in columns, one a finger: those in its disc, and its share of those in none."""
+
+    def __init__(self, basis: Floats, discs: tuple[Floats, Floats, Floats]) -> None:
+        x, y, radius = (part[:, None] for part in discs)
+        inside = (basis[1] - x) ** 2 + (basis[2] - y) ** 2 <= radius * np.abs(radius) * (
+            1.0 + RELATIVE_TOLERANCE
+        )
+        left = np.array_split(np.flatnonzero(~inside.any(axis=0)), len(inside))
+        self.cells = [
+            np.concatenate([own.nonzero()[0], more]) for own, more in zip(inside, left, strict=True)
+        ]
+        count, width = len(self.cells), max(own.size for own in self.cells)
+        self.flat = np.concatenate(self.cells)
+        self.finger = np.repeat(np.arange(count), [own.size for own in self.cells])
+        self.double, self.copies = find_copies(self.flat)
+        # Padded, for methods whose formulas hold for all fingers at once.
+        self.present = np.arange(width)[:, None] < [own.size for own in self.cells]
+        self.padded = np.zeros((width, count), np.intp)
+        self.padded.T[self.present.T] = self.flat
+        self.basis = np.where(self.present, basis[:, self.padded], 0.0)
+        self.basis[:, ~self.present] = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class HandControl:
+    """Controller of several fingers."""
+
+    runs: tuple[Any, ...]
+    """The method's, one a finger."""
+    together: Any
+    """One for all at once, where the formulas of the method hold for many."""
+    capture: Floats
+    """(f,): How far from each finger a pressed pin may be its own, m."""
+    skirt: float
+    """How much farther than its blister a disc of control reaches, m."""
+    felt: float
+    """Force from which on a pin tells of a new finger, N."""
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs: those of each controller, one after the other."""
+        return len(self.runs) * int(self.runs[0].rows)
+
+    def begin(self) -> Hands:
+        """Return the memory before a session."""
+        return Hands(tuple(run.begin() for run in self.runs), (NO_DISC,) * len(self.runs))
+
+    def locate(self, memory: Hands, touched: Measurement) -> tuple[Hands, Any]:
+        """Divide the pressed pins among the fingers, and let each controller take in its own."""
+        (pressed,) = touched.force.nonzero()
+        owner = np.full(touched.force.size, NOBODY)
+        if pressed.size:
+            basis, force = touched.quadratic_basis[:, pressed], touched.force[pressed]
+            who = touched.pressing[:, pressed].argmax(axis=0)
+            owner[pressed] = self._find_new(basis, force, self._assign(memory, basis), who)
+        located = self.method.locate(list(memory.fingers), self, touched, owner, pressed)
+        discs = [disc for _, disc in located]
+        return Hands(tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs)), discs
+
+    def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
+        """Let each controller command the pins around its finger; of two for one pin obey one."""
+        columns, owner = self.arrange("all", seen), np.full(seen.force.size, NOBODY)
+        (pressed,) = seen.force.nonzero()
+        if pressed.size:
+            owner[pressed] = self._assign(memory, seen.quadratic_basis[:, pressed])
+        fingers, given = self.method.command(list(memory.fingers), self, seen, owner, columns)
+        memory = memory._replace(fingers=tuple(fingers))
+        orders = Commands(seen.target.copy(), seen.mode.copy(), np.zeros(seen.target.size))
+        pairs: list[tuple[Any, Any]] = list(zip(orders, given, strict=True))
+        for all_cells, own in pairs:
+            all_cells[columns.flat] = own
+        if columns.double.size:
+            chosen = self._choose(memory, seen.quadratic_basis, columns, given.target)
+            for all_cells, own in pairs:
+                all_cells[columns.double] = own[chosen]
+        return memory, orders
+
+    @cached_property
+    def method(self) -> Together | OneByOne:
+        """How the controllers are called."""
+        return Together() if isinstance(self.together, BatchControl) else OneByOne()
+
+    def _assign(self, memory: Hands, basis: Floats) -> Cells:
+        """Return the finger that each pressed pin belongs to, (q,); `NOBODY`: none is near."""
+        places = np.array([own.place or (np.inf, np.inf) for own in memory.fingers])[:, :, None]
+        with np.errstate(invalid="ignore"):
+            apart = (basis[1] - places[:, 0]) ** 2 + (basis[2] - places[:, 1]) ** 2
+        far = ~(apart <= self.capture[:, None] ** 2)
+        rank = apart
+        if hasattr(self.runs[0], "predict_under"):
+            for finger, (run, own) in enumerate(zip(self.runs, memory.fingers, strict=True)):
+                under = run.predict_under(own, basis)
+                # One that is not predicted has no say where another one is.
+                rank[finger] = apart[finger] + 1.0 if under is None else under
+        np.putmask(rank, far, np.inf)
+        return np.where(far.all(axis=0), NOBODY, rank.argmin(axis=0))
+
+    def _find_new(self, basis: Floats, force: Floats, owner: Cells, who: Cells) -> Cells:
+        """Return the owners of pressed pins, those of new fingers among them: about the strongest forces.
+
+        `who` presses a pin is but the name of the new one, so that figures of finger and controller agree.
+        """
+        free = [i for i in range(len(self.runs)) if not (owner == i).any()]
+        while free:
+            left = np.where(owner == NOBODY, force, 0.0)
+            strongest = int(left.argmax())
+            if left[strongest] < self.felt:
+                break
+            named = int(who[strongest])
+            finger = free.pop(free.index(named) if named in free else 0)
+            x, y = basis[1:3, strongest]
+            apart = (basis[1] - x) ** 2 + (basis[2] - y) ** 2
+            owner = np.where((owner == NOBODY) & (apart <= self.capture[finger] ** 2), finger, owner)
+        return owner
+
+    def _choose(self, memory: Hands, basis: Floats, columns: Columns, target: Floats) -> Cells:
+        """Return which of the commands for each pin with several is obeyed, (g,)."""
+        copies = columns.copies
+        fingers, (x, y) = columns.finger[copies], basis[1:3, columns.double]
+        discs = np.array(memory.discs)
+        near_x, near_y, radius = discs[fingers].transpose(2, 0, 1)
+        reach = radius - self.skirt
+        inside = (x - near_x) ** 2 + (y - near_y) ** 2 <= reach * np.abs(reach)
+        grounds = np.array([own.edge for own in memory.fingers])
+        off = np.where(inside, np.abs(target[copies] - grounds[fingers]), -1.0)
+        chosen: Cells = np.take_along_axis(copies, off.argmax(axis=0)[None], 0)[0]
+        return chosen
+
+    def arrange(self, part: str, seen: Measurement) -> Columns:
+        """Return the columns of a part of the active cells; those of one active set are the same."""
+        basis, columns = self._kept.get(part, (None, None))
+        if columns is None or basis is not seen.quadratic_basis:
+            x, y, radius = (part[: len(self.runs)] for part in seen.discs)
+            columns = Columns(seen.quadratic_basis, (x, y, radius))
+            self._kept[part] = seen.quadratic_basis, columns
+        return columns
+
+    @cached_property
+    def _kept(self) -> dict[str, tuple[Floats, Columns]]:
+        """The last columns, and the basis they are of; keeping them changes no command."""
+        return {}
+
+    def own_rows(self, finger: int) -> slice:
+        """Return the rows of a cell that a finger's controller owns."""
+        count = int(self.runs[0].rows)
+        return slice(finger * count, (finger + 1) * count)
+
+
+class Together:
+    """Calls of one controller of all fingers, in columns (w, f)."""
+
+    def locate(
+        self, memory: list[Any], hand: HandControl, touched: Measurement, owner: Cells, pressed: Cells
+    ) -> list[tuple[Any, Disc | None]]:
+        """Return memory and disc of each finger."""
+        fingers, shape = np.arange(len(hand.runs)), (pressed.size, len(hand.runs))
+        own = owner[pressed, None] == fingers
+        wide = [np.broadcast_to(row[pressed, None], shape) for row in (touched.height, touched.force)]
+        basis = touched.quadratic_basis[:, pressed]
+        columns = touched._replace(
+            quadratic_basis=np.broadcast_to(basis[..., None], (6, *shape)),
+            height=wide[0],
+            force=np.where(own, wide[1], 0.0),
+        )
+        return list(zip(*hand.together.locate(memory, columns), strict=True))
+
+    def command(
+        self, memory: list[Any], hand: HandControl, seen: Measurement, owner: Cells, columns: Columns
+    ) -> tuple[list[Any], Commands]:
+        """Return the memories, and commands for the cells of all columns, one after the other."""
+        at, present = columns.padded, columns.present
+        others = owner[at]
+        theirs = (others != NOBODY) & (others != np.arange(len(hand.runs)))
+        count = int(hand.runs[0].rows)
+        rows = np.arange(count)[:, None, None] + count * np.arange(len(hand.runs))
+        own = seen.own[rows, at]
+        shown = Measurement(
+            columns.basis,
+            seen.height[at],
+            np.where(theirs | ~present, 0.0, seen.force[at]),
+            seen.target[at],
+            seen.mode[at],
+            own,
+            seen.cells[at],
+        )
+        memory, orders = hand.together.command(memory, shown)
+        if count:
+            finger, place = present.T.nonzero()
+            for row in range(count):
+                seen.own[row + count * finger, columns.flat] = own[row, place, finger]
+        return memory, Commands(*(np.ascontiguousarray(one.T)[present.T] for one in orders))
+
+
+class OneByOne:
+    """Calls of the controller of each finger, which sees no pin that belongs to another one."""
+
+    def locate(
+        self, memory: list[Any], hand: HandControl, touched: Measurement, owner: Cells, pressed: Cells
+    ) -> list[tuple[Any, Disc | None]]:
+        """Return memory and disc of each finger."""
+        columns, located = hand.arrange("touched", touched) if touched.discs is not None else None, []
+        for finger, (run, own) in enumerate(zip(hand.runs, memory, strict=True)):
+            ours = columns.cells[finger] if columns and own.place else pressed[owner[pressed] == finger]
+            shown = owner[ours]
+            ours = ours[(shown == finger) | (shown == NOBODY)]
+            if own.place and pressed.size:
+                ours = np.union1d(ours, pressed[owner[pressed] == finger])
+            part = take_part(touched, ours, hand.own_rows(finger))
+            located.append(run.locate(own, part))
+            touched.own[hand.own_rows(finger), ours] = part.own
+        return located
+
+    def command(
+        self, memory: list[Any], hand: HandControl, seen: Measurement, owner: Cells, columns: Columns
+    ) -> tuple[list[Any], Commands]:
+        """Return the memories, and commands for the cells of all columns, one after the other."""
+        given, fingers = [], []
+        for finger, (run, own, cells) in enumerate(zip(hand.runs, memory, columns.cells, strict=True)):
+            part = take_part(seen, cells, hand.own_rows(finger))
+            theirs = (owner[cells] != finger) & (owner[cells] != NOBODY)
+            part = part._replace(force=np.where(theirs, 0.0, part.force))
+            after, orders = run.command(own, part)
+            seen.own[hand.own_rows(finger), cells] = part.own
+            fingers.append(after)
+            given.append(orders)
+        return fingers, Commands(*map(np.concatenate, zip(*given, strict=True)))
+
+
+def take_part(seen: Measurement, cells: Cells, own: slice) -> Measurement:
+    """Return what is measured of some cells, with the rows of one finger's controller."""
+    return Measurement(
+        np.ascontiguousarray(seen.quadratic_basis[:, cells]),
+        seen.height[cells],
+        seen.force[cells],
+        seen.target[cells],
+        seen.mode[cells],
+        seen.own[own][:, cells],
+        seen.cells[cells],
+    )
+
+
+def join_fingers(
+    controllers: Sequence[Controller], together: Any, sizes: Sequence[float], skirt: float, felt: float
+) -> HandControl:
+    """Return the controller of several fingers, of largest semi-axes, m; see `HandControl`."""
+    return HandControl(tuple(controllers), together, CAPTURE * np.array(sizes), skirt, felt)
+
+
+def follows_finger(controller: Controller) -> bool:
+    """Tell whether a controller follows one fingertip, and several need one each."""
+    return hasattr(controller.begin(), "place")

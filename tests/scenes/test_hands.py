@@ -1,0 +1,228 @@
+"""Several fingertips on one bed: as alone where they are apart, by the sum of forces where they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.base.arrays import Floats
+from digiclay.core.control.blister import Blister
+from digiclay.core.control.methods import find_method
+from digiclay.core.engine.simulation import advance, begin, trace_fingers
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.fingertip import compute_forms, compute_underside
+from digiclay.core.model.relaxation import Relaxation
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.schema import Finger, Scene
+from digiclay.core.session import snapshot
+from digiclay.core.session.accuracy import Replay
+from digiclay.core.session.run_scene import run
+from scipy.integrate import solve_ivp
+
+PAPER = load(find("ridge_mound_valley"))
+(FINGER,) = PAPER.fingers
+PERIOD, REST = 5e-3, 40e-3
+METHODS = ("virtual_master", "cell_states", "hybrid", "elastic", "viscous", "push_pull")
+
+
+def scene(method: str | None, *fingers: Finger, **parts: Any) -> Scene:
+    """Return a bed of 50 x 50 pins under some fingers."""
+    control = find_method(method).import_parameters()() if method else None
+    blister = Blister(**(find_method(method).blister or {})) if method else None
+    layout = replace(PAPER.layout, rows=50, columns=50)
+    made = replace(PAPER, layout=layout, control=control, method=method or "virtual_master", blister=blister)
+    return replace(made, fingers=fingers, recorder=None, **parts)
+
+
+def press(
+    system: System, places: list[tuple[float, float]], way: tuple[float, float], periods: int
+) -> Floats:
+    """Return poses (t, p, f, 7) of fingertips that press 2.5 mm, and are dragged after half a second, m/s."""
+    time = np.arange(periods)[:, None] * PERIOD + system.instants
+    poses = np.zeros((*time.shape, len(places), 7))
+    for finger, (x, y) in enumerate(places):
+        gone = np.maximum(time - 0.5, 0.0)
+        poses[:, :, finger, 0], poses[:, :, finger, 1] = x + way[0] * gone, y + way[1] * gone
+        poses[:, :, finger, 2] = REST + 1e-3 - np.minimum(20e-3 * time, 3.5e-3)
+        angle = 0.4 * (finger + 1)
+        poses[:, :, finger, 3], poses[:, :, finger, 6] = np.cos(angle / 2), np.sin(angle / 2)
+    return poses
+
+
+def follow(system: System, poses: Floats, state: State | None = None) -> tuple[State, Floats]:
+    """Simulate poses; return the last state, and the forces of the fingers, (t, f), N."""
+    state, forces = state or begin(system), []
+    for finger in trace_fingers(system, poses):
+        state = advance(system, state, finger)
+        forces.append(state.finger_forces())
+    return state, np.array(forces)
+
+
+@pytest.mark.parametrize("method", [None, *METHODS[:-1]])
+def test_fingers_far_from_each_other_form_what_each_forms_alone(method: str | None) -> None:
+    places = [(-52e-3, -11e-3), (31e-3, 17e-3), (-3e-3, 55e-3)]
+    alone = assemble(scene(method, FINGER))
+    poses = press(alone, places, (14e-3, 5e-3), 260)
+    single = [follow(alone, poses[:, :, [finger]]) for finger in range(3)]
+    state, forces = follow(assemble(scene(method, *[FINGER] * 3)), poses)
+    # Rounding alone: sums go over the cells in another order; viscous pins depend on the active set.
+    np.testing.assert_allclose(forces, np.hstack([own for _, own in single]), rtol=0, atol=1e-9)
+    formed = sum(own.row(0) - REST for own, _ in single)
+    np.testing.assert_allclose(state.row(0) - REST, formed, rtol=0, atol=1e-10)
+
+
+def pose_of(finger: int, apart: float) -> Callable[[float], Floats]:
+    """Return the pose at a time, s, of one of two fingers about 0, 1 mm that press, rock and slide."""
+
+    def pose(time: float) -> Floats:
+        side, angle = (-0.5, 0.5)[finger], 0.3 * (finger + 1)
+        depth = 1.9e-3 * np.sin(min(16.0 * time, np.pi / 2)) + finger * 0.3e-3 * np.sin(20.0 * time)
+        place = [side * apart + 4e-3 * np.sin(9.0 * time), (0.5e-3, 1.8e-3)[finger], REST + 0.6e-3 - depth]
+        return np.array([*place, np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
+
+    return pose
+
+
+def integrate(system: System, cell: int, commands: Floats, ways: list[Any]) -> tuple[Floats, Floats, int]:
+    """Return height and force, (t,), of a cell by SciPy, and in how many periods two fingers press it."""
+    touches: Any = getattr(system.cell.touch, "each", ())
+    x, y = system.grid.x[cell], system.grid.y[cell]
+    basis = np.array([[1.0, x, y, x * x, x * y, y * y]]).T
+    parts, lag, dead = system.cell, 2e-3, 1e-3
+
+    def press_at(time: float, height: float, filters: Floats) -> tuple[list[float], list[Floats]]:
+        forces, rates, first = [], [], 0
+        for touch, way in zip(touches, ways, strict=True):
+            outline = touch.fingertip.outline(way(time)[None])
+            under = compute_underside(*compute_forms(outline), basis).item()
+            law, own = touch.contact, filters[first : first + touch.pulp.rows]
+            tension = law.stiffness / law.exponent * np.expm1(max(law.exponent * (height - under), 0.0))
+            forces.append(law.share * max(tension - float(touch.pulp.shares @ own), 0.0))
+            rates.append(touch.pulp.rates[:, 0] * (tension - own))
+            first += touch.pulp.rows
+        return forces, rates
+
+    def change(time: float, state: Floats, command: float) -> Floats:
+        forces, rates = press_at(time, state[0], state[2:])
+        drop = parts.supply.pressure(state[1:2]) - sum(forces) / parts.actuator.area
+        speed = parts.flow.flow(state[1:2], drop)[0] / parts.actuator.area
+        return np.concatenate([[speed, (command - state[1]) / lag], *rates])
+
+    state = np.zeros(2 + sum(touch.pulp.rows for touch in touches))
+    state[0], before, rows, double = REST, 0.0, [], 0
+    for period, command in enumerate(commands[:, cell]):
+        start = period * PERIOD
+        for a, b, given in ((start, start + dead, before), (start + dead, start + PERIOD, command)):
+            solved = solve_ivp(
+                change, (a, b), state, "LSODA", args=(given,), rtol=1e-8, atol=1e-12, max_step=1e-3
+            )
+            state = solved.y[:, -1]
+        before = command
+        forces, _ = press_at(start + PERIOD, state[0], state[2:])
+        rows.append((state[0], sum(forces)))
+        double += min(forces) > 0.0
+    return *np.array(rows).T, double
+
+
+SOFT = replace(FINGER, contact=replace(FINGER.contact, exponent=1700.0, stiffness=280.0))
+LONG = replace(
+    FINGER,
+    contact=replace(FINGER.contact, stiffness=330.0),
+    fingertip=replace(FINGER.fingertip, length=12e-3),
+    relaxation=Relaxation((5e-3, 0.3), (0.5, 0.2, 0.3)),
+)
+
+
+@pytest.mark.parametrize(
+    ("apart", "other"),
+    [(5e-3, FINGER), (7e-3, FINGER), (6e-3, SOFT), (7e-3, LONG), (6e-3, replace(FINGER, relaxation=None))],
+    ids=["5 mm", "7 mm", "another exponent", "another size and relaxation", "one elastic"],
+)
+def test_a_cell_that_two_fingers_press_moves_by_the_sum_of_their_forces(apart: float, other: Finger) -> None:
+    system, ways = assemble(scene(None, FINGER, other)), [pose_of(finger, apart) for finger in (0, 1)]
+    commands = np.random.default_rng(3).uniform(-0.3, 0.3, (60, system.grid.count))
+    system = replace(system, controller=Replay(system.grid, commands))
+    times = np.arange(60)[:, None] * PERIOD + system.instants
+    poses = np.array([[[way(time) for way in ways] for time in row] for row in times])
+    state, rows, pressed = begin(system), [], np.zeros(system.grid.count)
+    for finger in trace_fingers(system, poses):
+        state = advance(system, state, finger)
+        rows.append((state.row(0), state.row(system.rows.force)))
+        own = np.array([state.row(row) for row in range(system.rows.count)[system.rows.pressing]])
+        pressed += (own > 0.0).all(axis=0)
+    found, double = np.array(rows), 0
+    for cell in np.argsort(-pressed)[:3].tolist():
+        height, force, both = integrate(system, cell, commands, ways)
+        double += both
+        # What issue 26 asks for: 3 µm and 3 mN.
+        np.testing.assert_allclose(found[:, 0, cell], height, rtol=0, atol=3e-6)
+        np.testing.assert_allclose(found[:, 1, cell], force, rtol=0, atol=3e-3)
+    assert double > 10
+
+
+@pytest.mark.parametrize("method", [None, *METHODS])
+def test_a_session_of_three_fingers_goes_on_from_a_kept_state_to_the_same_bits(method: str | None) -> None:
+    system = assemble(scene(method, FINGER, LONG, FINGER))
+    poses = press(system, [(-9e-3, 1e-3), (8e-3, -4e-3), (30e-3, 2e-3)], (6e-3, -9e-3), 220)
+    half, _ = follow(system, poses[:150])
+    data = snapshot.dump(system, half)
+    ends = [follow(system, poses[150:], state)[0] for state in (snapshot.load(system, data), half)]
+    assert snapshot.dump(system, ends[0]) == snapshot.dump(system, ends[1])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_fingers_that_come_and_go_leave_the_others_what_they_have(method: str) -> None:
+    one, three = (assemble(scene(method, *[FINGER] * count)) for count in (1, 3))
+    places = [(-40e-3, 1e-3), (2e-3, -4e-3), (40e-3, 2e-3)]
+    poses = press(three, places, (6e-3, -9e-3), 200)
+    state, _ = follow(three, poses)
+    kept = snapshot.change_fingers(three, one, state.copy(), [1])
+    assert np.array_equal(kept.row(0), state.row(0))
+    still = np.repeat(poses[-1:, -1:], len(three.instants), axis=1)
+    after, force = follow(one, np.repeat(still[:, :, [1]], 5, axis=0), kept)
+    _, forces = follow(three, np.repeat(still, 5, axis=0), state)
+    # A set that is made anew adds up in another order.
+    np.testing.assert_allclose(force[:, 0], forces[:, 1], rtol=0, atol=1e-6)
+    more = snapshot.change_fingers(one, three, after, [None, 0, None])
+    _, again = follow(three, np.repeat(still, 3, axis=0), more)
+    assert np.isfinite(again).all()
+
+
+@pytest.mark.parametrize("method", [None, "virtual_master", "hybrid"])
+def test_fingers_that_jump_and_meet_leave_finite_numbers(method: str | None) -> None:
+    system = assemble(scene(method, FINGER, SOFT, LONG))
+    poses = press(system, [(0.0, 1e-3), (1e-3, 0.0), (0.0, 0.0)], (40e-3, 0.0), 120)
+    chance = np.random.default_rng(5)
+    poses[..., :2] += chance.normal(0.0, 8e-3, (*poses.shape[:1], 1, 3, 2))
+    poses[60:, :, :, 2] -= chance.uniform(0.0, 30e-3, (60, 1, 3))
+    state, forces = follow(system, poses)
+    assert np.isfinite(forces).all()
+    assert ((state.row(0) >= 0.0) & (state.row(0) <= system.cell.actuator.stroke)).all()
+
+
+def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors() -> None:
+    path = FINGER.trajectory
+    shifted = [replace(one, position=(one.position[0], 40e-3, one.position[2])) for one in path.waypoints]
+    aside = replace(path, waypoints=tuple(shifted))
+    short = replace(PAPER.simulation, duration=1.5)
+    both = scene("virtual_master", FINGER, replace(FINGER, trajectory=aside), simulation=short)
+    result = run(replace(both, recorder=PAPER.recorder))
+    assert result.history["fingertip"].shape[1:] == (2, 7)
+    np.testing.assert_allclose(
+        result.history["finger_force"].sum(axis=1), result.history["total_force"], rtol=0, atol=1e-12
+    )
+    first, second = result.metrics["fingers"]
+    alone = run(replace(scene("virtual_master", FINGER, simulation=short), recorder=PAPER.recorder)).metrics
+    assert first["rfd"] == pytest.approx(alone["rfd"], rel=1e-6)
+    assert result.metrics["rfd"] == max(first["rfd"], second["rfd"])
+    assert result.metrics["losses"] is not None
+    estimated = result.estimate_errors()
+    assert estimated is not None
+    assert (
+        0.0 < estimated.metrics["height_error"] < 30e-6
+    )  # what one finger of the paper's session has: 15 µm
