@@ -31,6 +31,8 @@ TINY = 1e-200
 _ROUNDED_AWAY = -36.8
 #: Stands for zero where a way so short is divided by, and what comes of it is multiplied by a growth.
 _STILL = 1e-100
+#: Load at which a flow's slope is looked for at least, Pa.
+LEAST = 1.0
 _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 
 
@@ -176,13 +178,16 @@ def find_loaded_path(
 
 
 def _mid_load(m: Floats | float, to_load: Floats | float, start: StepStart) -> tuple[Floats, Floats]:
-    """Return decay and free rise, m, with the conductance at the predicted load of mid step: second order."""
+    """Return decay and free rise, m: flows along the chord from no load to that predicted in mid step."""
     grown = middle = _exponential(start.exponent)
+    alone = start.rises(0.0)
+    free = alone.sum(axis=0)
+    slip = m * free - start.lift
     for _ in range(2):
-        conductance = start.conductance(to_load * np.maximum(middle - start.relaxed, 0.0))
-        decay = m * to_load * (start.weights * conductance).sum(axis=0) + TINY
-        free = (start.weights * (conductance * start.pressure)).sum(axis=0)
-        slip = m * free - start.lift
+        load = to_load * np.maximum(middle - start.relaxed, 0.0)
+        # A pin that has yet to meet the fingertip comes to rest against the pressure that drives it.
+        load = np.where(start.idle, np.minimum(load, np.abs(start.pressure)), load) + LEAST
+        decay = m * to_load * ((alone - start.rises(load)) / load).sum(axis=0) + TINY
         push, _ = _press(start.exponent, slip, decay, start.relaxed)
         way = np.where(grown > start.relaxed, slip + push, slip)
         middle = 0.5 * (grown + _exponential(start.exponent + way))
