@@ -6,20 +6,17 @@ import asyncio
 from collections import Counter
 from typing import Any
 
-from digiclay.core.base.errors import DigiclayError
+from digiclay.core.base.errors import DigiclayError, ParameterError
 
 from .doors import LatestSlot, Order, pack_order
-from .protocol import Bed, Frame, Pose, Reset, Status, unpack_frame
+from .protocol import Bed, Frame, Pose, Poses, Reset, Status, unpack_frame
 
 #: Time after the last pose of a client when another one may move the fingertip, s.
 LEASE = 2.0
 
 
-class HeldError(DigiclayError):
-    """Request of a client while another one moves the fingertip."""
-
-    def __init__(self) -> None:
-        super().__init__(f"Another client moves the fingertip: wait until it is silent for {LEASE:g} s.")
+class FrequentError(DigiclayError):
+    """What may be wrong with each of a thousand poses a second, of a client that means well."""
 
 
 class DoorLink:
@@ -53,22 +50,38 @@ class DoorLink:
             self._frame = unpack_frame(self.packed)
         return self._frame
 
-    def order(self, request: Pose | Reset | Status, client: object) -> dict[str, Any] | None:
-        """Carry out a request of a client, equal to itself alone; return the answer, if there is one."""
+    def order(self, request: Pose | Poses | Reset | Status, client: object) -> dict[str, Any] | None:
+        """Carry out a request of a client, equal to itself alone; return the answer, if there is one.
+
+        Raises FrequentError while another client moves the fingertip; and for what was wrong with some of
+        several fingers, after the others have been moved.
+        """
         if isinstance(request, Status):
             return dict(self.counts)
         now = asyncio.get_running_loop().time()
         if self._holder not in (None, client) and now < self._until:
             self.counts["poses while held"] += 1
-            raise HeldError
+            raise FrequentError(
+                f"Another client moves the fingertip: wait until it is silent for {LEASE:g} s."
+            )
         self._holder, self._until = client, now + LEASE
+        fault = ""
         if isinstance(request, Pose):
             self.counts["poses"] += 1
             self._order = self._order._replace(pose=request.pose, number=request.number)
+        elif isinstance(request, Poses):
+            self.counts["poses"] += 1
+            self._order, more = self._order.name(request, self.bed.fingers)
+            rule = f"must be at most {self.bed.fingers}, the fingertips of the session (--fingers)"
+            refusal = ParameterError("poses", "fingers", rule, f"{more} more")
+            fault = str(refusal) if more else request.fault
         else:
             self.counts["resets"] += 1
             self._order = Order(resets=self._order.resets + 1)
         self._orders.write(pack_order(self._order))
+        if fault:
+            self.counts["poses refused in part"] += 1
+            raise FrequentError(fault)
         return None
 
     def leave(self, client: object) -> None:

@@ -20,7 +20,7 @@ import digiclay
 import numpy as np
 from digiclay.core.base.errors import OutputError
 
-from .protocol import Bed
+from .protocol import MOST_FINGERS, Bed, Poses
 
 #: Bytes before the value: number of the value, twice that and one more while it is written; its checksum.
 HEAD = 16
@@ -83,8 +83,8 @@ def open_slot(path: Path) -> LatestSlot:
         return LatestSlot(mmap.mmap(file.fileno(), 0))
 
 
-#: Pose, its number, whether there is one, resets.
-LAYOUT = struct.Struct("<7dQQQ")
+#: Pose, its number, whether there is one, resets, messages with fingers, how many they are; each.
+LAYOUT = struct.Struct("<7d5Q" + MOST_FINGERS * "Q7d")
 
 
 class Order(NamedTuple):
@@ -96,18 +96,35 @@ class Order(NamedTuple):
     number: int = 0
     #: Since the start.
     resets: int = 0
+    #: Messages with fingers since the last reset.
+    named: int = 0
+    #: Identities and poses of those alive, in order of appearance.
+    fingers: tuple[tuple[int, tuple[float, ...]], ...] = ()
+
+    def name(self, request: Poses, most: int) -> tuple[Order, int]:
+        """Return the order after fingers were named, and how many there are beyond `most`."""
+        newest = {**dict(self.fingers), **dict(request.fingers)}
+        alive = set(request.alive)
+        there = [one for one in newest if one in alive]
+        fingers = tuple((one, newest[one]) for one in there[:most])
+        order = self._replace(pose=None, number=request.number, named=self.named + 1, fingers=fingers)
+        return order, len(there) - len(fingers)
 
 
 def pack_order(order: Order) -> bytes:
     """Write an order for `LatestSlot`."""
     pose = order.pose or (0.0,) * 7
-    return LAYOUT.pack(*pose, order.number, order.pose is not None, order.resets)
+    head = (*pose, order.number, order.pose is not None, order.resets, order.named, len(order.fingers))
+    fingers = [value for identity, finger in order.fingers for value in (identity, *finger)]
+    return LAYOUT.pack(*head, *fingers, *[0] * (8 * MOST_FINGERS - len(fingers)))
 
 
 def unpack_order(data: bytes) -> Order:
     """Read an order."""
-    *pose, number, there, resets = LAYOUT.unpack(data)
-    return Order(tuple(pose) if there else None, number, resets)
+    values = LAYOUT.unpack(data)
+    number, there, resets, named, count = values[7:12]
+    fingers = tuple((values[at], values[at + 1 : at + 8]) for at in range(12, 12 + 8 * count, 8))
+    return Order(values[:7] if there else None, number, resets, named, fingers)
 
 
 #: Time for the process to open the doors; to tell its counts, and then to end; to heed a signal, s.

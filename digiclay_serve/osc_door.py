@@ -15,7 +15,7 @@ from pythonosc import osc_bundle, osc_message
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from .door_link import DoorLink
-from .protocol import Frame, Pose, Reset, check_number, check_pose, is_token
+from .protocol import Frame, Pose, Poses, Reset, check_fingers, check_number, check_pose, is_token
 
 #: What can be subscribed to: the pose and the total force, or every pin's height and force besides.
 PARTS = ("state", "pins")
@@ -48,11 +48,19 @@ def read_osc(data: bytes) -> tuple[object, str, list[object]]:
     return token, address, rest
 
 
-def read_request(address: str, rest: list[object]) -> Pose | Reset | Subscription:
+def read_request(address: str, rest: list[object]) -> Pose | Poses | Reset | Subscription:
     """Read what follows the token. Raises ParameterError when it is no request."""
     if address == "/digiclay/pose":
         number = check_number(rest.pop(), 31) if len(rest) in (4, 8) else 0
         return Pose(check_pose(rest), number)
+    if address == "/digiclay/poses":
+        fingers: list[tuple[object, list[object]]] = []
+        for value in rest[1:]:
+            if isinstance(value, float) and fingers:
+                fingers[-1][1].append(value)
+            else:
+                fingers.append((value, []))
+        return check_fingers(fingers, None, check_number(rest[0] if rest else None, 31))
     if address == "/digiclay/reset" and not rest:
         return Reset()
     if address == "/digiclay/subscribe":
@@ -61,22 +69,29 @@ def read_request(address: str, rest: list[object]) -> Pose | Reset | Subscriptio
             rule = "must be state or pins, and a rate of at most 1000 Hz"
             raise ParameterError("subscription", "", rule, repr(rest)[:60])
         return Subscription(str(part), float(rate))
-    rule = "must be /digiclay/pose, /digiclay/reset or /digiclay/subscribe"
+    rule = "must be /digiclay/pose, /digiclay/poses, /digiclay/reset or /digiclay/subscribe"
     raise ParameterError("address", "", rule, repr(address)[:40])
 
 
 def format_osc_frame(frame: Frame, part: str) -> list[bytes]:
     """Write the datagrams of a frame, of a part of `PARTS`: its flags come first."""
     state = (frame.period, frame.number, frame.time, frame.total_force, *frame.pose.tolist())
-    datagrams = [_format("flags", "hi", frame.period, frame.flags), _format("state", "hh" + 9 * "d", *state)]
+    datagrams = [
+        format_osc("flags", "hi", frame.period, frame.flags),
+        format_osc("state", "hh" + 9 * "d", *state),
+    ]
+    if frame.fingers:
+        there = [(identity, force, *pose) for identity, force, pose in frame.fingers if identity >= 0]
+        each = (value for finger in there for value in finger)
+        datagrams.append(format_osc("fingers", "h" + len(there) * "hdddddddd", frame.period, *each))
     if part == "pins" and len(frame.heights) <= MOST_PINS:
         for name, values in (("heights", frame.heights), ("forces", frame.forces)):
             # OSC is big-endian.
-            datagrams.append(_format(name, "hb", frame.period, np.asarray(values, ">f4").tobytes()))
+            datagrams.append(format_osc(name, "hb", frame.period, np.asarray(values, ">f4").tobytes()))
     return datagrams
 
 
-def _format(name: str, kinds: str, *values: object) -> bytes:
+def format_osc(name: str, kinds: str, *values: object) -> bytes:
     """Write a message; `kinds`: a letter a value, as OSC has them."""
     builder = OscMessageBuilder(f"/digiclay/{name}")
     for kind, value in zip(kinds, values, strict=True):
@@ -141,7 +156,7 @@ class _OscDoor(asyncio.DatagramProtocol):
             if now - self._last_error >= BETWEEN_ERRORS:
                 self._last_error = now
                 reason = str(error).encode("ascii", "replace").decode()
-                self._transport.sendto(_format("error", "s", reason), address)
+                self._transport.sendto(format_osc("error", "s", reason), address)
 
     def _subscribe(self, address: Any, request: Subscription) -> None:
         """Begin or renew a subscription."""

@@ -1,6 +1,6 @@
 """Messages of the server, version 1: JSON and binary, little-endian; docs/serve.md is their table.
 
-A request is a pose of the fingertip, or a reset. A frame is the state after a control period.
+A request is a pose of the fingertip, poses of several, or a reset. A frame is the state after a period.
 """
 
 from __future__ import annotations
@@ -54,14 +54,18 @@ def is_token(given: object, token: str) -> bool:
 
 VERSION = 1
 MARK = b"DC"
-STATE, POSE, RESET = 1, 2, 3
+STATE, POSE, RESET, POSES = 1, 2, 3, 4
 #: Mark, version, kind, and the pins of a frame or the number of a request.
 HEAD = struct.Struct("<2sBBI")
 #: Period, number of the last pose taken up, flags, time, total force, pose.
 BODY = struct.Struct("<QII9d")
 POSITION = struct.Struct("<7d")
+#: Identity and pose of a finger in a request; identity, force, pose in a frame.
+FINGER, FELT = struct.Struct("<I7d"), struct.Struct("<q8d")
+#: Most fingers of a session.
+MOST_FINGERS = 32
 #: No request is larger, bytes.
-LARGEST_REQUEST = 4096
+LARGEST_REQUEST = 8192
 #: Shortest quaternion whose direction counts.
 SHORTEST = 1e-6
 
@@ -74,6 +78,19 @@ class Pose:
     pose: tuple[float, ...]
     #: The client's own, which the frames name once the pose has been taken up.
     number: int = 0
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Request: where fingertips with identities are to be; a wrong one does not hold up the others."""
+
+    #: Identities and poses, as that of `Pose`.
+    fingers: tuple[tuple[int, tuple[float, ...]], ...]
+    #: Identities that are there; those without a pose stay.
+    alive: tuple[int, ...]
+    number: int = 0
+    #: What was refused of it.
+    fault: str = ""
 
 
 @dataclass(frozen=True)
@@ -134,6 +151,8 @@ class Bed:
     #: Largest total force handed out, N, and largest speed of the fingertip, m/s.
     most_force: float = LIMITS.force
     most_speed: float = LIMITS.speed
+    #: Number of fingertips.
+    fingers: int = 1
 
 
 def describe_bed(scene: Scene, system: System, limits: Limits) -> Bed:
@@ -143,6 +162,7 @@ def describe_bed(scene: Scene, system: System, limits: Limits) -> Bed:
     return Bed(
         scene.name, layout.rows, layout.columns, layout.pitch, system.cell.actuator.stroke, system.period,
         tuple((float(x), float(y)) for x, y in listed), limits.force, limits.speed,
+        system.fingers,
     )  # fmt: skip
 
 
@@ -165,6 +185,8 @@ class Frame:
     forces: NDArray[np.float32]
     #: Of `Flag`.
     flags: int = 0
+    #: Identity, -1 for none, force, N, and pose (7,) of each of several fingertips.
+    fingers: tuple[tuple[int, float, tuple[float, ...]], ...] = ()
 
 
 def check_pose(values: Sequence[object]) -> tuple[float, ...]:
@@ -189,7 +211,32 @@ def check_pose(values: Sequence[object]) -> tuple[float, ...]:
     return (*place, *(part / length for part in turn))
 
 
-def read_json(text: str) -> Pose | Reset | Status:
+def check_fingers(given: Sequence[tuple[object, Sequence[object]]], alive: object, number: int) -> Poses:
+    """Return the request for fingers by identity, 3 or 7 numbers each, and those alive; none: those given.
+
+    A finger that is wrong is left out, and told; it stays where it was. Raises ParameterError.
+    """
+    fingers: dict[int, tuple[float, ...]] = {}
+    faults, seen = [], []
+    for name, values in given:
+        try:
+            identity = check_number(name, field="identity")
+            seen.append(identity)
+            if seen.count(identity) > 1:
+                fingers.pop(identity, None)
+                raise ParameterError("pose", "", "must be the only one of its identity", "two")
+            if values:
+                fingers[identity] = check_pose(values)
+        except ParameterError as error:
+            faults.append(f"Finger {str(name)[:12]}: {error}")
+    living = seen if alive is None else alive
+    if not isinstance(living, list) or any(type(one) is not int for one in living):
+        raise ParameterError("poses", "alive", "must be a list of identities", repr(alive)[:40])
+    more = f" And {len(faults) - 1} more." if len(faults) > 1 else ""
+    return Poses(tuple(fingers.items()), tuple(dict.fromkeys(living)), number, "".join(faults[:1]) + more)
+
+
+def read_json(text: str) -> Pose | Poses | Reset | Status:
     """Read a request in JSON. Raises ParameterError when it is none."""
     try:
         message: Any = json.loads(text)
@@ -199,24 +246,53 @@ def read_json(text: str) -> Pose | Reset | Status:
         raise ParameterError("message", "", 'must be an object, such as {"type": "reset"}', repr(text[:40]))
     _check_version(message.get("version", VERSION))
     kind = message.get("type")
-    if kind not in ("pose", "reset", "status"):
-        raise ParameterError("message", "type", "must be pose, reset or status", repr(kind)[:40])
-    allowed = {"type", "version", *(("position", "orientation", "number") if kind == "pose" else ())}
+    if not isinstance(kind, str) or kind not in KEYS:
+        raise ParameterError("message", "type", f"must be one of {', '.join(KEYS)}", repr(kind)[:40])
+    _check_keys(message, {"type", "version", *KEYS[kind]})
+    if kind in ("reset", "status"):
+        return Reset() if kind == "reset" else Status()
+    number = check_number(message.get("number", 0))
+    if kind == "pose":
+        values = []
+        for name, usual, count in (("position", None, 3), ("orientation", list(LEVEL), 4)):
+            value = message.get(name, usual)
+            if not isinstance(value, list) or len(value) != count:
+                raise ParameterError("pose", name, f"must be {count} numbers", repr(value)[:40])
+            values += value
+        return Pose(check_pose(values), number)
+    fingers = message.get("fingers")
+    if not isinstance(fingers, list) or not all(isinstance(one, dict) for one in fingers):
+        rule = 'must be a list such as [{"id": 1, "position": [0, 0, 0.05]}]'
+        raise ParameterError("poses", "fingers", rule, repr(fingers)[:40])
+    for finger in fingers:
+        _check_keys(finger, {"id", "position", "orientation"})
+    return check_fingers(
+        [(one.get("id"), _list_numbers(one)) for one in fingers], message.get("alive"), number
+    )
+
+
+def _list_numbers(finger: dict[str, Any]) -> list[object]:
+    """Return what a finger has for numbers of a pose, as it stands: `check_fingers` refuses it alone."""
+    place, turn = finger.get("position", []), finger.get("orientation", [])
+    whole = isinstance(place, list) and isinstance(turn, list) and len(place) in (0, 3)
+    return [*place, *turn] if whole else [place]
+
+
+#: Keys of requests beside type and version.
+KEYS = {
+    "pose": ("position", "orientation", "number"), "poses": ("fingers", "alive", "number"),
+    "reset": (), "status": (),
+}  # fmt: skip
+
+
+def _check_keys(message: dict[str, Any], allowed: set[str]) -> None:
+    """Refuse unknown keys."""
     if unknown := sorted(set(message) - allowed):
         rule = f"must have no other keys than {', '.join(sorted(allowed))}"
         raise ParameterError("message", "", rule, repr(unknown[0])[:40])
-    if kind != "pose":
-        return Reset() if kind == "reset" else Status()
-    values = []
-    for name, usual, count in (("position", None, 3), ("orientation", list(LEVEL), 4)):
-        value = message.get(name, usual)
-        if not isinstance(value, list) or len(value) != count:
-            raise ParameterError("pose", name, f"must be {count} numbers", repr(value)[:40])
-        values += value
-    return Pose(check_pose(values), check_number(message.get("number", 0)))
 
 
-def read_binary(data: bytes) -> Pose | Reset:
+def read_binary(data: bytes) -> Pose | Poses | Reset:
     """Read a request in binary. Raises ParameterError when it is none."""
     if len(data) < HEAD.size or data[:2] != MARK:
         raise ParameterError("message", "", f"must begin with {MARK.decode()}", repr(data[:8]))
@@ -224,6 +300,9 @@ def read_binary(data: bytes) -> Pose | Reset:
     _check_version(version)
     if kind == RESET and len(data) == HEAD.size:
         return Reset()
+    if kind == POSES and (len(data) - HEAD.size) % FINGER.size == 0:
+        fingers = [(identity, pose) for identity, *pose in FINGER.iter_unpack(data[HEAD.size :])]
+        return check_fingers(fingers, None, number)
     if kind != POSE or len(data) != HEAD.size + POSITION.size:
         rule = f"must be a pose, kind {POSE} of {HEAD.size + POSITION.size} bytes, or a reset, kind {RESET}"
         raise ParameterError("message", "", rule, f"kind {kind} of {len(data)} bytes")
@@ -235,24 +314,33 @@ def pack_pose(request: Pose) -> bytes:
     return HEAD.pack(MARK, VERSION, POSE, request.number) + POSITION.pack(*request.pose)
 
 
+def pack_poses(request: Poses) -> bytes:
+    """Write poses in binary: those alive have one."""
+    fingers = (FINGER.pack(identity, *pose) for identity, pose in request.fingers)
+    return b"".join([HEAD.pack(MARK, VERSION, POSES, request.number), *fingers])
+
+
 def pack_frame(frame: Frame) -> bytes:
     """Write a frame in binary."""
     head = (frame.period, frame.number, frame.flags, frame.time, frame.total_force)
     body = BODY.pack(*head, *frame.pose.tolist())
     pins = (np.asarray(values, "<f4").tobytes() for values in (frame.heights, frame.forces))
-    return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins])
+    fingers = (FELT.pack(identity, force, *pose) for identity, force, pose in frame.fingers)
+    return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins, *fingers])
 
 
 def unpack_frame(data: bytes) -> Frame:
     """Read a frame in binary. Raises ParameterError when it is none."""
     start = HEAD.size + BODY.size
     mark, version, kind, pins = HEAD.unpack_from(data) if len(data) >= start else (b"", 0, 0, 0)
-    if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) != start + 8 * pins:
+    end = start + 8 * pins
+    if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) < end or (len(data) - end) % FELT.size:
         rule = f"must be a state, kind {STATE} of version {VERSION}"
         raise ParameterError("frame", "", rule, f"kind {kind} of {len(data)} bytes")
     period, number, flags, time, force, *pose = BODY.unpack_from(data, HEAD.size)
-    heights, forces = np.frombuffer(data, "<f4", offset=start).reshape(2, pins)
-    return Frame(period, number, time, force, np.array(pose), heights, forces, flags)
+    heights, forces = np.frombuffer(data, "<f4", 2 * pins, start).reshape(2, pins)
+    fingers = tuple((each[0], each[1], each[2:]) for each in FELT.iter_unpack(data[end:]))
+    return Frame(period, number, time, force, np.array(pose), heights, forces, flags, fingers)
 
 
 def name_flags(flags: int) -> list[str]:
@@ -267,10 +355,15 @@ def format_message(kind: str, **fields: Any) -> str:
 
 def format_frame(frame: Frame) -> str:
     """Write a frame in JSON."""
+    fingers = [
+        {"id": identity, "force": force, "position": pose[:3], "orientation": pose[3:]}
+        for identity, force, pose in frame.fingers if identity >= 0
+    ]  # fmt: skip
     return format_message(
         "state", period=frame.period, number=frame.number, time=frame.time, total_force=frame.total_force,
         position=frame.pose[:3].tolist(), orientation=frame.pose[3:].tolist(),
         heights=frame.heights.tolist(), forces=frame.forces.tolist(), flags=name_flags(frame.flags),
+        **({"fingers": fingers} if frame.fingers else {}),
     )  # fmt: skip
 
 
@@ -280,8 +373,8 @@ def _check_version(version: object) -> None:
         raise ParameterError("message", "version", f"must be {VERSION}", repr(version)[:40])
 
 
-def check_number(number: object, bits: int = 32) -> int:
+def check_number(number: object, bits: int = 32, field: str = "number") -> int:
     """Return the number of a request, below 2**bits; refuse anything else."""
     if type(number) is not int or not 0 <= number < 2**bits:
-        raise ParameterError("pose", "number", "must be a whole number of 32 bits", repr(number)[:40])
+        raise ParameterError("pose", field, "must be a whole number of 32 bits", repr(number)[:40])
     return number

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .doors import Doors
 from .protocol import name_flags, pack_frame
-from .served_session import PartWriter, Session, follow, make_frame, record, reset
+from .served_session import PartWriter, Session, aim, follow, make_frame, record, reset
 
 #: Rounding errors of times count as whole periods when they are below this share of one.
 SLACK = 1e-6
@@ -141,8 +141,8 @@ def run_session(
             resets = order.resets
             session = _restart(session, writer, room)
         diverged = session.diverged
-        target = session.pose if order.pose is None else np.array(order.pose)
-        session = follow(session, target, order.number, count)
+        session, targets, clear = aim(session, order, count)
+        session = follow(session, targets, order.number, count, clear)
         if session.diverged != diverged:
             tell(f"The session diverged, and went back to {session.kept.period * period:.3f} s.")
         frame = make_frame(session)

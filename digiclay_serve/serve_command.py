@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,10 @@ from digiclay.core.files.run_folder import format_json, write_whole
 from digiclay.core.scene.scene_source import Setting
 
 from .doors import Doors
-from .protocol import LIMITS, VARIABLE, Limits, choose_token, describe_bed, pack_frame
+from .protocol import LIMITS, MOST_FINGERS, VARIABLE, Limits, choose_token, describe_bed, pack_frame
 from .real_time_loop import run_session
 from .served_session import PartWriter, begin_session, make_frame
+from .tracking import Tracking
 
 EXAMPLES = f"""\
 examples:
@@ -53,6 +55,11 @@ def add(commands: Any) -> None:
             _within(1.0, 1e4, "mm/s"),
             f"largest speed of the fingertip, mm/s; default: {most_speed:g}", most_speed,
         ),
+        "--fingers N": (whole_number(1, MOST_FINGERS), "number of fingertips, all as the scene's first"),
+        "--lift MS": (_within(1.0, 1e4, "ms"), "lift fingers not named for this time; default: 100", 100.0),
+        "--clutch MM": (_within(0.0, 1e3, "mm"), "height over the pins where fingers begin, and slip", 0.0),
+        "--filter HZ": (_within(0.0, 1e3, "Hz"), "least cutoff of the 1-euro filter of fingers", 0.0),
+        "--coupling N/MM": (_within(0.0, 1e3, "N/mm"), "spring between tracked and simulated fingertip", 0.0),
         "--out DIR": (Path, "record a take into this folder"),
         "--part S": (
             _within(0.1, 600.0, "s"),
@@ -81,7 +88,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
         arguments.settings.append(Setting("simulation.control_period", repr(1.0 / arguments.rate), "--rate"))
     arguments.scene = arguments.scene or SCENE
     scene, _ = scene_of(arguments)
-    session = begin_session(scene, Limits(arguments.most_force, 1e-3 * arguments.most_speed))
+    if arguments.fingers is not None:
+        scene = replace(scene, fingers=scene.fingers[:1] * arguments.fingers)
+    limits = Limits(arguments.most_force, 1e-3 * arguments.most_speed)
+    by_hand = (1e-3 * arguments.lift, 1e-3 * arguments.clutch, arguments.filter, 1e3 * arguments.coupling)
+    session = begin_session(scene, limits, Tracking(*by_hand))
     bed, host = describe_bed(scene, session.system, session.limits), arguments.host
     size, out = len(pack_frame(make_frame(session))), arguments.out
     with (

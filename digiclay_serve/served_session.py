@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -34,12 +35,27 @@ from digiclay.core.session.live_session import (
 from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 
+from .doors import Order
 from .protocol import LIMITS, Flag, Frame, Limits
+from .tracking import CLEAR, PARKED, TRACKING, Contact, Tracking, Tracks, advance, begin_tracks, name_fingers
 
 #: Time between two states that are kept for a session that diverges, s.
 KEEP = 0.5
 #: How far a point of the fingertip is from the lowest one at most, in the paper's device, m: a turn moves it.
 ARM = 0.02
+#: How far around a fingertip pins are looked at, m: whatever is under it, and what it could run into.
+AROUND = 0.015
+
+
+class Pulp(NamedTuple):
+    """What `feel` needs of the fingers' laws: a row a finger, a column a filter of the relaxation."""
+
+    #: (f,): 1/m; and stiffness of a cell at first touch, N/m.
+    exponent: Floats
+    touch: Floats
+    #: (f, k): shares of the filters, and their rates, 1/s.
+    shares: Floats
+    rates: Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,47 +68,112 @@ class Session(LiveSession):
     number: int = 0
     #: How often it went back.
     diverged: int = 0
-    #: Pose (7,) on the way to which it diverged: it is not gone to again.
+    #: Poses (f, 7) on the way to which it diverged: they are not gone to again.
     refused: Floats | None = None
     limits: Limits = LIMITS
-    #: Whether the pose asked for is farther away than the largest speed allows.
+    #: Whether a pose asked for is farther away than the largest speed allows.
     behind: bool = False
+    tracking: Tracking = TRACKING
+    #: Of fingers with identities, after so many messages with them.
+    tracks: Tracks
+    named: int = 0
+    #: Laws of the fingers, and filters (f, k) of what has relaxed of their forces, N.
+    pulp: Pulp
+    relaxed: Floats
 
 
-def begin_session(scene: Scene, limits: Limits = LIMITS) -> Session:
-    """Begin a session at rest, its fingertip where the path of the scene begins. Raises DigiclayError."""
-    return _begin_at_rest(scene, assemble(scene), limits)
+def begin_session(scene: Scene, limits: Limits = LIMITS, tracking: Tracking = TRACKING) -> Session:
+    """Begin a session at rest, its fingertips where the paths of the scene begin. Raises DigiclayError."""
+    return _begin_at_rest(scene, assemble(scene), limits, tracking)
 
 
-def _begin_at_rest(scene: Scene, system: System, limits: Limits) -> Session:
-    """Return the session of a bed at rest."""
+def _begin_at_rest(scene: Scene, system: System, limits: Limits, tracking: Tracking) -> Session:
+    """Return the session of a bed at rest; a fingertip in the place of another one is not there."""
     state = begin(system)
-    first = sample_poses(scene.trajectories(), np.zeros(1))[0, 0]
-    pose = clamp_pose(first, system.cell.actuator.stroke)
-    kept = Moment(0, snapshot.dump(system, state), pose[None])
-    return Session(scene=scene, system=system, state=state, poses=pose[None], kept=kept, limits=limits)
+    first = sample_poses(scene.trajectories(), np.zeros(1))[0]
+    poses = np.array([clamp_pose(pose, system.cell.actuator.stroke) for pose in first])
+    for row in range(1, len(poses)):
+        if (poses[:row] == poses[row]).all(1).any():
+            poses[row, 2] = PARKED
+    kept = Moment(0, snapshot.dump(system, state), poses)
+    return Session(
+        scene=scene, system=system, state=state, poses=poses, kept=kept, limits=limits, tracking=tracking,
+        tracks=begin_tracks(poses), pulp=(pulp := describe_pulp(scene)), relaxed=np.zeros_like(pulp.rates),
+    )  # fmt: skip
 
 
-def follow(session: Session, target: Floats, number: int, count: int) -> Session:
-    """Simulate control periods in which the fingertip goes straight to a pose, at its largest speed at most.
+def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, float]:
+    """Return the session, and where its fingertips (f, 7) are to be after control periods by an order.
 
-    A session that diverges goes back to a state it has kept, with the fingertip there; its recording too.
+    And the height, m, over which they go there at once. An identity that is not named lifts.
+    """
+    if not order.named:
+        targets, clear = session.poses.copy(), math.inf
+    else:
+        tracks, felt = session.tracks, feel(session)
+        if order.named != session.named:
+            tracks = name_fingers(tracks, order.fingers)
+        time = count * session.system.period
+        tracks, targets = advance(tracks, session.tracking, felt, time)
+        relaxed = session.relaxed
+        relaxed = relaxed - np.expm1(-time * session.pulp.rates) * (felt.tension[:, None] - relaxed)
+        session = replace(session, tracks=tracks, named=order.named, relaxed=relaxed)
+        clear = felt.peak + CLEAR
+    if order.pose is not None:
+        targets[0] = order.pose
+    return session, targets, clear
 
-    `session`: used up; `target` (7,), lowest point, m, and unit quaternion, finite; `number`: of the pose;
-    `count`: control periods, at least 1.
+
+def feel(session: Session) -> Contact:
+    """Return what the fingertips feel."""
+    state, system, poses = session.state, session.system, session.poses
+    heights, pressed = state.row(0), state.row(system.rows.force) > 0.0
+    near = ((system.grid.positions - poses[:, None, :2]) ** 2).sum(2) < AROUND**2
+    force, pulp = state.finger_forces(), session.pulp
+    # What grows is the tension: the force and what has relaxed of it meanwhile.
+    tension = force + (pulp.shares * session.relaxed).sum(1)
+    stiffness = pulp.exponent * tension + pulp.touch * (near & pressed).sum(1)
+    top = np.where(near, heights, 0.0).max(1)
+    return Contact(poses, force, tension, stiffness, top, 1.0 / pulp.exponent, float(heights.max()))
+
+
+def describe_pulp(scene: Scene) -> Pulp:
+    """Return what `feel` needs of the fingers of a scene."""
+    laws = [finger.contact for finger in scene.fingers]
+    filters = [
+        (one.shares, one.rates[:, 0]) if (one := finger.relaxation) else () for finger in scene.fingers
+    ]
+    table = np.zeros((2, len(laws), max(len(pair[0]) if pair else 0 for pair in filters)))
+    for row, pair in enumerate(filters):
+        if pair:
+            table[:, row, : len(pair[0])] = pair
+    exponent = np.array([law.exponent if law else 1.0 for law in laws])
+    return Pulp(exponent, np.array([law.stiffness * law.share if law else 0.0 for law in laws]), *table)
+
+
+def follow(session: Session, targets: Floats, number: int, count: int, clear: float = math.inf) -> Session:
+    """Simulate control periods in which fingertips go straight to poses, at their largest speed at most.
+
+    A session that diverges goes back to a state it has kept, with the fingertips there; its recording too.
+
+    `session`: used up; `targets` (f, 7), lowest point, m, and unit quaternion, finite; `number`: of the pose;
+    `count`: control periods, at least 1; `clear`: height over which fingertips go anywhere at once, m.
     """
     system = session.system
-    if session.refused is not None and np.array_equal(target, session.refused):
-        target = session.pose
-    goal = clamp_pose(target, system.cell.actuator.stroke)
-    end = _limit_way(session.pose, goal, session.limits.speed * system.period * count)
-    start, stop = session.pose[None], end[None]
-    path = np.array([start, stop]) if count == 1 else interpolate_path(start, stop, count)
+    if session.refused is not None and np.array_equal(targets, session.refused):
+        targets = session.poses
+    goals = np.array([clamp_pose(target, system.cell.actuator.stroke) for target in targets])
+    way = session.limits.speed * system.period * count
+    ends = np.array([_limit_way(*each, way, clear) for each in zip(session.poses, goals, strict=True)])
+    start = session.poses
+    path = np.array([start, ends]) if count == 1 else interpolate_path(start, ends, count)
     try:
         after = follow_path(session, path)
     except DivergenceError:
-        return replace(go_back(session, session.kept), diverged=session.diverged + 1, refused=target)
-    after = replace(after, poses=end[None], number=number, behind=end is not goal)
+        back = go_back(session, session.kept)
+        tracks = begin_tracks(back.poses)
+        return replace(back, diverged=session.diverged + 1, refused=targets, tracks=tracks)
+    after = replace(after, poses=ends, number=number, behind=not np.array_equal(ends, goals))
     if after.state.period - session.kept.period < KEEP / system.period:
         return after
     return replace(after, kept=_keep(after))
@@ -103,8 +184,15 @@ def _keep(session: Session) -> Moment:
     return Moment(session.state.period, snapshot.dump(session.system, session.state), session.poses)
 
 
-def _limit_way(start: Floats, goal: Floats, most: float) -> Floats:
-    """Return the pose (7,) on the way to another at which no point of the fingertip has gone farther, m."""
+def _limit_way(start: Floats, goal: Floats, most: float, clear: float) -> Floats:
+    """Return the pose (7,) on the way to another at which no point of the fingertip has gone farther, m.
+
+    Above a height, m, no way counts.
+    """
+    if start[2] >= clear:
+        if goal[2] >= clear:
+            return goal
+        start = np.array([*goal[:2], clear, *goal[3:]])
     first, last = start.tolist(), goal.tolist()  # faster than arrays of 7
     cosine = abs(sum(map(operator.mul, first[3:], last[3:])))
     way = math.dist(first[:3], last[:3]) + ARM * 2.0 * math.acos(min(1.0, cosine))
@@ -116,7 +204,7 @@ def _limit_way(start: Floats, goal: Floats, most: float) -> Floats:
 
 def reset(session: Session) -> Session:
     """Return the session with its bed at rest and its fingertip where it began; a recording ends."""
-    fresh = _begin_at_rest(session.scene, session.system, session.limits)
+    fresh = _begin_at_rest(session.scene, session.system, session.limits, session.tracking)
     return replace(fresh, number=session.number, diverged=session.diverged)
 
 
@@ -129,17 +217,19 @@ def record(session: Session, room: int) -> Session:
 def make_frame(session: Session) -> Frame:
     """Return the state for other programs: no more force than the limit, and flags."""
     state, system, most = session.state, session.system, session.limits.force
-    forces = state.row(system.rows.force)
+    forces, each = state.row(system.rows.force), state.finger_forces()
     total = float(forces.sum())
     flags = Flag.POSE_LIMITED if session.behind else Flag(0)
-    if exceeds_law(system, state, session.pose):
+    if any(exceeds_law(system, state, pose) for pose in session.poses):
         flags |= Flag.BEYOND_A_FINGER
     if total > most:
         flags |= Flag.FORCE_LIMITED
-        forces, total = forces * (most / total), most
+        forces, each, total = forces * (most / total), each * (most / total), most
     pins = state.row(0).astype(np.float32), forces.astype(np.float32)
     time = state.period * system.period
-    return Frame(state.period, session.number, time, total, session.pose, *pins, flags)
+    rows = session.tracks.identities.tolist(), each.tolist(), map(tuple, session.poses.tolist())
+    fingers = tuple(zip(*rows, strict=True)) if system.fingers > 1 else ()
+    return Frame(state.period, session.number, time, total, session.poses[0], *pins, flags, fingers)
 
 
 #: Most parts that wait for the disk.

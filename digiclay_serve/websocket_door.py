@@ -16,7 +16,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from .door_link import DoorLink, HeldError
+from .door_link import DoorLink, FrequentError
 from .protocol import LARGEST_REQUEST, format_frame, format_message, is_token, read_binary, read_json
 
 #: Most clients, and most connections that have not said yet who they are: beyond it the oldest is cut.
@@ -193,7 +193,7 @@ class _WebSocketDoor:
             try:
                 request = read_json(message) if isinstance(message, str) else read_binary(message)
                 answer = self.link.order(request, connection)
-            except HeldError as error:
+            except FrequentError as error:
                 # Answered once a second: poses come a thousand times as often.
                 if clock() - refused >= 1.0:
                     refused = clock()

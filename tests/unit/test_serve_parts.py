@@ -38,7 +38,7 @@ SMALL = {
 }
 WAIT = {"waypoints": [{"time": time, "position": [0, 0, 0.05]} for time in (0.0, 1.0)]}
 STILL = resolve({**SMALL, "trajectory": WAIT})
-DOWN = np.array([0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0])
+DOWN = np.array([[0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0]])
 
 
 def test_a_period_is_due_from_its_beginning_once_and_the_oldest_late_ones_are_left_out() -> None:
@@ -85,7 +85,7 @@ def pressed(session: Session, count: int = 20) -> Session:
 def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, flags: int) -> None:
     session, seen = begin_session(STILL, replace(LIMITS, force=most)), 0
     for _ in range(30):
-        session = follow(session, np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]), 3, 1)
+        session = follow(session, np.array([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]]), 3, 1)
         frame = make_frame(session)
         seen |= frame.flags
         assert frame.total_force == pytest.approx(frame.forces.sum(), rel=1e-5)  # 32 bits
@@ -105,10 +105,10 @@ def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, fl
 def test_the_fingertip_has_a_largest_speed(place: Any, turn: Any, way: float, count: int) -> None:
     session, turns, each = begin_session(STILL, Limits(speed=0.1)), 0, 0.1 * 5e-3 * count
     while turns == 0 or session.behind:
-        before = session.pose[:3]
-        session, turns = follow(session, np.array(place + turn), 3, count), turns + 1
-        assert np.linalg.norm(session.pose[:3] - before) <= each * (1.0 + 1e-9)  # rounding
-    assert (session.pose.tolist(), turns) == (place + turn, np.ceil(way / each - 1e-9))
+        before = session.poses[0, :3]
+        session, turns = follow(session, np.array([place + turn]), 3, count), turns + 1
+        assert np.linalg.norm(session.poses[0, :3] - before) <= each * (1.0 + 1e-9)  # rounding
+    assert (session.poses[0].tolist(), turns) == (place + turn, np.ceil(way / each - 1e-9))
 
 
 def test_a_session_that_diverges_goes_back_and_does_not_go_there_again() -> None:
@@ -116,10 +116,10 @@ def test_a_session_that_diverges_goes_back_and_does_not_go_there_again() -> None
     words |= {"simulation.physics_step": "0.05", "layout.columns": "11"}
     scene = load(find("slow_press"), [Setting(key, word) for key, word in words.items()])
     session = record(begin_session(scene), 1000)
-    high = session.pose
+    high = session.poses
     for _ in range(15):  # a state is kept in between
         session = follow(session, high, 1, 1)
-    deep = np.array([0.0, 0.0, 0.03, 1.0, 0.0, 0.0, 0.0])
+    deep = np.array([[0.0, 0.0, 0.03, 1.0, 0.0, 0.0, 0.0]])
     for _ in range(100):
         session = session if session.diverged else follow(session, deep, 2, 1)
     assert session.diverged == 1
@@ -127,8 +127,8 @@ def test_a_session_that_diverges_goes_back_and_does_not_go_there_again() -> None
     assert session.recording is not None
     assert session.recording.count == 11
     after = follow(session, deep, 2, 1)
-    assert (after.diverged, after.pose.tolist(), after.state.period) == (1, high.tolist(), 11)
-    assert follow(after, high + DOWN / 1e3, 3, 1).pose.tolist() != high.tolist()
+    assert (after.diverged, after.poses.tolist(), after.state.period) == (1, high.tolist(), 11)
+    assert follow(after, high + DOWN / 1e3, 3, 1).poses.tolist() != high.tolist()
 
 
 def taken(session: Session) -> Take:
@@ -245,6 +245,13 @@ FEW_PINS = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "con
         ("--port -1", "must be a whole number from 0 to 65535"),
         ("--osc-port x", "must be a whole number from 0 to 65535"),
         ("--token short", "--token must have 8 to 128"),
+        ("--token -short", "--token must have 8 to 128"),
+        ("--fingers 0", "must be a whole number from 1 to 32"),
+        ("--fingers 33", "must be a whole number from 1 to 32"),
+        ("--lift 0", "must be from 1 to 10000 ms"),
+        ("--clutch nan", "must be from 0 to 1000 mm"),
+        ("--filter -1", "must be from 0 to 1000 Hz"),
+        ("--coupling x", "must be from 0 to 1000 N/mm"),
         ("--most-force 0", "must be from 0.001 to 1000 N"),
         ("--most-speed inf", "must be from 1 to 10000 mm/s"),
         ("--part 0", "must be from 0.1 to 600 s"),

@@ -12,7 +12,7 @@ if sys.platform == "win32":
     pytest.skip("the server runs on Linux and macOS", allow_module_level=True)
 
 from digiclay_serve import door_link, websocket_door
-from digiclay_serve.door_link import Bed, DoorLink, HeldError
+from digiclay_serve.door_link import Bed, DoorLink, FrequentError
 from digiclay_serve.doors import LAYOUT, make_slot
 from digiclay_serve.protocol import Pose, pack_pose
 from digiclay_serve.websocket_door import open_websocket
@@ -53,7 +53,7 @@ async def press_elsewhere(link: DoorLink) -> None:
         try:
             link.order(POSE, "another client")
             return
-        except HeldError:
+        except FrequentError:
             await asyncio.sleep(0.01)
 
 
@@ -91,11 +91,11 @@ def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch: pytest
     async def take_turns() -> list[str]:
         link, moved = make_link(), []
         for client in ("one", "two", "one"):
-            with suppress(HeldError):
+            with suppress(FrequentError):
                 link.order(POSE, client)
                 moved.append(client)
         link.leave("two")  # it did not move the fingertip
-        with pytest.raises(HeldError):
+        with pytest.raises(FrequentError):
             link.order(POSE, "two")
         await asyncio.sleep(0.2)
         link.order(POSE, "two")

@@ -1,4 +1,4 @@
-"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve``, ``compare --suite``.
+"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve``, ``hands``, ``compare --suite``.
 
 They are in packages beside this one, where those are installed. ``digiclay benchmark`` says where the
 benchmarks are.
@@ -22,6 +22,7 @@ COMMANDS = {
     "study": ("digiclay_study", "study_command", "study", "find which parameters matter for which metric"),
     "tune": ("digiclay_study", "tune_command", "study", "find the best trade-off of two metrics"),
     "serve": ("digiclay_serve", "serve_command", "serve", "run a session for other programs"),
+    "hands": ("digiclay_serve", "hands_command", "serve", "move the fingertips of a server by tracked hands"),
 }
 #: The package and the module of ``digiclay compare --suite``.
 SUITE = ("digiclay_study", "suite_command")

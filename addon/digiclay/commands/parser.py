@@ -65,8 +65,11 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse unknown arguments here, where their command is known."""
-        self._given = sys.argv[1:] if args is None else args
-        known, unknown = super().parse_known_args(args, namespace)
+        self._given = given = list(sys.argv[1:] if args is None else args)
+        if "--token" in given[:-1]:  # which may begin with a dash
+            at = given.index("--token")
+            given[at : at + 2] = ["=".join(given[at : at + 2])]
+        known, unknown = super().parse_known_args(given, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         return known, unknown

@@ -1,0 +1,218 @@
+"""``digiclay hands``: fingers of tracked hands or of a touch pad, to a server of a session."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import math
+import os
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from digiclay.commands.arguments import Options, add_command, add_options, millimeters, whole_number
+from digiclay.commands.stop import Stop, refuse_without
+from digiclay.core.base.arrays import Floats
+from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.model.fingertip import LEVEL
+
+from .hts import Hands
+from .protocol import VARIABLE, Poses, choose_token, pack_poses
+
+EXAMPLES = """\
+examples:
+  digiclay serve --fingers 10 --clutch 10 --filter 1 --coupling 0.1
+  digiclay hands --from hts --to ws://127.0.0.1:8765 --record hands.txt
+  digiclay hands --from tuio --to osc://127.0.0.1:8766
+  digiclay hands --from hts --play hands.txt
+
+A Quest sends the lines of Hand Tracking Streamer to --port by UDP or TCP, a tablet TUIO 1.1 or 2.0 by UDP.
+"""
+#: Ports by source, as the programs have them.
+PORTS = {"hts": 9000, "tuio": 3333}
+HOST, TO = "127.0.0.1", "ws://127.0.0.1:8765"
+#: Fingers that rest are named again after this time, s.
+AGAIN = 0.03
+
+#: Sends fingers by identity, (3,), m, each.
+Send = Callable[[Mapping[int, Floats]], Awaitable[None]]
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    options: Options = {
+        "--from SOURCE": {
+            "dest": "source", "choices": sorted(PORTS), "default": "hts",
+            "help": "hts: Hand Tracking Streamer, the default; tuio: a touch pad",
+        },
+        "--to ADDRESS": (None, f"of 'digiclay serve': ws://HOST:PORT or osc://HOST:PORT; default: {TO}", TO),
+        "--token T": f"token of the server; default: {VARIABLE}",
+        "--host": (None, f"address of this machine to listen at, 0.0.0.0: all; default: {HOST}", HOST),
+        "--port N": (whole_number(1, 65535), "to listen at; default: 9000, of tuio 3333"),
+        "--height MM": (millimeters, "height of the clay at rest, mm; default: 40", 40e-3),
+        "--size MM": (millimeters, "side of the bed that a touch pad covers, mm; default: 70", 70e-3),
+        "--depth MM": (millimeters, "depth of a finger on a pad at full pressure, mm; default: 10", 10e-3),
+        "--record FILE": (Path, "write what is received, with its times"),
+        "--play FILE": (Path, "take a recording in place of a device"),
+    }  # fmt: skip
+    purpose = "move the fingertips of a server by tracked hands or a touch pad"
+    add_options(add_command(commands, "hands", purpose, EXAMPLES, carry_out=carry_out), options)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Pass fingers on until Ctrl-C, or the end of a recording."""
+    refuse_without("digiclay hands", "serve", "websockets", "pythonosc")
+    from .tuio import Pad
+
+    if arguments.token is None and VARIABLE not in os.environ:
+        raise OutputError(f"digiclay hands needs the token of the server: --token, or {VARIABLE}.")
+    token, pad = choose_token(arguments.token)[0], (arguments.height, arguments.size, arguments.depth)
+    source = Hands(arguments.height) if arguments.source == "hts" else Pad(*pad)
+    packets = read_packets(arguments.play) if arguments.play else None
+    with Stop() as stop:
+        try:
+            asyncio.run(_pass_on(arguments, source, packets, token, stop))
+        except OSError as error:
+            where = f": {error.filename}" if error.filename else ""
+            raise OutputError(f"digiclay hands has ended: {error.strerror or error}{where}.") from None
+    return 0
+
+
+async def _pass_on(arguments: argparse.Namespace, source: Any, packets: Any, token: str, stop: Stop) -> None:
+    """Pass what comes on to the server; fingers that rest are named again and again."""
+    came, told = asyncio.Event(), -math.inf
+    async with AsyncExitStack() as stack:
+        file = stack.enter_context(arguments.record.open("x", encoding="utf-8")) if arguments.record else None
+
+        def tell(line: object) -> None:
+            nonlocal told
+            if time.monotonic() - told >= 1.0:
+                print(line, flush=True)
+                told = time.monotonic()
+
+        def take(data: bytes) -> None:
+            nonlocal source
+            now = time.monotonic()
+            if file:
+                print(json.dumps([round(now, 6), data.decode("latin-1")]), file=file, flush=True)
+            try:
+                source = source.take(data, now)
+            except DigiclayError as error:
+                tell(error)
+            came.set()
+
+        send = await stack.enter_async_context(_connect(arguments.to, token, tell))
+        player = None if packets is None else asyncio.ensure_future(_play(packets, take))
+        if packets is None:
+            await _listen(stack, arguments.host, arguments.port or PORTS[arguments.source], take)
+        while not stop() and not (player and player.done()):
+            with suppress(TimeoutError):
+                await asyncio.wait_for(came.wait(), AGAIN)
+            came.clear()
+            await send(source.fingers(time.monotonic()))
+        if player:
+            player.cancel()
+
+
+async def _listen(stack: AsyncExitStack, host: str, port: int, take: Callable[[bytes], None]) -> None:
+    """Listen at a port by UDP and, to lines, by TCP."""
+
+    class Datagrams(asyncio.DatagramProtocol):
+        def datagram_received(self, data: bytes, address: Any) -> None:
+            take(data)
+
+    async def take_lines(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with suppress(ValueError, OSError):  # a line without end; a connection that was reset
+            async for line in reader:
+                take(line)
+        writer.close()
+
+    transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Datagrams, (host, port))
+    stack.callback(transport.close)
+    stack.callback((await asyncio.start_server(take_lines, host, port)).close)
+    print(f"listening at {host}:{port}, by UDP and TCP", flush=True)
+
+
+def read_packets(path: Path) -> list[tuple[float, bytes]]:
+    """Return the packets of a recording with their times, s: lines of JSON, a character a byte."""
+    try:
+        lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+        packets = [(float(at), str(text).encode("latin-1")) for at, text in lines]
+        if not all(math.isfinite(at) for at, _ in packets):
+            raise ValueError("a time is not finite")
+    except (OSError, ValueError, TypeError) as error:
+        rule = "must be a recording of 'digiclay hands --record'"
+        raise OutputError(f"--play {path} {rule} ({getattr(error, 'strerror', None) or error}).") from None
+    return packets
+
+
+async def _play(packets: list[tuple[float, bytes]], take: Callable[[bytes], None]) -> None:
+    """Give the packets of a recording at the times they came."""
+    late = time.monotonic() - packets[0][0] if packets else 0.0
+    for at, data in packets:
+        await asyncio.sleep(at + late - time.monotonic())
+        take(data)
+
+
+@asynccontextmanager
+async def _connect(address: str, token: str, tell: Callable[[object], None]) -> AsyncIterator[Send]:
+    """Give the function that sends fingers to the server at an address; what it refuses is told."""
+    from pythonosc.osc_message import OscMessage
+    from websockets.asyncio.client import connect
+    from websockets.exceptions import InvalidStatus, WebSocketException
+
+    from .osc_door import format_osc
+
+    parts, number = urlsplit(address), 0
+    try:
+        if parts.scheme not in ("ws", "osc") or not parts.hostname or not parts.port:
+            raise ValueError
+    except ValueError:
+        raise OutputError(f"--to must be ws://HOST:PORT or osc://HOST:PORT (got {address!r}).") from None
+    if parts.scheme == "osc":
+
+        class Answers(asyncio.DatagramProtocol):
+            def datagram_received(self, data: bytes, _: Any) -> None:
+                tell(f"server: {OscMessage(data).params[0]}")
+
+            def error_received(self, exc: Exception) -> None:
+                tell(f"No server at {address}: it has ended, or is not started yet.")
+
+        where = parts.hostname, parts.port
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Answers, remote_addr=where)
+
+        async def send_datagram(fingers: Mapping[int, Floats]) -> None:
+            values = [value for one, place in fingers.items() for value in (one, *place.tolist())]
+            transport.sendto(format_osc("poses", "si" + "hddd" * len(fingers), token, 0, *values))
+
+        yield send_datagram
+        transport.close()
+        return
+
+    async def send(fingers: Mapping[int, Floats]) -> None:
+        nonlocal number
+        number = (number + 1) % 2**32
+        poses = tuple((one, (*place.tolist(), *LEVEL)) for one, place in fingers.items())
+        await server.send(pack_poses(Poses(poses, tuple(fingers), number)))
+
+    async def take_answers() -> None:
+        async for message in server:
+            answer = json.loads(message)
+            if answer["type"] == "error":
+                tell(f"server: {answer['message']}")
+
+    header = {"Authorization": f"Bearer {token}"}
+    try:
+        async with connect(f"{address}/?rate=0", additional_headers=header, compression=None) as server:
+            answers = asyncio.ensure_future(take_answers())
+            yield send
+            answers.cancel()
+    except InvalidStatus as error:
+        reason = (error.response.body or b"").decode().strip()
+        raise OutputError(f"The server at {address} refuses: {reason}") from None
+    except WebSocketException as error:
+        raise OutputError(f"The server at {address} has ended: {error}.") from None

@@ -1,0 +1,442 @@
+"""Fingers with identities: requests, slots, clutch, filter, coupling; lines of a Quest and of touch pads."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import ParameterError
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+from pythonosc.osc_message_builder import OscMessageBuilder
+
+from digiclay_serve.door_link import DoorLink, FrequentError
+from digiclay_serve.doors import LAYOUT, Order, make_slot, pack_order, unpack_order
+from digiclay_serve.hts import Hands
+from digiclay_serve.osc_door import read_osc, read_request
+from digiclay_serve.protocol import Bed, Poses, check_fingers, pack_poses, read_binary, read_json
+from digiclay_serve.tracking import PARKED, Contact, Tracking, advance, begin_tracks, give_way, name_fingers
+from digiclay_serve.tuio import Pad
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+PLACE = (0.01, -0.02, 0.05)
+
+
+# Requests
+
+
+def osc(address: str, *values: Any) -> bytes:
+    """Return a message of OSC as other programs send it."""
+    builder = OscMessageBuilder(address)
+    for value in values:
+        builder.add_arg(value, "d" if isinstance(value, float) else None)
+    return bytes(builder.build().dgram)
+
+
+def test_poses_are_the_same_in_all_formats() -> None:
+    wanted = Poses(((7, (*PLACE, *LEVEL)), (3, (0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 1.0))), (7, 3), 9)
+    fingers = [
+        {"id": 7, "position": list(PLACE)},
+        {"id": 3, "position": [0, 0, 0.04], "orientation": [0, 0, 0, 2]},
+    ]
+    assert read_json(json.dumps({"type": "poses", "number": 9, "fingers": fingers})) == wanted
+    assert read_binary(pack_poses(wanted)) == wanted
+    sent = osc("/digiclay/poses", "token", 9, 7, *PLACE, 3, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 2.0)
+    assert read_request(*read_osc(sent)[1:]) == wanted
+    # An identity that is alive without a pose stays where it was.
+    said = json.dumps({"type": "poses", "fingers": fingers[:1], "alive": [7, 3]})
+    assert read_json(said) == Poses(wanted.fingers[:1], (7, 3))
+    assert read_request(*read_osc(osc("/digiclay/poses", "token", 9, 3))[1:]) == Poses((), (3,), 9)
+
+
+BAD: list[tuple[str, list[tuple[Any, list[Any]]], str]] = [
+    ("NaN in one", [(2, [0.0, 0.0, math.nan])], "Finger 2: pose must be finite numbers"),
+    ("two numbers", [(2, [0.0, 0.0])], "Finger 2: pose must be 3 numbers"),
+    ("text", [(2, ["a", 0.0, 0.0])], "Finger 2: pose must be numbers"),
+    ("a turn of length 0", [(2, [0.0] * 7)], "Finger 2: pose must have a quaternion of length 1"),
+    ("two with one identity", [(2, [*PLACE]), (2, [*PLACE])], "Finger 2: pose must be the only one"),
+    ("no identity", [(None, [*PLACE])], "Finger None: pose.identity must be a whole number"),
+    ("a negative identity", [(-1, [*PLACE])], "Finger -1: pose.identity must be a whole number"),
+    ("two are wrong", [(2, [math.inf] * 3), (-1, [*PLACE])], "And 1 more."),
+]
+
+
+@pytest.mark.parametrize(("wrong", "message"), [row[1:] for row in BAD], ids=[row[0] for row in BAD])
+def test_a_wrong_finger_is_told_and_the_others_go_on(wrong: list[Any], message: str) -> None:
+    read = check_fingers([(1, [*PLACE]), *wrong, (3, [*PLACE])], None, 5)
+    assert [identity for identity, _ in read.fingers] == [1, 3]
+    assert message in read.fault
+    assert "\n" not in read.fault
+    assert 2 not in [name for name, _ in wrong] or 2 in read.alive  # it stays where it was
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({}, "fingers must be a list"),
+        ({"fingers": 3}, "fingers must be a list"),
+        ({"fingers": [3]}, "fingers must be a list"),
+        ({"fingers": [{"id": 3, "pos": [0, 0, 0]}]}, "no other keys"),
+        ({"fingers": [], "alive": 7}, "alive must be a list"),
+        ({"fingers": [], "alive": ["a"]}, "alive must be a list"),
+        ({"fingers": [], "position": [0, 0, 0]}, "no other keys"),
+    ],
+)
+def test_a_message_that_is_none_is_refused_in_one_line(said: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as caught:
+        read_json(json.dumps({"type": "poses", **said}))
+    assert "\n" not in str(caught.value)
+
+
+def poses(*identities: int, alive: tuple[int, ...] = (), **given: Any) -> Poses:
+    """Return a request with fingers 10 mm apart."""
+    fingers = tuple((one, (0.01 * one, 0.0, 0.05, *LEVEL)) for one in identities)
+    return Poses(fingers, alive or identities, **given)
+
+
+def test_the_first_that_appear_have_the_fingertips_and_33_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    import asyncio
+
+    for fingers, identities, held in ((2, (5, 4, 3), [5, 4]), (32, tuple(range(33)), list(range(32)))):
+        orders, path = make_slot(LAYOUT.size)
+        path.unlink()
+        bed = Bed("", 1, 1, 1.0, 1.0, 1.0, (), fingers=fingers)
+        link = DoorLink(bed, orders, orders, "")
+
+        async def order(link: DoorLink = link, identities: tuple[int, ...] = identities) -> None:
+            link.order(poses(*identities), "me")
+
+        with pytest.raises(FrequentError, match=f"at most {fingers}.*got 1 more"):
+            asyncio.run(order())
+        seen = unpack_order(orders.read() or b"")
+        assert [identity for identity, _ in seen.fingers] == held
+
+
+def test_an_order_keeps_what_is_alive_and_its_bytes_are_read_as_they_were_written() -> None:
+    order, _ = Order().name(poses(1, 2), 2)
+    order, more = order.name(poses(3, alive=(2, 3), number=2**32 - 1), 2)
+    assert ([one for one, _ in order.fingers], more, order.named) == ([2, 3], 0, 2)
+    assert unpack_order(pack_order(order)) == order
+    order, _ = order.name(Poses((), ()), 2)
+    assert order.fingers == ()
+
+
+# From tracked to simulated
+
+
+def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.04) -> Contact:
+    """Return what fingertips feel, all the same."""
+    each = np.ones(len(poses))
+    return Contact(np.array(poses, float), force * each, force * each, stiffness * each, top * each, 5e-4 * each, top)
+
+
+def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]]]:
+    """Return fingers 1, 2, ... at places."""
+    return [(1 + row, (*place, *LEVEL)) for row, place in enumerate(places)]
+
+
+def test_a_finger_that_is_not_named_lifts_after_100_ms_and_its_fingertip_is_free() -> None:
+    simulated, tracks = np.tile([0.0, 0.0, 0.05, *LEVEL], (2, 1)), begin_tracks(np.zeros((2, 7)))
+    tracks = name_fingers(tracks, at((0.0, 0.0, 0.05), (0.02, 0.0, 0.05)))
+    lifted = []
+    for step in range(40):
+        if step in (5, 19):  # 70 ms without are a dropout that nobody feels
+            tracks = name_fingers(tracks, at((0.0, 0.0, 0.05))[:1])
+        tracks, targets = advance(tracks, Tracking(), felt(simulated), 5e-3)
+        lifted.append([bool(z == PARKED) for z in targets[:, 2]])
+    assert [both.index(True) for both in zip(*lifted, strict=True)] == [38, 19]
+    tracks = name_fingers(tracks, [(9, (*PLACE, *LEVEL))])
+    assert tracks.identities.tolist() == [9, -1]
+
+
+EXCHANGED = [
+    ("two change places", (0.0, 0.04), (0.04, 0.0), (2, 1)),
+    ("neighbors change places", (0.0, 0.018), (0.017, 0.001), (2, 1)),
+    ("all go on as they were", (0.0, 0.018), (0.004, 0.022), (1, 2)),
+    ("they meet and part", (0.0, 0.018), (0.008, 0.010), (1, 2)),
+]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "held"), [r[1:] for r in EXCHANGED], ids=[r[0] for r in EXCHANGED]
+)
+@pytest.mark.parametrize("turn", [0.0, 2.0])
+def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(
+    before: Any, after: Any, held: tuple[int, ...], turn: float
+) -> None:
+    way = np.array([math.cos(turn), math.sin(turn), 0.0])
+    start, now = ([tuple(np.array([0, 0, 0.04]) + x * way) for x in xs] for xs in (before, after))
+    poses = np.array([[*place, *LEVEL] for place in start])
+    tracks = name_fingers(begin_tracks(poses), at(*start))
+    tracks = replace(tracks, there=np.ones(2, bool))
+    tracks, targets = advance(name_fingers(tracks, at(*now)), Tracking(), felt(poses), 5e-3)
+    assert tuple(tracks.identities.tolist()) == held
+    assert np.linalg.norm(targets[:, :3] - poses[:, :3], axis=1).max() < 0.011  # of what each has moved
+
+
+def test_a_finger_that_is_elsewhere_all_at_once_rises_before_it_goes_there() -> None:
+    here, there = np.array([[0.0, 0.0, 0.038, *LEVEL]]), (0.03, 0.0, 0.038)
+    tracks = replace(name_fingers(begin_tracks(here), at((0.0, 0.0, 0.038))), there=np.ones(1, bool))
+    tracks, targets = advance(name_fingers(tracks, at(there)), Tracking(), felt(here), 5e-3)
+    assert targets[0, :3].tolist() == [0.0, 0.0, PARKED]
+    high = here + np.eye(7)[2] * 0.01
+    assert advance(tracks, Tracking(), felt(high), 5e-3)[1][0, :3].tolist() == list(there)
+
+
+@pytest.mark.parametrize("bias", [-0.011, 0.0, 0.011, 1.06])
+def test_a_clutch_takes_away_any_bias_of_height_and_slips_where_the_hand_is_raised(bias: float) -> None:
+    tracks, heights = begin_tracks(np.array([[0.0, 0.0, PARKED, *LEVEL]])), []
+    for height in (0.060, 0.055, 0.045, 0.070, 0.060):
+        tracks = name_fingers(tracks, at((0.0, 0.0, height + bias)))
+        tracks, targets = advance(tracks, Tracking(clutch=0.01), felt([[0, 0, 1.0, *LEVEL]]), 5e-3)
+        heights.append(float(targets[0, 2]))
+    assert heights == pytest.approx([0.05, 0.045, 0.035, 0.05, 0.04], abs=1e-12)
+
+
+def filtered(signal: Callable[[float], float], cutoff: float, seconds: float, step: float) -> np.ndarray:
+    """Return what the 1-euro filter makes of a height over time."""
+    tracks, found = begin_tracks(np.zeros((1, 7))), []
+    for time in np.arange(0.0, seconds, step):
+        tracks = name_fingers(tracks, at((0.0, 0.0, signal(time))))
+        tracks, targets = advance(tracks, Tracking(cutoff=cutoff), felt([[0, 0, 1.0, *LEVEL]]), step)
+        found.append(targets[0, 2])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("step", [1e-3, 5e-3])
+def test_the_filter_calms_a_trembling_hand_and_follows_a_quick_one(step: float) -> None:
+    still = filtered(lambda _: 0.05, 1.0, 0.5, step)
+    assert np.ptp(still) == 0.0
+    # A tremor of 0.1 mm at 10 Hz, of 4 mm/s, raises the cutoff of 1 Hz by 0.1 Hz at most: a tenth passes.
+    tremor = filtered(lambda time: 0.05 + 1e-4 * math.sin(20.0 * math.pi * time), 1.0, 4.0, step)[-int(1.0 / step) :]
+    assert 0.08 < np.ptp(tremor) / 2e-4 < 0.13
+    # A hand at 0.1 m/s has a cutoff of 3 Hz: it is followed by 1 / (2 pi 3 Hz), 53 ms.
+    ramp = filtered(lambda time: 0.1 * time, 1.0, 4.0, step)
+    assert 0.1 * (4.0 - step) - ramp[-1] == pytest.approx(0.1 / (2.0 * math.pi * 3.0), rel=0.02)
+
+
+def test_a_turn_and_its_negative_are_one_to_the_filter() -> None:
+    turn = np.array([0.8, 0.0, 0.0, 0.6])
+    tracks = name_fingers(begin_tracks(np.zeros((1, 7))), [(1, (*PLACE, *turn))])
+    tracks = name_fingers(tracks, [(1, (*PLACE, *-turn))])
+    _, targets = advance(tracks, Tracking(cutoff=1.0), felt([[0, 0, 1.0, *LEVEL]]), 5e-3)
+    np.testing.assert_allclose(targets[0, 3:], turn, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("deep", [1e-4, 1e-3, 5e-3, 20e-3])
+@pytest.mark.parametrize("far", [1.0, 4.0])
+def test_the_coupling_comes_to_its_balance_from_any_force(deep: float, far: float) -> None:
+    exponent, unit, spring = 2000.0, 0.5, 100.0  # of the whole fingertip's force, N; N/m
+
+    def press(height: float) -> float:
+        return unit * math.expm1(exponent * max(0.04 - height, 0.0))
+
+    height, forces = 0.04 - deep, []
+    for _ in range(200):
+        force = press(height)
+        forces.append(force)
+        # The stiffness that is foretold is up to four times too large: relaxed pulp.
+        contact = felt([[0, 0, height, *LEVEL]], force, far * exponent * (force + unit))
+        height = float(give_way(np.array([0.03]), contact, spring)[0])
+    balance = press(height)
+    assert max(forces[1:]) <= max(forces[0], 1.3 * balance)  # what it swings over when it lands
+    assert spring * (height - 0.03) == pytest.approx(balance, rel=1e-3)
+
+
+def test_a_coupled_fingertip_lands_a_growth_of_force_deep_at_most() -> None:
+    contact = felt([[0, 0, 0.041, *LEVEL]])
+    assert give_way(np.array([0.03]), contact, 100.0).tolist() == [0.0395]
+
+
+# Lines of a Quest
+
+WRIST = "0.2502, 1.0635, 0.2540, 0.194, -0.116, 0.094, -0.970"
+JOINTS = np.linspace(-0.05, 0.13, 63).round(4).reshape(21, 3)
+JOINTS[[4, 8, 12, 16, 20], 0] = [-0.033, -0.012, 0.010, 0.028, 0.048]
+
+
+def lines(side: str = "Right", wrist: str = WRIST, joints: Any = JOINTS, meta: str = "") -> bytes:
+    """Return a packet as Hand Tracking Streamer writes it."""
+    numbers = ", ".join(f"{value:.4f}" for value in np.ravel(joints))
+    return f"{side} wrist{meta}:, {wrist}\n{side} landmarks{meta}:, {numbers}".encode()
+
+
+def tips(*packets: bytes) -> np.ndarray:
+    """Return the fingertips that packets show."""
+    hands = Hands(0.04)
+    for packet in packets:
+        hands = hands.take(packet, 1.0)
+    return np.array(list(hands.fingers(1.0).values()))
+
+
+def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_room() -> None:
+    found = tips(lines())
+    np.testing.assert_allclose(found[:, :2].mean(0), 0.0, atol=1e-12)
+    assert found[:, 2].min() == pytest.approx(0.06)
+    np.testing.assert_allclose(tips(lines(wrist="1.2502, 0.0635, -0.746" + WRIST[22:])), found, atol=1e-12)
+    # A hand that is not turned: Unity's x, z, y are the bed's x, y, z.
+    plain = tips(lines(wrist="0, 0, 0, 0, 0, 0, 1"))
+    np.testing.assert_allclose(
+        np.diff(plain, axis=0), np.diff(JOINTS[[4, 8, 12, 16, 20]], axis=0)[:, [0, 2, 1]]
+    )
+    # Turned by 90 degrees about Unity's y, clockwise from above, its fingers point to the right.
+    turned = tips(lines(wrist="0, 0, 0, 0, 0.7071, 0, 0.7071"))
+    np.testing.assert_allclose(turned[:, :2], plain[:, [1, 0]] * [1.0, -1.0], atol=1e-4)
+    assert list(Hands(0.04).take(lines(meta=" | f = 12 | t = 123456"), 1.0).fingers(1.0)) == [5, 6, 7, 8, 9]
+
+
+def test_the_left_hand_is_the_mirrored_right_one() -> None:
+    x, y, z, a, b, c, w = (float(word) for word in WRIST.split(","))
+    mirrored = lines("Left", ", ".join(map(str, (-x, y, z, a, -b, -c, w))), JOINTS * [-1.0, 1.0, 1.0])
+    np.testing.assert_allclose(tips(mirrored), tips(lines()) * [-1.0, 1.0, 1.0], atol=1e-12)
+    assert list(Hands(0.04).take(mirrored, 1.0).take(lines(), 1.0).fingers(1.0)) == list(range(10))
+
+
+def test_a_hand_is_gone_after_100_ms_and_after_a_second_begins_over_the_middle_again() -> None:
+    hands = Hands(0.04).take(lines(), 1.0)
+    assert len(hands.fingers(1.09)) == 5
+    assert hands.fingers(1.11) == {}
+    aside = "0.3502" + WRIST[6:]
+    soon, late = (
+        hands.take(lines(wrist=aside), 1.9).fingers(1.9),
+        hands.take(lines(wrist=aside), 2.1).fingers(2.1),
+    )
+    assert np.mean([tip[0] for tip in soon.values()]) == pytest.approx(0.1)
+    assert np.mean([tip[0] for tip in late.values()]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("packet", "message"),
+    [
+        (b"Right wrist:, 0,2502, 1,0635, 0,2540, 0,194, -0,116, 0,094, -0,970", "decimal points"),
+        (b"Right wrist:, nan, 1, 1, 0, 0, 0, 1", "must be 7 numbers"),
+        (b"Right wrist:, 1e300, 1, 1, 0, 0, 0, 1", "must be 7 numbers"),
+        (b"Right wrist:", "must be 7 numbers"),
+        (b"Right wrist:, a, b, c, d, e, f, g", "must be 7 numbers"),
+        (lines()[:-8], "must be 63 numbers"),
+        (b"Left landmarks:, 1, 2, 3", "must be 63 numbers"),
+    ],
+)
+def test_a_hostile_line_is_refused_in_one_line(packet: bytes, message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as caught:
+        Hands(0.04).take(packet, 1.0)
+    assert "\n" not in str(caught.value)
+
+
+def test_other_lines_are_passed_over_and_a_hand_that_is_not_turned_at_all_does_no_harm() -> None:
+    others = [
+        b"",
+        b"\xff\xfe",
+        b"Head pose:, 1, 2",
+        b":::",
+        lines().split(b"\n")[1],
+        b"\n\n",
+        b"wrist right:, 1",
+    ]
+    assert [len(Hands(0.04).take(packet, 1.0).fingers(1.0)) for packet in others] == [0] * len(others)
+    assert np.isfinite(tips(lines(wrist="0, 0, 0, 0, 0, 0, 0"))).all()
+
+
+# Touch pads
+
+
+def bundle(*messages: bytes) -> bytes:
+    """Return messages as one datagram."""
+    from pythonosc.osc_message import OscMessage
+
+    builder = OscBundleBuilder(IMMEDIATELY)
+    for message in messages:
+        builder.add_content(OscMessage(message))
+    return bytes(builder.build().dgram)
+
+
+def touch(*fingers: tuple[int, float, float]) -> bytes:
+    """Return a frame of TUIO 1.1."""
+    alive = osc("/tuio/2Dcur", "alive", *(one for one, *_ in fingers))
+    sets = [osc("/tuio/2Dcur", "set", one, x, y, 0.0, 0.0, 0.0) for one, x, y in fingers]
+    return bundle(alive, *sets, osc("/tuio/2Dcur", "fseq", 7))
+
+
+def point(*fingers: tuple[int, float, float, float]) -> bytes:
+    """Return a frame of TUIO 2.0 with pressure."""
+    pointers = [
+        osc("/tuio2/ptr", one, 1, 0, x, y, 0.0, 0.0, 0.01, pressure) for one, x, y, pressure in fingers
+    ]
+    ends = (
+        osc("/tuio2/alv", *(one for one, *_ in fingers))
+        if fingers
+        else OscMessageBuilder("/tuio2/alv").build().dgram
+    )
+    return bundle(osc("/tuio2/frm", 1, 0, 0, "me"), *pointers, ends)
+
+
+PAD = Pad(0.04, 0.08, 0.01)
+
+
+def test_a_pads_corners_are_the_beds_and_pressure_is_depth() -> None:
+    old = PAD.take(touch((4, 0.0, 0.0), (5, 1.0, 0.25)), 1.0).fingers(1.0)
+    assert {one: tip.tolist() for one, tip in old.items()} == {
+        4: pytest.approx([-0.04, 0.04, 0.035]),
+        5: pytest.approx([0.04, 0.02, 0.035]),
+    }
+    new = PAD.take(point((4, 0.5, 1.0, 1.0), (5, 0.0, 0.0, 0.25), (6, 0.0, 0.0, 0.0)), 1.0).fingers(1.0)
+    assert {one: tip.tolist() for one, tip in new.items()} == {
+        4: pytest.approx([0.0, -0.04, 0.03]),
+        5: pytest.approx([-0.04, 0.04, 0.0375]),
+        6: pytest.approx([-0.04, 0.04, 0.035]),  # it has no pressure: half
+    }
+
+
+def test_a_contact_that_rests_stays_and_ends_with_the_list_of_those_alive() -> None:
+    pad = PAD.take(touch((4, 0.5, 0.5), (5, 0.6, 0.5)), 1.0)
+    pad = pad.take(bundle(osc("/tuio/2Dcur", "alive", 5)), 1.5)
+    assert list(pad.fingers(1.6)) == [5]
+    assert pad.fingers(2.71) == {}
+    assert PAD.take(point((4, 0.5, 0.5, 0.5)), 1.0).take(point(), 1.1).fingers(1.1) == {}
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"", b"\xff" * 50, touch((4, 0.5, 0.5))[:-3], touch((4, math.nan, 0.5)), osc("/tuio2/alv", "a"),
+        point((4, 0.5, 0.5, math.inf)), osc("/tuio/2Dcur", "set", 4), osc("/tuio2/ptr", 4, 1, 0, 0.5),
+        osc("/tuio/2Dcur", "set", "a", 0.1, 0.1), osc("/tuio/2Dcur", "set", 4, "x", "y"),
+        bundle(*[osc("/tuio/2Dcur", "set", one, 0.5, 0.5) for one in range(300)]),
+    ],
+)  # fmt: skip
+def test_a_datagram_that_is_none_is_refused_and_changes_nothing(data: bytes) -> None:
+    with pytest.raises(ParameterError, match=r"must be TUIO"):
+        PAD.take(data, 1.0)
+
+
+def test_a_pad_beyond_its_corners_stays_on_the_bed() -> None:
+    assert PAD.take(touch((-1, 7.0, -7.0)), 1.0).fingers(1.0)[2**32 - 1].tolist() == [0.04, 0.04, 0.035]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--token short", "--token must have 8 to 128"),
+        ("", "needs the token of the server"),
+        ("--from quest --token=a-token-of-tests", "invalid choice"),
+        ("--to http://x:1 --token=a-token-of-tests --play empty", "--to must be ws://HOST:PORT"),
+        ("--to ws://x:1:2 --token=a-token-of-tests --play empty", "--to must be ws://HOST:PORT"),
+        ("--to ws://127.0.0.1:1 --token=a-token-of-tests --play empty", "has ended"),
+        ("--play missing --token=a-token-of-tests", "must be a recording"),
+        ("--play bad --token=a-token-of-tests", "must be a recording"),
+        ("--play nan --token=a-token-of-tests", "must be a recording"),
+        ("--record bad --token=a-token-of-tests", "File exists: bad"),
+    ],
+)
+def test_a_wrong_option_of_hands_is_refused_in_one_line(
+    words: str, message: str, here: Path, refused: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DIGICLAY_SERVE_TOKEN", raising=False)
+    for name, text in (("empty", ""), ("bad", "[1]\n"), ("nan", '[NaN, "a"]\n')):
+        (here / name).write_text(text, encoding="utf-8")
+    refused(["hands", *words.split()], message)
