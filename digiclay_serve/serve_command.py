@@ -23,7 +23,7 @@ from .doors import Doors
 from .protocol import LIMITS, MOST_FINGERS, VARIABLE, Limits, choose_token, describe_bed, pack_frame
 from .real_time_loop import run_session
 from .served_session import PartWriter, begin_session, make_frame
-from .tracking import Tracking
+from .tracked_fingers import Tracking
 
 EXAMPLES = f"""\
 examples:

@@ -37,7 +37,17 @@ from digiclay.core.session.take import Take, from_bytes, to_bytes
 
 from .doors import Order
 from .protocol import LIMITS, Flag, Frame, Limits
-from .tracking import CLEAR, PARKED, TRACKING, Contact, Tracking, Tracks, advance, begin_tracks, name_fingers
+from .tracked_fingers import (
+    CLEAR,
+    PARKED,
+    TRACKING,
+    Contact,
+    Tracking,
+    Tracks,
+    advance,
+    begin_tracks,
+    name_fingers,
+)
 
 #: Time between two states that are kept for a session that diverges, s.
 KEEP = 0.5

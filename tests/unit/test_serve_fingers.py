@@ -20,7 +20,15 @@ from digiclay_serve.doors import LAYOUT, Order, make_slot, pack_order, unpack_or
 from digiclay_serve.hts import Hands
 from digiclay_serve.osc_door import read_osc, read_request
 from digiclay_serve.protocol import Bed, Poses, check_fingers, pack_poses, read_binary, read_json
-from digiclay_serve.tracking import PARKED, Contact, Tracking, advance, begin_tracks, give_way, name_fingers
+from digiclay_serve.tracked_fingers import (
+    PARKED,
+    Contact,
+    Tracking,
+    advance,
+    begin_tracks,
+    give_way,
+    name_fingers,
+)
 from digiclay_serve.tuio import Pad
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -132,7 +140,9 @@ def test_an_order_keeps_what_is_alive_and_its_bytes_are_read_as_they_were_writte
 def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.04) -> Contact:
     """Return what fingertips feel, all the same."""
     each = np.ones(len(poses))
-    return Contact(np.array(poses, float), force * each, force * each, stiffness * each, top * each, 5e-4 * each, top)
+    return Contact(
+        np.array(poses, float), force * each, force * each, stiffness * each, top * each, 5e-4 * each, top
+    )
 
 
 def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]]]:
@@ -213,7 +223,9 @@ def test_the_filter_calms_a_trembling_hand_and_follows_a_quick_one(step: float) 
     still = filtered(lambda _: 0.05, 1.0, 0.5, step)
     assert np.ptp(still) == 0.0
     # A tremor of 0.1 mm at 10 Hz, of 4 mm/s, raises the cutoff of 1 Hz by 0.1 Hz at most: a tenth passes.
-    tremor = filtered(lambda time: 0.05 + 1e-4 * math.sin(20.0 * math.pi * time), 1.0, 4.0, step)[-int(1.0 / step) :]
+    tremor = filtered(lambda time: 0.05 + 1e-4 * math.sin(20.0 * math.pi * time), 1.0, 4.0, step)[
+        -int(1.0 / step) :
+    ]
     assert 0.08 < np.ptp(tremor) / 2e-4 < 0.13
     # A hand at 0.1 m/s has a cutoff of 3 Hz: it is followed by 1 / (2 pi 3 Hz), 53 ms.
     ramp = filtered(lambda time: 0.1 * time, 1.0, 4.0, step)

@@ -1,4 +1,4 @@
-"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve``, ``hands``, ``compare --suite``.
+"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve``, ``hands``; its suite.
 
 They are in packages beside this one, where those are installed. ``digiclay benchmark`` says where the
 benchmarks are.
