@@ -32,7 +32,6 @@ from digiclay.live import tick
 from digiclay.operators.add_bed import add, select_only
 from digiclay.panels import display
 from digiclay.plots.figure import INK
-from digiclay.roles import fingertip_of
 from digiclay.sessions import running, sculpting
 from digiclay.sessions.sculpting import INTERVAL, change_stroke, queue_stroke
 from digiclay.settings import devices, properties
@@ -139,7 +138,7 @@ def _time_parts() -> Iterator[defaultdict[str, float]]:
             (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"),
             (accuracy, "note", "monitor"), (accuracy, "catch_up", "monitor"),
             (accuracy, "begin_stretch", "monitor"), (snapshot, "dump", "pack"),
-            (tick, "_move_finger", "finger"), (tick, "_evaluate", "evaluate"), (live_beds, "write", "store"),
+            (tick, "_move_fingers", "finger"), (tick, "_evaluate", "evaluate"), (live_beds, "write", "store"),
             (view, "show_state", "show"),
         ):  # fmt: skip
             timed = partial(add_time, part, getattr(module, name))
@@ -366,7 +365,7 @@ def measure_bed(rows: int, columns: int, ticks: int) -> dict[str, float]:
         down = min(count / (0.8 * WARM_UP), 1.0) * (PRESSED + 2e-3)
         height = scene.actuator.rest_height + 2e-3 - down
         pose = np.array([CIRCLE * np.cos(turn), CIRCLE * np.sin(turn), height, 1.0, 0.0, 0.0, 0.0])
-        bridge.place_fingertip(fingertip_of(bed), pose, find_ellipsoid(scene))
+        bridge.place_fingertips(bed, pose[None], [find_ellipsoid(scene)])
         bpy.context.view_layer.update()
 
     with open_session(make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master")) as bed:

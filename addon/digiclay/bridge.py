@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from .compat import bpy
 from .core.base.arrays import Floats
 from .core.base.errors import DigiclayError
-from .core.model.fingertip import Fingertip
-from .roles import ELLIPSOID, ROLE
+from .core.model.fingertip import LEVEL, Fingertip, make_matrices
+from .roles import ELLIPSOID, PALM, ROLE, fingertips_of, owner_of
 from .ui_text import localize
 
 #: Blender units per meter of the device: a millimeter is drawn as a hundredth of a unit,
@@ -25,6 +25,8 @@ UNEVEN = 1e-3
 #: A bed scaled to less than this can be neither seen nor inverted.
 SMALLEST_SCALE = 1e-6
 
+#: Matrices of fingertips that differ by less, in Blender units, stand alike on a palm: they are float32.
+STRAY = 1e-4
 #: Where an empty keeps the semi-axes of its finger, m.
 AXES = "digiclay_axes"
 
@@ -96,19 +98,54 @@ def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
     return cells
 
 
-def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
-    """Put the fingertip to a pose (7,), and give its ellipsoid its size."""
-    move_fingertip(tip, at, finger)
-    resize_fingertip(tip, finger)
+def place_fingertips(bed: Any, poses: Floats, fingers: Sequence[Fingertip]) -> None:
+    """Put the fingertips of a bed to poses (f, 7), in order, and give their ellipsoids their sizes."""
+    for tip, finger in zip(fingertips_of(bed).values(), fingers, strict=False):
+        resize_fingertip(tip, finger)
+    move_fingertips(bed, poses, fingers)
+
+
+def move_fingertips(bed: Any, poses: Floats, fingers: Sequence[Fingertip]) -> None:
+    """Put fingertips of a bed to poses (f, 7); a palm whose fingertips keep their places goes along."""
+    hands: dict[Any, list[tuple[Any, Floats]]] = {}
+    for tip, at, finger in zip(fingertips_of(bed).values(), poses, fingers, strict=False):
+        if tip.parent == bed:
+            move_fingertip(tip, at, finger)
+        else:
+            hands.setdefault(tip.parent, []).append((tip, _place(at, finger)))
+    whole = np.array(bed.matrix_world)
+    for palm, tips in hands.items():
+        stood = np.array(palm.matrix_world)
+        if palm.get(ROLE) == PALM:
+            ways = [whole @ place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
+            stood = ways[0] @ stood if np.ptp(ways, axis=0).max() < STRAY else stood
+            above = palm.parent.matrix_world @ palm.matrix_parent_inverse
+            _set_basis(palm, np.linalg.pinv(above) @ stood)
+        for tip, place in tips:
+            tip.matrix_parent_inverse.identity()
+            _set_basis(tip, np.linalg.pinv(stood) @ whole @ place)
+
+
+def _set_basis(thing: Any, matrix: Floats) -> None:
+    """Set location, rotation and scale of an object by a matrix (4, 4)."""
+    thing.matrix_basis = type(thing.matrix_basis)(matrix.tolist())
 
 
 def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
-    """Put the fingertip to a pose (7,), lowest point, m, and quaternion; its ellipsoid's size stays."""
+    """Put a fingertip that hangs on its bed to a pose (7,), lowest point, m, and quaternion."""
     tip.matrix_parent_inverse.identity()
     tip.rotation_mode = "QUATERNION"
     tip.rotation_quaternion = at[3:]
     tip.location = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
     tip.scale = (1.0, 1.0, 1.0)
+
+
+def _place(at: Floats, finger: Fingertip) -> Floats:
+    """Return the matrix (4, 4) of a fingertip at a pose (7,) in the space of its bed."""
+    place = np.eye(4)
+    place[:3, :3] = make_matrices(at[None, 3:])[0]
+    place[:3, 3] = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
+    return place
 
 
 def resize_fingertip(tip: Any, finger: Fingertip) -> None:
@@ -128,15 +165,29 @@ def finger_of(tip: Any) -> Fingertip:
 
 def pose(tip: Any) -> Floats:
     """Return the pose (7,) of a fingertip in its bed's space: lowest point, m, and quaternion."""
-    bed = tip.parent
+    (found,) = _read_poses(owner_of(tip), [tip])
+    return np.asarray(found)
+
+
+def poses(bed: Any) -> Floats:
+    """Return the poses (f, 7) of the fingertips of a bed, in order; without any that of one at its origin."""
+    tips = list(fingertips_of(bed).values())
+    return _read_poses(bed, tips) if tips else np.array([[0.0, 0.0, 0.0, *LEVEL]])
+
+
+def _read_poses(bed: Any, tips: Sequence[Any]) -> Floats:
+    """Return the poses (f, 7) of fingertips in the space of their bed."""
     uniform(bed)
-    # The world's matrix is live while the user drags the fingertip by whatever means.
-    local = bed.matrix_world.inverted() @ tip.matrix_world
-    center, turn, _ = local.decompose()
-    quaternion = np.array(turn.normalized())
-    # The center of a finger whose lowest point is the origin, taken away again.
-    above = finger_of(tip).outline(np.array([[0.0, 0.0, 0.0, *quaternion]]))[0, :3]
-    return np.array([*(np.array(center) / SCALE - above), *quaternion])
+    inverse, found = bed.matrix_world.inverted(), np.empty((len(tips), 7))
+    for row, tip in zip(found, tips, strict=True):
+        # The world's matrix is live while the user drags the fingertip by whatever means.
+        center, turn, _ = (inverse @ tip.matrix_world).decompose()
+        row[:3], row[3:] = center, turn.normalized()
+    turns, squares = make_matrices(found[:, 3:]), np.array([tip[AXES] for tip in tips]) ** 2
+    # How the center is above the lowest point: as in `Fingertip.outline`.
+    above = np.einsum("fij,fj,fj->fi", turns, squares, turns[:, 2])
+    found[:, :3] = found[:, :3] / SCALE - above / np.sqrt(above[:, 2:])
+    return found
 
 
 def uniform(bed: Any) -> float:

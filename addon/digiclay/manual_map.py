@@ -16,6 +16,8 @@ ENTRIES = (
     ("bpy.ops.mesh.digital_clay_make", "#export"),
     ("bpy.ops.export_mesh.digital_clay", "#export"),
     ("bpy.ops.import_scene.digital_clay_run", ""),
+    ("bpy.ops.digiclay.add_fingertip", "#several-fingertips"),
+    ("bpy.ops.digiclay.add_hand", "#several-fingertips"),
     ("bpy.ops.digiclay.session", "#first-ridge"),
     ("bpy.ops.digiclay.session_go_on", "#first-ridge"),
     ("bpy.ops.digiclay.session_*", "#keys"),

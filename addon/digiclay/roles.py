@@ -1,16 +1,24 @@
-"""Roles of Blender's objects: which is a bed, its fingertip, the ellipsoid in that, or another part."""
+"""Roles of Blender's objects: which is a bed, a fingertip of it, the ellipsoid in that, or another part."""
 
 from __future__ import annotations
 
 from typing import Any
+
+from .core.model.fingers import MOST_FINGERS
 
 #: Property that holds an object's role.
 ROLE = "digiclay_role"
 #: A housing is an object of its own in older files only. A pin is whatever the bed's nodes draw, and a bake
 #: holds baked pins: both stand in no scene.
 BED, FINGERTIP, ELLIPSOID, HOUSING, PIN, BAKE = "bed", "fingertip", "ellipsoid", "housing", "pin", "bake"
+#: The empty between a bed and the fingertips of a hand, which moves them as one.
+PALM = "palm"
 #: Properties by which a bed holds its fingertip, and that its ellipsoid: what is held is appended along.
 FINGER, BALL = "digiclay_fingertip", "digiclay_ellipsoid"
+#: Property by which a fingertip holds its palm, so that one that is deleted is still known.
+HAND = "digiclay_hand"
+#: Those by which beds and palms hold their fingertips, by number, from 1 on.
+FINGERS = (FINGER, *(f"{FINGER}_{number}" for number in range(2, MOST_FINGERS + 1)))
 #: Marks what was seen to belong to a bed: only that can be left behind by one. What older files have lying
 #: about without a bed stays.
 OWNED = "digiclay_owned"
@@ -40,9 +48,15 @@ def is_linked(thing: Any) -> bool:
     return bool(thing.users_collection)
 
 
+def fingertips_of(bed: Any) -> dict[int, Any]:
+    """Return the fingertips that belong to a bed, by number; not those that the user has deleted."""
+    parts = ((number, _part(bed, name, FINGERTIP)) for number, name in enumerate(FINGERS, 1))
+    return {number: part for number, part in parts if part is not None}
+
+
 def fingertip_of(bed: Any) -> Any | None:
-    """Return the fingertip that belongs to a bed, or None when the user has deleted it."""
-    return _part(bed, FINGER, FINGERTIP)
+    """Return the first fingertip that belongs to a bed, or None when the user has deleted all of them."""
+    return next(iter(fingertips_of(bed).values()), None)
 
 
 def ellipsoid(tip: Any) -> Any | None:
@@ -50,9 +64,17 @@ def ellipsoid(tip: Any) -> Any | None:
     return _part(tip, BALL, ELLIPSOID)
 
 
+def owner_of(part: Any, role: str = BED) -> Any | None:
+    """Return the nearest object of a role above one; None without, or if a palm between is deleted."""
+    above = part.parent
+    while above is not None and above.get(ROLE) != role:
+        above = None if above.get(ROLE) == PALM and not is_linked(above) else above.parent
+    return above
+
+
 def _part(owner: Any, name: str, role: str) -> Any | None:
-    """Return the part that an object holds as a property, if it still is its child in a collection."""
+    """Return the part that an object holds as a property, if it still is below it and in a collection."""
     part = owner.get(name)
-    if part is None:  # older files do not have it as a property
+    if name in (FINGER, BALL) and name not in owner:  # older files do not have it as a property
         part = next((child for child in owner.children if child.get(ROLE) == role), None)
-    return part if part is not None and part.parent == owner and is_linked(part) else None
+    return part if part is not None and owner_of(part, owner[ROLE]) == owner and is_linked(part) else None

@@ -91,7 +91,7 @@ def test_the_take_replays_to_the_stored_heights() -> None:
 def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip() -> None:
     found = bed("Session")
     pose = bridge.pose(fingertip_of(found))
-    np.testing.assert_allclose(pose, beds.read_pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits
+    np.testing.assert_allclose(pose, beds.read_poses(found)[0], rtol=0, atol=1e-6)  # Blender's 32 bits
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
     assert beds.read_snapshot(found) is None
     assert (exact(found) == 40e-3).all()

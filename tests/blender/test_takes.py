@@ -82,7 +82,7 @@ def baked(bed: Any, take: Take, first: int = 1) -> bake.BakedFrames:
     """Bake a take into a bed."""
     *_, moments = bake.simulate_frames(take, 40.0)
     assert isinstance(moments, bake.BakedFrames)
-    bake.apply(bed, moments, first, Fingertip(), keyframe_finger=True)
+    bake.apply(bed, moments, first, [Fingertip()], keyframe_fingers=True)
     return moments
 
 
@@ -193,7 +193,7 @@ def test_a_bake_plays_without_the_extension(bed: Any, tmp_path: Path) -> None:
 
 def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
     tip = fingertip_of(bed)
-    bridge.place_fingertip(tip, np.array([0.0, 0.0, 45e-3, *LEVEL]), Fingertip())
+    bridge.place_fingertips(bed, np.array([[0.0, 0.0, 45e-3, *LEVEL]]), [Fingertip()])
     tip.keyframe_insert("location", frame=1)
     tip.location.z -= 8e-3 * bridge.SCALE
     tip.keyframe_insert("location", frame=21)

@@ -36,7 +36,7 @@ def still(bed: Any) -> bake.BakedFrames:
 def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_path: Path, how: str) -> None:
     bed = added()
     if how == "append baked":
-        bake.apply(bed, still(bed), 1, Fingertip(), keyframe_finger=False)
+        bake.apply(bed, still(bed), 1, [Fingertip()], keyframe_fingers=False)
     at = bridge.pose(fingertip_of(bed))
     name = bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))

@@ -70,6 +70,16 @@ WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
              "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister"),
         ("N: beyond",),
     ),
+    "several fingertips": (
+        {"fingers": ((1, DARK), (4, LIGHT)), "finger_force": np.full((1001, 2), [1.9, 0.25]),
+         "force": np.full(1001, 2.15)},
+        ("Total force  2.15 N | set point 0.40 N each", "1: 1.90 N | 4: 0.25 N"), ("N: beyond",),
+    ),
+    "one of several that presses beyond its model": (
+        {"fingers": ((1, DARK), (4, LIGHT)), "finger_force": np.full((1001, 2), [2.5, 0.0]),
+         "force": np.full(1001, 2.5)},
+        ("Total force  2.5 N: beyond 2 N",), (),
+    ),
     "beyond its model": ({"beyond": True}, ("N: beyond 3 mm",), ("Force on a pin",)),
     "the colors of the force while pins wear them": ({"top": 0.2}, ("Force on a pin | 0 N | 0.2 N",), ()),
     "a hard knock, which does not flatten the force": ({"force": KNOCK}, (" | 2 N | ",), ()),
@@ -146,6 +156,17 @@ def test_in_short_it_has_two_rows(changes: dict[str, object], rows: str) -> None
     picture = lay_out(session(**changes), choose_colors(DARK, LIGHT), ROOM, 1.0, COMPACT, "top_left")
     assert said(picture) == rows
     assert picture.boxes[0].height < 60.0
+
+
+def test_in_short_several_fingertips_stand_two_in_a_row_below_and_none_over_another() -> None:
+    told = session(
+        fingers=tuple((number, LIGHT) for number in (1, 2, 31)), finger_force=np.full((1001, 3), 0.4)
+    )
+    picture = lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0, COMPACT, "top_left")
+    assert said(picture).endswith("1: 0.40 N | 2: 0.40 N | 31: 0.40 N")
+    assert 80.0 < picture.boxes[0].height < 100.0
+    one, two, three = [(words.x, words.y) for words in picture.words[-3:]]
+    assert (one[1] == two[1] > three[1], two[0] - one[0] > 70.0, one[0] == three[0]) == (True, True, True)
 
 
 def test_a_curve_shows_the_window_alone_and_nothing_that_is_no_number() -> None:

@@ -48,7 +48,7 @@ def put_spikes(blender: Any) -> None:
     pose[2] = 0.08
     back = blender.part("sessions.sculpting").restore(session, kept, pose)
     blender.part("live.tick").show(blender.beds()[0], back)
-    blender.part("live.tick").place_finger(bpy.context, blender.beds()[0], back)
+    blender.part("live.tick").place_fingers(bpy.context, blender.beds()[0], back)
     blender.call(bpy.ops.ed.undo_push, message="Spikes")
 
 

@@ -134,9 +134,9 @@ def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
 
 def sizes(scene: Scene) -> dict[str, Any]:
     """Return the sizes of the device for drawing."""
-    from ..device.instant import find_ellipsoid
+    from ..device.instant import find_ellipsoids
 
-    return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoid(scene)}
+    return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoids(scene)}
 
 
 def draw_still(scene: Scene, history: History, looks: Still, out: Path, row: int | None = None) -> Path:

@@ -14,7 +14,7 @@ from ..core.base.arrays import Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.model.actuator import Actuator
-from ..core.model.fingertip import LEVEL, Fingertip, require_one
+from ..core.model.fingertip import LEVEL, Fingertip
 from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import Scene
 from ..core.session import finished_run
@@ -39,22 +39,25 @@ class Instant:
     mode: Codes
     #: (n,), on each pin, N, pressing down is positive.
     force: Floats
-    #: (7,), lowest point of the fingertip, m, and its orientation as a quaternion w, x, y, z.
+    #: (7,), or (f, 7) of several: lowest point of the fingertip, m, and its orientation, w, x, y, z.
     fingertip: Floats
     #: Distance between neighboring pins, m.
     pitch: float = Layout().pitch
     #: Gives the pins' thickness (bore), stroke and rest height.
     actuator: Actuator = field(default_factory=Actuator)
-    #: Gives the fingertip's semi-axes.
-    finger: Fingertip = field(default_factory=Fingertip)
+    #: Gives the semi-axes of the fingertip, or of each.
+    finger: Fingertip | tuple[Fingertip, ...] = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
         count = len(self.position)
-        shapes = {"position": (count, 2), "fingertip": (7,)}
+        poses = (len(self.finger), 7) if isinstance(self.finger, tuple) and len(self.finger) > 1 else (7,)
+        shapes = {"position": (count, 2), "fingertip": poses}
         for name in ARRAYS:
             shape = shapes.get(name, (count,))
             kind = np.int8 if name == "mode" else np.float64
             array = np.array(getattr(self, name), kind)
+            if name == "fingertip" and array.shape == (1, 7):
+                array = array[0]
             if array.shape != shape or not count:
                 raise OutputError(f"{name} must be an array of the shape {shape} (got {array.shape}).")
             if not np.isfinite(array).all():
@@ -79,17 +82,28 @@ class Instant:
 
     @classmethod
     def at_rest(
-        cls, layout: Layout, actuator: Actuator | None = None, finger: Fingertip | None = None
-    ) -> Instant:
-        """Return a bed nobody has touched yet, the fingertip above its center."""
+        cls, layout: Layout, actuator: Actuator | None = None,
+        finger: Fingertip | tuple[Fingertip, ...] | None = None,
+    ) -> Instant:  # fmt: skip
+        """Return a bed nobody has touched yet, the fingertips above its center."""
         actuator, finger = actuator or Actuator(), finger or Fingertip()
         bed = make_grid(layout)
-        rest = actuator.rest_height
+        rest, count = actuator.rest_height, len(finger) if isinstance(finger, tuple) else 1
         return cls(
             bed.positions, np.full(bed.count, rest), np.full(bed.count, Mode.REST, np.int8),
-            np.zeros(bed.count), np.array([0.0, 0.0, rest + CLEARANCE, *LEVEL]), layout.pitch, actuator,
-            finger,
+            np.zeros(bed.count), np.tile([0.0, 0.0, rest + CLEARANCE, *LEVEL], (count, 1)), layout.pitch,
+            actuator, finger,
         )  # fmt: skip
+
+    @property
+    def fingertips(self) -> Floats:
+        """Poses (f, 7) of the fingertips."""
+        return self.fingertip.reshape(-1, 7)
+
+    @property
+    def fingers(self) -> tuple[Fingertip, ...]:
+        """Gives the semi-axes of each fingertip."""
+        return self.finger if isinstance(self.finger, tuple) else (self.finger,)
 
     @property
     def modes(self) -> list[Mode]:
@@ -97,14 +111,14 @@ class Instant:
         return [Mode(int(code)) for code in np.unique(self.mode)]
 
 
+def find_ellipsoids(scene: Scene) -> tuple[Fingertip, ...]:
+    """Return the ellipsoids a bed's fingertips are drawn as, also where a scene leaves the fingertip out."""
+    return tuple(finger.fingertip or Fingertip() for finger in scene.fingers)
+
+
 def find_ellipsoid(scene: Scene) -> Fingertip:
-    """Return the ellipsoid a bed's fingertip is drawn as, also where a scene leaves the fingertip out."""
-    return require_one(scene.fingers).fingertip or Fingertip()
-
-
-def pick_pose(poses: Floats) -> Floats:
-    """Return the pose (7,) of the finger that a bed's fingertip shows, of those of all fingers (f, 7)."""
-    return require_one(tuple(poses))
+    """Return the ellipsoid of the first fingertip: that of press strokes."""
+    return find_ellipsoids(scene)[0]
 
 
 def read(path: Path, index: int = -1) -> Instant:
@@ -113,5 +127,5 @@ def read(path: Path, index: int = -1) -> Instant:
         raise OutputError(f"{path} is not the history.npz of a run's folder.")
     run = finished_run.read_run(path.parent, *ARRAYS)
     scene = run.scene
-    sizes = {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoid(scene)}
+    sizes = {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoids(scene)}
     return Instant.of(run.history, index, **sizes)

@@ -27,6 +27,13 @@ CLAY, SHARE = (0.76, 0.70, 0.63), 0.2
 PLAIN = (Mode.REST, Mode.HOLD)
 #: Beginning of the roles of the skin's materials over pins of the other modes.
 TINTED = "skin_"
+#: sRGB of fingertips by number, again from the first on after the last: no two alike for any color vision.
+FINGERS: tuple[Color, ...] = tuple(
+    _hex(code)
+    for code in (
+        "ea9580", "9500ff", "d4d400", "aaeaff", "aa4055", "2a6aaa", "ffffaa", "9580ea", "aa8000", "6abfd4",
+    )
+)  # fmt: skip
 DEFAULT = "okabe_ito"
 #: sRGB of each mode.
 PALETTES: dict[str, dict[Mode, Color]] = {
@@ -43,6 +50,11 @@ WORDS = {
     "tol_muted": ("Tol, muted", "Paul Tol's quieter set, told apart with any kind of color vision"),
     "brightness": ("Brightness", "Shades of gray, for vision or print without colors"),
 }
+
+
+def finger_color(number: int) -> Color:
+    """Return the color of a fingertip by its number, from 1 on."""
+    return FINGERS[(number - 1) % len(FINGERS)]
 
 
 def has_palette() -> bool:

@@ -10,11 +10,27 @@ import numpy as np
 from .. import bridge
 from ..bridge import SCALE
 from ..compat import bpy, shader_nodes
+from ..core.base.errors import DigiclayError
 from ..core.base.modes import COLORS, Mode
-from ..roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
+from ..roles import (
+    BALL,
+    ELLIPSOID,
+    FINGERS,
+    FINGERTIP,
+    HAND,
+    OWNED,
+    PALM,
+    PIN,
+    ROLE,
+    ellipsoid,
+    fingertips_of,
+    owner_of,
+)
+from ..ui_text import localize
 from . import heat, primitives
 from .instant import Instant
 from .palettes import CLAY, PLAIN, TINTED, mix_tint
+from .palettes import FINGERS as FINGER_COLORS
 from .skin_lattice import Pass, SkinLattice, choose_parts, make_lattice
 
 #: sRGB of what is no pin.
@@ -29,6 +45,10 @@ GAP, WALL = 0.85, 1.7
 MANY = 4000
 #: Radius of an arrow's head, in pitches.
 HEAD = 0.36
+#: Words about fingertips beyond the last one.
+TOO_MANY = "A bed has at most {} fingertips (got {})."
+#: Half the edge of the cube that a palm is drawn as, m.
+PALM_SIZE = 9e-3
 #: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on the way.
 PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = "previous", "following", "low", "high", "value", "pair"
 #: Attribute of the faces of the skin: the nearest pin.
@@ -183,12 +203,12 @@ def _write_weights(mesh: Any, step: Pass) -> None:
             made.data.foreach_set("vector", share.astype(np.float32).ravel())
 
 
-def make_fingertip(collection: Any, bed: Any) -> Any:
-    """Make the fingertip: an empty that is moved, and in it an ellipsoid to see and to click on."""
+def make_fingertip(collection: Any, bed: Any, number: int = 1, palm: Any = None) -> Any:
+    """Make a fingertip of a bed, or of a palm on it: an empty that is moved, in it an ellipsoid."""
     # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
     # of the device, kept in the ellipsoid's scale.
-    made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=bed)
-    bed[FINGER] = made
+    made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=palm or bed)
+    hold_fingertip(bed, number, made)
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"
     made.lock_scale = (True, True, True)
@@ -199,7 +219,33 @@ def make_fingertip(collection: Any, bed: Any) -> Any:
     made[OWNED] = ball[OWNED] = True
     lock_in_place(ball)
     ball.material_slots[0].link = "OBJECT"
-    ball.material_slots[0].material = finger_material(clear=False)
+    color_fingertip(made, number, clear=False)
+    return made
+
+
+def find_free_number(bed: Any) -> int:
+    """Return the least number that no fingertip of a bed has; raise DigiclayError where all have one."""
+    taken = fingertips_of(bed)
+    free = (number for number in range(1, len(FINGERS) + 1) if number not in taken)
+    number = next(free, None)
+    if number is None:
+        raise DigiclayError(localize(TOO_MANY, len(FINGERS), len(FINGERS) + 1))
+    return number
+
+
+def hold_fingertip(bed: Any, number: int, tip: Any) -> None:
+    """Have a bed, and the palm that a fingertip stands on, hold it as that of a number."""
+    bed[FINGERS[number - 1]] = tip
+    palm = owner_of(tip, PALM)
+    if palm is not None:
+        palm[FINGERS[number - 1]], tip[HAND] = tip, palm
+
+
+def make_palm(collection: Any, bed: Any) -> Any:
+    """Make the palm of a hand over a bed: an empty that moves its fingertips as one."""
+    made = marked(None, "Digital Clay Hand", PALM, collection, parent=bed)
+    made[OWNED] = True
+    made.empty_display_type, made.empty_display_size = "CUBE", PALM_SIZE * SCALE
     return made
 
 
@@ -209,8 +255,11 @@ def lock_in_place(ball: Any) -> None:
     ball.lock_location = ball.lock_rotation = ball.lock_scale = (True, True, True)
 
 
-def finger_material(clear: bool) -> Any:
-    """Return the fingertip's material: opaque, or clear so that arrows under it are seen."""
-    if clear:
-        return material("fingertip_clear", SKIN, roughness=0.4, alpha=CLEAR)
-    return material("fingertip", SKIN, roughness=0.4)
+def color_fingertip(tip: Any, number: int, *, clear: bool) -> None:
+    """Give the ellipsoid of a fingertip the color of its number, opaque, or clear so that arrows are seen."""
+    ball = ellipsoid(tip)
+    if ball is not None:
+        place = (number - 1) % len(FINGER_COLORS)
+        kind, color = (f"fingertip_{place + 1}", FINGER_COLORS[place]) if place else ("fingertip", SKIN)
+        name, alpha = (f"{kind}_clear", CLEAR) if clear else (kind, 1.0)
+        ball.material_slots[0].material = material(name, color, roughness=0.4, alpha=alpha)

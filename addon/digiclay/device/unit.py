@@ -6,7 +6,7 @@ here finds what is missing or left over then and puts it right; the second, a ti
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -21,18 +21,23 @@ from ..roles import (
     BED,
     ELLIPSOID,
     FINGER,
+    FINGERS,
     FINGERTIP,
+    HAND,
     HOUSING,
     OWNED,
+    PALM,
     PIN,
     ROLE,
     ellipsoid,
-    fingertip_of,
+    fingertips_of,
     is_linked,
+    owner_of,
 )
-from ..settings import properties
+from ..settings import devices, properties
 from . import parts, view
-from .instant import Instant, find_ellipsoid
+from .instant import Instant, find_ellipsoids
+from .node_tree import ARROWS
 
 #: Marks what was hidden along with what it belongs to: only that is shown along with it again.
 HIDDEN = "digiclay_hidden"
@@ -43,10 +48,12 @@ EYE, SWITCHES = 1, ((2, "hide_viewport"), (4, "hide_render"))
 class Faults(NamedTuple):
     """Missing and surplus objects of a bed; not to be stored, since undo invalidates them."""
 
-    #: Beds that have come without a fingertip of their own: copies, and beds of older files. And fingertips
-    #: that were copied without their ellipsoid, which cannot be selected.
+    #: Beds, and palms, that have come without fingertips of their own: copies, and beds of older files. And
+    #: fingertips that were copied without their ellipsoid, which cannot be selected.
     bare: list[Any]
-    #: Fingertips, ellipsoids and housings whose bed or fingertip is gone.
+    #: Fingertips that were copied on their bed: further ones.
+    loose: list[Any]
+    #: Fingertips, palms, ellipsoids and housings whose bed or fingertip is gone.
     left: list[Any]
     #: What beds are drawn with, come into a scene with an older bed that was appended.
     strewn: list[Any]
@@ -54,11 +61,8 @@ class Faults(NamedTuple):
 
 def mark_parts() -> frozenset[int]:
     """Mark what belongs to the beds there are; return the uids of all objects that are known from now on."""
-    for bed in _beds():
-        tip = fingertip_of(bed)
-        if tip is None:
-            continue
-        if bed.get(FINGER) != tip:  # an older file
+    for bed, number, tip in _tips():
+        if bed.get(FINGERS[number - 1]) != tip:  # an older file
             bed[FINGER] = tip
             view.hold_parts(bed)
         ball = ellipsoid(tip)
@@ -75,15 +79,19 @@ def mark_parts() -> frozenset[int]:
 
 def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
     """Return what is to be put right."""
-    bare = [bed for bed in _beds() if fingertip_of(bed) is None and _lacks_part(bed, FINGER, known, mended)]
-    tips = (thing for thing in bpy.data.objects if thing.get(ROLE) == FINGERTIP and not thing.library)
-    bare += [tip for tip in tips if is_linked(tip) and _lacks_part(tip, BALL, known, mended)]
+    bare = [each for each in _standing(BED) + _standing(PALM) if any(_lacking(each, known, mended))]
+    tips = _standing(FINGERTIP)
+    bare += [tip for tip in tips if _lacks_part(tip, BALL, known, mended)]
+    beds = _standing(BED)
+    held = {bed.get(name) for bed in beds for name in FINGERS}.union(tip for _, _, tip in _tips())
+    new = [tip for tip in tips if tip not in held and tip.session_uid not in known - mended]
+    loose = [tip for tip in new if owner_of(tip) in beds]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
     # Deleted along with its bed a fingertip may stand nowhere, and have no user any more.
     left = [thing for thing in mine if not thing.users or (is_linked(thing) and _is_orphan(thing))]
     shown = {thing for scene in bpy.data.scenes for thing in scene.objects if thing.get(ROLE) in (PIN, BAKE)}
     strewn = [thing for thing in shown if thing.session_uid not in known - mended and not thing.library]
-    return Faults(bare, left, strewn)
+    return Faults(bare, loose, left, strewn)
 
 
 def repair(found: Faults) -> None:
@@ -91,38 +99,41 @@ def repair(found: Faults) -> None:
     for thing in found.strewn:
         _unlink(thing)
     for owner in found.bare:
-        if owner.get(ROLE) == BED:
-            _complete(owner)
-        else:
+        if owner.get(ROLE) == FINGERTIP:
             _copy(owner, BALL)
+        else:
+            _complete(owner)
+    for tip in found.loose:
+        _adopt(tip)
     _remove(found.left)
 
 
 def give_fingertip(bed: Any, scene: Scene) -> str:
     """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one."""
-    if fingertip_of(bed) is not None:
+    if fingertips_of(bed):
         return ""
     tip = bed.get(FINGER)
     if tip is not None and tip.parent == bed:  # deleted: nothing but the bed holds it any more
-        for part in filter(None, (tip, tip.get(BALL))):
-            bed.users_collection[0].objects.link(part)
+        _stand(bed, tip)
         return f"{bed.name} got its fingertip back"
-    made = parts.make_fingertip(bed.users_collection[0], bed)
-    rest = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
-    bridge.place_fingertip(made, rest.fingertip, rest.finger)
+    parts.make_fingertip(bed.users_collection[0], bed)
+    rest = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1])
+    bridge.place_fingertips(bed, rest.fingertips, rest.fingers)
     view.hold_parts(bed)
     return f"{bed.name} got a new fingertip"
 
 
 def follow_visibility() -> None:
     """Have the parts of a bed hidden while it is, and an ellipsoid while its fingertip is."""
-    for bed in _beds():
-        tip, case = fingertip_of(bed), view.housing_of(bed)
+    for bed in _standing(BED):
+        case = view.housing_of(bed)
         if case is not None and case.parent == bed:
             _hide_along(bed, case)
-        if tip is None:
-            continue
-        _hide_along(bed, tip)
+    for palm in _standing(PALM):
+        if owner_of(palm) is not None:
+            _hide_along(owner_of(palm), palm)
+    for bed, _, tip in _tips():
+        _hide_along(owner_of(tip, PALM) or bed, tip)
         ball = ellipsoid(tip)
         if ball is not None:
             _hide_along(tip, ball)
@@ -130,7 +141,7 @@ def follow_visibility() -> None:
 
 def follow_selection() -> None:
     """Have a fingertip selected where its ellipsoid is, and active: a click on the ball takes hold of it."""
-    for tip in filter(None, map(fingertip_of, _beds())):
+    for _, _, tip in _tips():
         ball = ellipsoid(tip)
         if ball is None:
             continue
@@ -143,10 +154,38 @@ def follow_selection() -> None:
                 layer.objects.active = tip
 
 
-def _beds() -> list[Any]:
-    """Return the beds of this file that stand in a collection."""
-    every = (thing for thing in bpy.data.objects if thing.get(ROLE) == BED)
+def _standing(role: str) -> list[Any]:
+    """Return the objects of this file with a role that stand in a collection."""
+    every = (thing for thing in bpy.data.objects if thing.get(ROLE) == role)
     return [thing for thing in every if not thing.library and not thing.override_library and is_linked(thing)]
+
+
+def _tips() -> Iterator[tuple[Any, int, Any]]:
+    """Give the fingertips of all beds, with bed and number."""
+    for bed in _standing(BED):
+        yield from ((bed, number, tip) for number, tip in fingertips_of(bed).items())
+
+
+def _lacking(owner: Any, known: frozenset[int], mended: frozenset[int]) -> Iterator[str]:
+    """Give the properties of a bed or a palm whose fingertips it is to get."""
+    own = fingertips_of(owner)
+    if not own and owner.get(ROLE) == BED and _lacks_part(owner, FINGER, known, mended):
+        yield FINGER
+    for number, name in enumerate(FINGERS, 1):
+        if number not in own and _is_copied(owner, name) and _lacks_part(owner, name, known, mended):
+            yield name
+
+
+def _is_copied(owner: Any, name: str) -> bool:
+    """Return whether an object holds a part that stands, or one of its own that stands nowhere."""
+    part = owner.get(name)
+    return part is not None and (is_linked(part) or _holder(part, owner) == owner)
+
+
+def _holder(part: Any, owner: Any) -> Any | None:
+    """Return what has a part: its parent, or the bed of its palm, unless that is the owner asked about."""
+    above = part.parent
+    return above.parent if above is not None and above.get(ROLE) == PALM and above != owner else above
 
 
 def _lacks_part(owner: Any, name: str, known: frozenset[int], mended: frozenset[int]) -> bool:
@@ -156,46 +195,105 @@ def _lacks_part(owner: Any, name: str, known: frozenset[int], mended: frozenset[
     part, new = owner.get(name), owner.session_uid not in known
     if part is None:
         return name == FINGER and (new or (FINGER not in owner and owner.session_uid in mended))
-    if part.parent == owner:  # it stands nowhere: of a bed that was linked and made local, or deleted
-        return name == FINGER and new
-    return new or part.parent is not None or owner.session_uid in mended
+    holder = _holder(part, owner)
+    if holder == owner:  # it stands nowhere: of a bed that was linked and made local, or deleted
+        return name != BALL and new
+    return new or holder is not None or owner.session_uid in mended
 
 
 def _is_orphan(part: Any) -> bool:
     """Return whether nothing that stands has this part any more."""
-    kind, name = (FINGERTIP, BALL) if part.get(ROLE) == ELLIPSOID else (BED, FINGER)
-    owner = part.parent
-    if owner is not None and owner.get(ROLE) == kind and is_linked(owner):
+    kind, names = {ELLIPSOID: (FINGERTIP, (BALL,)), PALM: (BED, (HAND,))}.get(part[ROLE], (BED, FINGERS))
+    owner = owner_of(part, kind)
+    if owner is not None and is_linked(owner):
         return False
+    if part.parent is not None and part.parent.get(ROLE) == PALM:  # which was deleted, or its bed
+        return True
     # With its parent cleared or exchanged by hand it is still held by its bed, and stays as long as that.
-    return not any(thing.get(name) == part and is_linked(thing) for thing in bpy.data.objects)
+    return not any(
+        thing.get(name) == part and is_linked(thing) for thing in bpy.data.objects for name in names
+    )
 
 
-def _complete(bed: Any) -> None:
-    """Give a bed a fingertip: a copy of the one it holds and does not own, or a new one."""
-    tip = bed.get(FINGER)
-    if tip is not None and tip.parent != bed:
-        _copy(bed, FINGER)
-        if tip.get(BALL) is not None:
-            _copy(bed[FINGER], BALL)
+def _complete(owner: Any) -> None:
+    """Give a bed, or a palm, fingertips: copies of those it holds and does not own, or a new one."""
+    bed, own = owner if owner[ROLE] == BED else owner_of(owner), fingertips_of(owner)
+    for number, name in enumerate(FINGERS, 1):
+        tip = owner.get(name)
+        if tip is None or number in own or bed is None:
+            continue
+        if _holder(tip, owner) == owner:
+            _stand(bed, tip)
+        elif is_linked(tip) or (number == 1 and not own):
+            above = owner if owner != bed else _find_palm(bed, name)
+            if owner_of(tip) is not None and tip not in fingertips_of(owner_of(tip)).values():
+                tip.parent = above  # it was copied along
+            else:
+                _copy(owner, name, above)
+                if tip.get(BALL) is not None:
+                    _copy(owner[name], BALL)
+            if owner == bed:
+                parts.hold_fingertip(bed, number, owner[name])
+            else:
+                _adopt(owner.pop(name))
+    if owner != bed or bed is None:
+        return
     try:
         scene = properties.read_scene(bed)
     except DigiclayError:  # settings that do not go together: a session will say so
         scene = resolve({})
     give_fingertip(bed, scene)
     if view.is_drawn(bed) and view.housing_of(bed) is None:  # of an older file, where it is an object
-        view.add_modifier(bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene)))
+        view.add_modifier(bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1]))
     view.hold_parts(bed)
 
 
-def _copy(owner: Any, held: str) -> None:
-    """Give a copy of an object a copy of the part it holds, where that one is, its animation its own."""
-    made = owner[held].copy()
+def _find_palm(bed: Any, name: str) -> Any:
+    """Return the palm for the copy of a fingertip that a bed holds, itself copied if need be; or the bed."""
+    tip = bed[name]
+    palm = owner_of(tip, PALM)
+    if palm is None or tip.parent != palm:
+        return bed
+    mine = (one for one in _standing(PALM) if one.parent == bed and one.get(name) is not None)
+    own = [one for one in mine if one[name].parent == palm]
+    if own:
+        return own[0]
+    return _duplicate(palm, bed, bed)
+
+
+def _stand(bed: Any, tip: Any) -> None:
+    """Have a fingertip, with its ellipsoid and palm, stand where its bed does."""
+    for part in (tip, tip.get(BALL), owner_of(tip, PALM)):
+        if part is not None and not is_linked(part):
+            bed.users_collection[0].objects.link(part)
+
+
+def _adopt(tip: Any) -> None:
+    """Make a fingertip that was copied on its bed a further one; as many as a bed can have."""
+    bed = owner_of(tip)
+    try:
+        number = parts.find_free_number(bed)
+    except DigiclayError:  # it stays as it is, and touches nothing
+        return
+    parts.hold_fingertip(bed, number, tip)
+    devices.give_settings(bed, tip)
+    parts.color_fingertip(tip, number, clear=bool(view.read_setting(bed, ARROWS, False)))
+    view.hold_parts(bed)
+
+
+def _copy(owner: Any, held: str, parent: Any = None) -> None:
+    """Give a copy of an object a copy of the part it holds, where that one is."""
+    owner[held] = _duplicate(owner[held], parent or owner, owner)
+
+
+def _duplicate(thing: Any, parent: Any, owner: Any) -> Any:
+    """Return a copy of an object below another, its animation its own, that stands where its owner does."""
+    made = thing.copy()
     own_curves(made)
-    made.parent = owner
-    owner[held] = made
+    made.parent = parent
     for collection in owner.users_collection:
         collection.objects.link(made)
+    return made
 
 
 def _remove(found: Iterable[Any]) -> None:

@@ -21,7 +21,7 @@ from ..compat import has_node_setting, node_setting, set_node_setting
 from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
-from ..roles import BED, HOUSING, ROLE, ellipsoid, fingertip_of
+from ..roles import BED, HOUSING, ROLE, fingertips_of
 from . import parts
 from .instant import Instant
 from .node_tree import ARROWS, CASE, COLOR_BY_FORCE, FAR, FORM, SOURCES, bed_nodes
@@ -45,13 +45,14 @@ def picked_pins(bed: Any) -> tuple[int, ...]:
 
 
 def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
-    """Add a bed and its fingertip to a collection."""
+    """Add a bed and its fingertips to a collection."""
     cells = make_cells(instant)
     bed = parts.marked(cells, cells.name, BED, collection)
     bed.modifiers.new(MODIFIER, "NODES").node_group = _make_tree(instant, lowest)
-    parts.make_fingertip(collection, bed)
+    for number in range(1, len(instant.fingers) + 1):
+        parts.make_fingertip(collection, bed, number)
     hold_parts(bed)
-    _place_fingertip(bed, instant)
+    bridge.place_fingertips(bed, instant.fingertips, instant.fingers)
     return bed
 
 
@@ -83,15 +84,14 @@ def hold_parts(bed: Any) -> None:
     """Have what a bed is drawn with stay out of the scene when the bed is appended to another file."""
     # Blender puts an appended collection of objects that stand in no scene into the scene, unless an
     # empty instances it. The fingertip is one; it shows nothing of it, since its instancing is off.
-    tip = fingertip_of(bed)
-    if tip is not None:
+    for tip in fingertips_of(bed).values():
         tip.instance_collection = sources_of(bed)
 
 
 def show(bed: Any, instant: Instant) -> None:
-    """Show another instant of the same bed, its fingertip's pose included."""
+    """Show another instant of the same bed, the poses of its fingertips included."""
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
-    _place_fingertip(bed, instant)
+    bridge.place_fingertips(bed, instant.fingertips, instant.fingers)
 
 
 def show_state(bed: Any, system: System, state: State) -> None:
@@ -160,10 +160,8 @@ def shows_force(bed: Any) -> bool:
 def show_arrows(bed: Any, on: bool) -> None:
     """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so."""
     write_setting(bed, ARROWS, bool(on))
-    tip = fingertip_of(bed)
-    ball = ellipsoid(tip) if tip is not None else None
-    if ball is not None:
-        ball.material_slots[0].material = parts.finger_material(clear=bool(on))
+    for number, tip in fingertips_of(bed).items():
+        parts.color_fingertip(tip, number, clear=bool(on))
 
 
 def wants_force(bed: Any) -> bool:
@@ -228,10 +226,3 @@ def underside(bed: Any) -> float:
     """Return the height of the housing's underside in the space of its bed, Blender units."""
     housing: Any = housing_of(bed)
     return min(float(vertex.co.z) for vertex in housing.data.vertices)
-
-
-def _place_fingertip(bed: Any, instant: Instant) -> None:
-    """Put the fingertip, where there is one, to its pose in an instant."""
-    tip = fingertip_of(bed)
-    if tip is not None:
-        bridge.place_fingertip(tip, instant.fingertip, instant.finger)

@@ -11,7 +11,6 @@ import numpy as np
 from .. import bridge
 from ..core.base.errors import DigiclayError, ParameterError
 from ..core.engine.simulation import begin, periods
-from ..core.model.fingertip import LEVEL
 from ..core.model.layout import make_grid
 from ..core.model.trajectory import make_level
 from ..core.scene.assembly import assemble
@@ -22,9 +21,9 @@ from ..core.shapes.fitting import Fitted, Relief, fit_relief, fit_shape, pack
 from ..core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
 from ..core.shapes.request import Shape
 from ..device import view
-from ..device.instant import CLEARANCE, find_ellipsoid
+from ..device.instant import CLEARANCE, find_ellipsoids
 from ..live import beds
-from ..roles import ROLE, fingertip_of
+from ..roles import ROLE, fingertips_of
 from ..sessions import sculpting
 from ..settings import properties
 
@@ -80,30 +79,29 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     system = assemble(scene)
     display = find_display(system)
     assert display is not None
-    finger = make_level(np.zeros(1), np.array([[0.0, 0.0, AWAY]]))
+    fingers = [make_level(np.zeros(1), np.array([[0.0, 0.0, AWAY]]))] * len(scene.fingers)
     count = min(compute_display_time(display), LONGEST) / system.period
-    (state,) = deque(periods(system, [finger], begin(system), max(1, round(count))), maxlen=1)
+    (state,) = deque(periods(system, fingers, begin(system), max(1, round(count))), maxlen=1)
     off = float(np.abs(state.row(0) - display.heights).max())
-    pose = _lift_finger(bed, scene, state.row(0))
+    poses = _lift_fingers(bed, scene, state.row(0))
     # All that can fail is done: from here on the bed changes.
     properties.write_scene(bed, scene)
     began, problem = sculpting.begin_session(
-        bed.session_uid, bed.name, scene, pose, snapshot.dump(system, state), beds.read_tick(bed)
-    )
+        bed.session_uid, bed.name, scene, poses, snapshot.dump(system, state), beds.read_tick(bed),
+        tuple(fingertips_of(bed)),
+    )  # fmt: skip
     if problem:
         raise DigiclayError(f"{bed.name}: {problem}")
     beds.write(bed, began)
     view.show_state(bed, system, began.state)
-    tip = fingertip_of(bed)
-    if tip is not None:
-        bridge.place_fingertip(tip, pose, find_ellipsoid(scene))
+    bridge.place_fingertips(bed, poses, find_ellipsoids(scene))
     return laid, off
 
 
-def _lift_finger(bed: Any, scene: Scene, heights: Any) -> Any:
-    """Return the pose of the bed's fingertip, raised to above the shape where it is not already."""
-    tip, finger = fingertip_of(bed), find_ellipsoid(scene)
-    pose = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
-    touch = find_touch_height(make_grid(scene.layout), heights, finger, float(pose[0]), float(pose[1]))
-    pose[2] = max(pose[2], touch + CLEARANCE)
-    return pose
+def _lift_fingers(bed: Any, scene: Scene, heights: Any) -> Any:
+    """Return the poses (f, 7) of the bed's fingertips, raised to above the shape where it is higher."""
+    poses, grid = bridge.poses(bed), make_grid(scene.layout)
+    for pose, finger in zip(poses, find_ellipsoids(scene), strict=True):
+        touch = find_touch_height(grid, heights, finger, float(pose[0]), float(pose[1]))
+        pose[2] = max(pose[2], touch + CLEARANCE)
+    return poses

@@ -9,7 +9,7 @@ import numpy as np
 from .. import bridge
 from ..compat import bpy
 from ..core.base.arrays import Floats
-from ..roles import BED, ROLE, bed_of, fingertip_of
+from ..roles import BED, FINGERS, ROLE, bed_of, fingertips_of
 from ..sessions import running
 from ..sessions.running import TABLE, Running
 from ..ui_text import localize
@@ -63,16 +63,18 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
     fault = bridge.find_fault(bed.data, pins)
     if fault:
         return fault
-    tip = fingertip_of(bed)
-    if tip is None:
+    tips = fingertips_of(bed).values()
+    if not tips:
         return localize(
             "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
         )
-    if not _is_shown(context, tip):
+    if not all(_is_shown(context, tip) for tip in tips):
         return localize("its fingertip stands in no scene shown: link it to a collection to go on")
     fault = bridge.find_scale_fault(bed)
-    matrix = np.array(tip.matrix_world)
-    if not fault and (not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12):
+    matrices = np.array([tip.matrix_world for tip in tips])
+    if not fault and (
+        not np.isfinite(matrices).all() or np.abs(np.linalg.det(matrices[:, :3, :3])).min() < 1e-12
+    ):
         return localize("its fingertip is scaled to nothing: clear its scale to go on")
     return fault
 
@@ -86,8 +88,8 @@ def active_session(context: Any) -> tuple[Any, Running] | None:
     return None if session is None else (bed, session)
 
 
-#: The state by `core.session.snapshot`, the fingertip's pose at it, and the tick it is of.
-STATE, POSE, TICK = "digiclay_state", "digiclay_pose", "digiclay_moment"
+#: The state by `core.session.snapshot`, poses and numbers of the fingertips at it, and the tick it is of.
+STATE, POSE, NUMBERS, TICK = "digiclay_state", "digiclay_pose", "digiclay_fingers", "digiclay_moment"
 
 
 def write(bed: Any, running: Running, before: Running | None = None) -> None:
@@ -96,7 +98,8 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
     bed[TICK] = running.tick
     if before is not None and running.snapshot is before.snapshot:
         return
-    for name, data in ((STATE, running.snapshot), (POSE, running.pose.tobytes())):
+    numbers = bytes(running.numbers)
+    for name, data in ((STATE, running.snapshot), (POSE, running.poses.tobytes()), (NUMBERS, numbers)):
         # Blender takes bytes that are assigned over others for a text: it stops at the first 0,
         # and corrupts its memory where the lengths differ.
         bed.pop(name, None)
@@ -105,7 +108,7 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
 
 def clear(bed: Any) -> None:
     """Remove all session data: the bed is at rest."""
-    for name in (STATE, POSE, TICK):
+    for name in (STATE, POSE, NUMBERS, TICK):
         bed.pop(name, None)
 
 
@@ -115,14 +118,22 @@ def read_snapshot(bed: Any) -> bytes | None:
     return value if value is None or isinstance(value, bytes) else b""
 
 
-def read_pose(bed: Any) -> Floats | None:
-    """Return the fingertip's pose (7,) at the stored state, or None where there is no usable one."""
+def read_poses(bed: Any) -> Floats | None:
+    """Return the fingertips' poses (f, 7) at the stored state, or None where there are no usable ones."""
     value = bed.get(POSE)
-    if not isinstance(value, bytes) or len(value) != 7 * 8:
+    if not isinstance(value, bytes) or len(value) != len(read_numbers(bed)) * 7 * 8:
         return None
-    pose = np.frombuffer(value, np.float64).copy()
-    length = np.linalg.norm(pose[3:])
-    return pose if np.isfinite(pose).all() and abs(length - 1.0) < 1e-6 else None
+    poses = np.frombuffer(value, np.float64).reshape(-1, 7).copy()
+    lengths = np.linalg.norm(poses[:, 3:], axis=1)
+    return poses if np.isfinite(poses).all() and (abs(lengths - 1.0) < 1e-6).all() else None
+
+
+def read_numbers(bed: Any) -> tuple[int, ...]:
+    """Return the numbers of the fingertips at the stored state; 1 for older files and unusable ones."""
+    value = bed.get(NUMBERS)
+    numbers = tuple(value) if isinstance(value, bytes) else ()
+    valid = 0 < len(numbers) == len(set(numbers)) and all(0 < one <= len(FINGERS) for one in numbers)
+    return numbers if valid else (1,)
 
 
 def read_tick(bed: Any) -> int:

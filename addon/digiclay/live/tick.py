@@ -15,10 +15,10 @@ from .. import bridge, preferences
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError, DivergenceError, MethodError
 from ..device import unit, view
-from ..device.instant import find_ellipsoid
+from ..device.instant import find_ellipsoids
 from ..recorded import takes
 from ..recorded.bake import is_baked
-from ..roles import fingertip_of
+from ..roles import fingertips_of
 from ..sessions import running, sculpting
 from ..sessions.running import Running
 from ..sessions.sculpting import drop_strokes
@@ -50,8 +50,8 @@ def start(context: Any, bed: Any) -> list[Note]:
     if reason:
         raise DigiclayError(f"The session of {bed.name} cannot start: {reason}.")
     begun, fault = sculpting.begin_session(
-        bed.session_uid, bed.name, scene, bridge.pose(fingertip_of(bed)),
-        beds.read_snapshot(bed), beds.read_tick(bed),
+        bed.session_uid, bed.name, scene, bridge.poses(bed), beds.read_snapshot(bed), beds.read_tick(bed),
+        tuple(fingertips_of(bed)), beds.read_numbers(bed),
     )  # fmt: skip
     show(bed, replace(begun, settings=settings))
     faults = [Note("WARNING", f"{bed.name}: {fault}")] if fault else []
@@ -74,10 +74,10 @@ def show(bed: Any, session: Running) -> None:
         view.show_state(bed, session.system, session.state)
 
 
-def place_finger(context: Any, bed: Any, session: Running) -> None:
-    """Put the fingertip where a session has it; an animation or constraint of the fingertip prevails."""
-    if _move_finger(bed, session):
-        _evaluate(context)
+def place_fingers(context: Any, bed: Any, session: Running) -> None:
+    """Put the fingertips where a session has them; an animation or constraint of a fingertip prevails."""
+    _move_fingers(bed, session, len(session.poses))
+    _evaluate(context)
 
 
 def _evaluate(context: Any) -> None:
@@ -85,12 +85,9 @@ def _evaluate(context: Any) -> None:
     context.view_layer.update()
 
 
-def _move_finger(bed: Any, session: Running) -> bool:
-    """Put the fingertip where a session has it, without evaluation; return whether there is one."""
-    tip = fingertip_of(bed)
-    if tip is not None:
-        bridge.move_fingertip(tip, session.pose, find_ellipsoid(session.scene))
-    return tip is not None
+def _move_fingers(bed: Any, session: Running, count: int = 1) -> None:
+    """Put the first fingertips where a session has them, without evaluation."""
+    bridge.move_fingertips(bed, session.poses[:count], find_ellipsoids(session.scene))
 
 
 def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
@@ -101,7 +98,7 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
         if bed is not None:
             back = sculpting.withdraw_stroke(session)
             show(bed, back)
-            place_finger(context, bed, back)
+            place_fingers(context, bed, back)
     return bool(busy)
 
 
@@ -119,7 +116,7 @@ def end_haste(context: Any) -> None:
             bed = find_bed(session.uid, session.name)
             if bed is not None:
                 show(bed, session)
-                place_finger(context, bed, session)
+                place_fingers(context, bed, session)
 
 
 def tick(context: Any, now: float) -> list[Note]:
@@ -163,10 +160,11 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
     seen = _visible_rows(session)
     try:
         # The fingertip of a stroke is where the session has put it.
-        pose = session.pose if session.strokes else followed
-        pose = bridge.pose(fingertip_of(bed)) if pose is None else pose
+        poses = session.poses if session.strokes else bridge.poses(bed)
+        if followed is not None and not session.strokes:
+            poses[0] = followed
         later = sculpting.advance(
-            session, pose, now, most, view.picked_pins(bed), loop.find_interval(context)
+            session, poses, now, most, view.picked_pins(bed), loop.find_interval(context)
         )
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.poses)
@@ -176,7 +174,9 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
     # Whatever is written into the bed, Blender draws.
     if loop.LOOP.in_haste and later.finished_strokes == session.finished_strokes:
         return
-    moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
+    moved = bool(session.strokes) or followed is not None
+    if moved:
+        _move_fingers(bed, later)
     beds.write(bed, later, before)
     # Drawing costs most: where nothing has changed, nothing is redrawn.
     if before.stale or before.blocking_reason or changes or not np.array_equal(seen, _visible_rows(later)):
@@ -203,9 +203,11 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
             session, words = _take_settings(bed, session)
             session = replace(session, settings=settings)
         if session.stale:
-            pose = beds.read_pose(bed)
-            pose = session.poses if pose is None else pose
-            back = sculpting.restore(session, beds.read_snapshot(bed), pose, beds.read_tick(bed))
+            poses, was = beds.read_poses(bed), beds.read_numbers(bed)
+            if poses is None:
+                others = session.poses[:1].repeat(len(was), axis=0)
+                poses = sculpting.match_poses(session.poses, session.numbers, others, was)
+            back = sculpting.restore(session, beds.read_snapshot(bed), poses, beds.read_tick(bed), was)
             if session.recording is not None and back.recording is None:
                 words = localize(
                     "The recording ended: undo went back to before it, or redo to what it did not lead to"
@@ -218,11 +220,12 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
 
 def _take_settings(bed: Any, session: Running) -> tuple[Running, str]:
     """Return the session with the scene of its bed's settings, and words about what that ended."""
-    scene = properties.scene_of(bed)
-    if scene == session.scene:
+    scene, numbers = properties.scene_of(bed), tuple(fingertips_of(bed))
+    if scene == session.scene and numbers == session.numbers:
         return session, ""
-    changed, words = sculpting.change_scene(session, scene)
+    changed, words = sculpting.change_scene(session, scene, numbers, bridge.poses(bed))
     # A take is of one scene: what was recorded under the former one is not lost.
     words = ". ".join(filter(None, (words, takes.keep_recording(bed, session))))
-    bridge.resize_fingertip(fingertip_of(bed), find_ellipsoid(scene))
+    for tip, finger in zip(fingertips_of(bed).values(), find_ellipsoids(scene), strict=True):
+        bridge.resize_fingertip(tip, finger)
     return changed, words

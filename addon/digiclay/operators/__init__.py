@@ -9,7 +9,7 @@ import importlib
 import pkgutil
 
 from ..compat import bpy
-from . import add_bed, export_mesh, session_loop
+from . import add_bed, add_fingers, export_mesh, session_loop
 
 MODULES = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
 CLASSES: tuple[type, ...] = tuple(
@@ -22,6 +22,7 @@ CLASSES: tuple[type, ...] = tuple(
 MENUS = (
     ("VIEW3D_MT_mesh_add", add_bed.entry),
     ("VIEW3D_MT_mesh_add", add_bed.samples_entry),
+    ("VIEW3D_MT_mesh_add", add_fingers.entries),
     ("TOPBAR_MT_file_import", add_bed.import_entry),
     ("TOPBAR_MT_file_export", export_mesh.entry),
     ("VIEW3D_MT_editor_menus", session_loop.leave_entry),

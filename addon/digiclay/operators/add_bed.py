@@ -17,13 +17,13 @@ from ..core.shapes.fitting import list_shapes
 from ..core.shapes.request import Shape
 from ..core.studies.job_table import embed_heights
 from ..device import palettes, unit, view
-from ..device.instant import Instant, find_ellipsoid, pick_pose, read
+from ..device.instant import Instant, find_ellipsoids, read
 from ..exchange import shape_show
 from ..live import beds
 from ..panels.base import menu
 from ..press.aim import find_free_place
 from ..recorded import takes
-from ..roles import HOUSING, ROLE, bed_of, fingertip_of
+from ..roles import HOUSING, ROLE, bed_of, fingertips_of
 from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import choice, flag, integer, number, title
@@ -163,7 +163,7 @@ def rebuild_bed(operator: Any, context: Any) -> None:
 
 def add(context: Any, scene: Scene) -> Any:
     """Add the device of a scene, at rest, in the context's collection; return its bed."""
-    return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene)))
+    return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)))
 
 
 def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
@@ -187,7 +187,7 @@ def select_only(context: Any, bed: Any) -> None:
 def rebuild(bed: Any) -> Scene:
     """Make a bed anew, at rest, by its settings; its place, fingertip and children stay."""
     scene = properties.read_scene(bed)
-    instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
+    instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
     mesh, drawing = bed.data, view.find_modifier(bed)
     bed.data = view.make_cells(instant)
     if drawing is not None:  # it stays, and with it how the bed is colored; only what it draws is another
@@ -195,7 +195,8 @@ def rebuild(bed: Any) -> Scene:
         view.add_modifier(bed, instant)
         _discard(tree)
     unit.give_fingertip(bed, scene)
-    bridge.resize_fingertip(fingertip_of(bed), instant.finger)
+    for tip, finger in zip(fingertips_of(bed).values(), instant.fingers, strict=False):
+        bridge.resize_fingertip(tip, finger)
     view.hold_parts(bed)
     _remove(child for child in bed.children if child.get(ROLE) == HOUSING)
     if not mesh.users:
@@ -253,13 +254,13 @@ class AddSceneAction(Placed, Action):
     )  # fmt: skip
 
     def add_scene(self, context: Any, scene: Scene) -> None:
-        """Add the bed of a scene, its fingertip where its path begins."""
+        """Add the bed of a scene, its fingertips where their paths begin."""
         scene = embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
         bed.name = scene.name
-        start = pick_pose(sample_poses(scene.trajectories(), takes.START)[0])
-        bridge.place_fingertip(fingertip_of(bed), start, find_ellipsoid(scene))
+        start = sample_poses(scene.trajectories(), takes.START)[0]
+        bridge.place_fingertips(bed, start, find_ellipsoids(scene))
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
         if taken is not None:
             takes.add(bed, taken, scene.name)

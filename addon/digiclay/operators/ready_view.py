@@ -12,7 +12,7 @@ from ..core.base.arrays import Floats
 from ..device import detail, view
 from ..overlay.sections import find_compact_box
 from ..overlay.views import find_free_room
-from ..roles import BALL, fingertip_of
+from ..roles import BALL, fingertips_of
 
 #: Width of a sidebar that is yet to be opened, at a UI scale of 1, pixels.
 SIDEBAR = 280.0
@@ -125,9 +125,8 @@ def place_eye(points: Floats, lens: Floats, room: Floats, parallel: bool, farthe
 
 def _list_corners(bed: Any) -> Floats:
     """Return the corners (k, 3) of the boxes about housing, pins and fingertip, world."""
-    tip = fingertip_of(bed)
     things = [(view.housing_of(bed), bed), (bed, bed)]
-    things += [(tip[BALL], tip[BALL])] if tip is not None and tip.get(BALL) else []
+    things += [(tip[BALL], tip[BALL]) for tip in fingertips_of(bed).values() if tip.get(BALL)]
     boxes = []
     for shape, placed in things:
         matrix = np.array(placed.matrix_world)

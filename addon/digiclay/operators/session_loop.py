@@ -8,19 +8,21 @@ import time
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from .. import bridge, preferences
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.engine.simulation import begin
 from ..core.scene.assembly import assemble
 from ..device import view
-from ..device.instant import CLEARANCE, find_ellipsoid
+from ..device.instant import CLEARANCE, find_ellipsoids
 from ..live import beds, follow, handlers, loop, tick
 from ..live.beds import active_session
 from ..overlay import views
 from ..press import tool
 from ..recorded import takes
-from ..roles import bed_of, fingertip_of
+from ..roles import bed_of
 from ..sessions import running, sculpting
 from ..sessions.running import Running
 from ..settings import properties
@@ -330,7 +332,7 @@ def rewind_session(operator: Any, context: Any) -> None:
         words = takes.keep_recording(bed, session)
         operator.report({"INFO"}, words or localize("The recording ended: the gesture began before it"))
     tick.show(bed, back)
-    tick.place_finger(context, bed, back)
+    tick.place_fingers(context, bed, back)
 
 
 @action(
@@ -353,7 +355,7 @@ def reset_session(operator: Any, context: Any) -> set[str] | None:
     words = takes.keep_recording(bed, session)
     back = sculpting.reset(session)
     tick.show(bed, back)
-    tick.place_finger(context, bed, back)
+    tick.place_fingers(context, bed, back)
     if words:
         operator.report({"INFO"}, words)
     return None
@@ -365,11 +367,9 @@ def _bring_to_rest(bed: Any) -> None:
     system = assemble(scene)
     beds.clear(bed)
     view.show_state(bed, system, begin(system))
-    tip = fingertip_of(bed)
-    if tip is not None:
-        pose = bridge.pose(tip)
-        pose[2] = max(pose[2], scene.actuator.rest_height + CLEARANCE)
-        bridge.place_fingertip(tip, pose, find_ellipsoid(scene))
+    poses = bridge.poses(bed)
+    poses[:, 2] = np.maximum(poses[:, 2], scene.actuator.rest_height + CLEARANCE)
+    bridge.place_fingertips(bed, poses, find_ellipsoids(scene))
 
 
 class FollowServer(Action, bpy.types.Operator):

@@ -13,18 +13,17 @@ from ..core.base.errors import DigiclayError
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
 from ..core.files.run_folder import write_whole
-from ..core.model.fingertip import LEVEL
 from ..core.scene.assembly import assemble
 from ..core.scene.toml_table import format_scene
 from ..core.session import snapshot
 from ..core.session.live_session import Clock, periods_due, simulate_path
 from ..core.session.take import MOST_PARTS, Take, refine, to_scene
 from ..device import view
-from ..device.instant import find_ellipsoid, pick_pose
+from ..device.instant import find_ellipsoids
 from ..live import beds, handlers, tick
 from ..recorded import bake, takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
-from ..roles import bed_of, fingertip_of
+from ..roles import bed_of, fingertips_of
 from ..sessions import running, sculpting
 from ..settings import properties
 from ..settings.declared import choice, integer, text
@@ -114,7 +113,7 @@ def play(operator: Any, context: Any) -> None:
         assert session is not None  # it has just been started
         *_, session = play_strokes(session, recorded.strokes)
         tick.show(bed, session)
-        tick.place_finger(context, bed, session)
+        tick.place_fingers(context, bed, session)
     finally:  # when a stroke fails, the bed stays as it was
         tick.stop(bed.session_uid)
     operator.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))
@@ -190,9 +189,8 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         """Read the take and put everything to its start."""
         bed = bed_of(context)
         self._uid = bed.session_uid
-        tip = fingertip_of(bed)
-        # The fingertip's pose now: it may have been moved since the last session.
-        self._stood = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
+        # The poses of the fingertips now: they may have been moved since the last session.
+        self._stood = bridge.poses(bed)
         self._take: Take = takes.read(bed, self.take)
         self._system = assemble(refine(self._take.scene, self.parts))
         if self._system.grid.count != len(bed.data.vertices):
@@ -204,11 +202,8 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:
-        """Put the fingertip to where the take has it; one that is animated follows its animation."""
-        tip = fingertip_of(bed)
-        if tip is not None:
-            finger = find_ellipsoid(self._take.scene)
-            bridge.place_fingertip(tip, pick_pose(self._take.poses[self._at]), finger)
+        """Put the fingertips to where the take has them; one that is animated follows its animation."""
+        bridge.place_fingertips(bed, self._take.poses[self._at], find_ellipsoids(self._take.scene))
 
     def _finish(self, context: Any) -> set[str]:
         """Leave the bed in the final state of the take, and report the comparison."""
@@ -216,8 +211,9 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         state = snapshot.dump(system, self._state)
         self._place(bed)
         # The session that would go on from here.
-        uid, pose, tick_count = bed.session_uid, pick_pose(self._take.poses[-1]), beds.read_tick(bed)
-        begun = sculpting.begin_session(uid, bed.name, self._take.scene, pose, state, tick_count)
+        uid, poses, tick_count = bed.session_uid, self._take.poses[-1], beds.read_tick(bed)
+        numbers = tuple(fingertips_of(bed)) if len(fingertips_of(bed)) == len(poses) else None
+        begun = sculpting.begin_session(uid, bed.name, self._take.scene, poses, state, tick_count, numbers)
         beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)
         seconds = f"{self._take.duration:.1f} s"
@@ -242,10 +238,11 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             try:
                 scene = properties.scene_of(bed)
                 before, _ = sculpting.begin_session(
-                    bed.session_uid, bed.name, scene, self._stood, beds.read_snapshot(bed)
-                )
+                    bed.session_uid, bed.name, scene, self._stood, beds.read_snapshot(bed), 0,
+                    tuple(fingertips_of(bed)), beds.read_numbers(bed),
+                )  # fmt: skip
                 view.show_state(bed, before.system, before.state)
-                tick.place_finger(context, bed, before)
+                tick.place_fingers(context, bed, before)
             except DigiclayError as error:
                 self.report({"WARNING"}, str(error))
         self.report({"INFO"}, localize("Replay stopped: the bed is restored"))
@@ -337,7 +334,7 @@ class Bake(TimedAction, bpy.types.Operator):
                 yield 0.3 + 0.7 * part
             else:
                 moments = part
-        bake.apply(bed, moments, self.first, find_ellipsoid(take.scene), keyframe_finger=recorded)
+        bake.apply(bed, moments, self.first, find_ellipsoids(take.scene), keyframe_fingers=recorded)
         count = len(moments.height)
         last = self.first + count - 1
         self.report({"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, last))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,8 @@ from .picture import Box, Color, Dot, Line, Look, Picture, Words, round_axis, sc
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
 #: Space below a section.
 GAP = 6.0
+#: Width of the number and force of a fingertip.
+FINGER = 85.0
 #: Set points that the axis of the force shows at most: a hard knock is drawn up to its end, and no further.
 MOST = 5.0
 #: Shortest axes, N and mm: a quiet force is not drawn as a wild one.
@@ -59,6 +61,9 @@ class Readings:
     top: float | None = None
     #: Whether the contact law does not hold now, by `core.model.touch`.
     beyond: bool = False
+    #: Numbers and colors of several fingertips, and the force of each, (t, f), N.
+    fingers: tuple[tuple[int, Color], ...] = ()
+    finger_force: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def window(self) -> tuple[float, float]:
@@ -130,11 +135,11 @@ def error_message(errors: tuple[float, float] | None) -> str:
     return localize("Solver error: about {}, {}", _size(errors[0] * 1e6, "µm"), _size(errors[1] * 1e3, "mN"))
 
 
-def force_message(force: float, *, beyond: bool = False) -> str:
-    """Return the text of the total force, N, and whether the contact law does not hold."""
+def force_message(force: float, *, beyond: bool = False, hardest: float | None = None) -> str:
+    """Return the text of the total force, N, and whether the law does not hold; `hardest`: of a finger."""
     if force >= 100.0:
         return localize("{:.3g} N: no finger", force)
-    if force > MOST_FORCE:
+    if (force if hardest is None else hardest) > MOST_FORCE:
         return localize("{:.1f} N: beyond {:g} N", force, MOST_FORCE)
     return localize("{:.2f} N: beyond {:g} mm", force, MOST_INDENTATION * 1e3) if beyond else f"{force:.2f} N"
 
@@ -155,14 +160,15 @@ def _draw_head(readings: Readings, pen: Pen, top: float) -> None:
 
 def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
-    now = force_message(float(readings.force[-1]), beyond=readings.beyond) if readings.force.size else ""
-    asked = "" if readings.set_point is None else localize("set point {:.2f} N", readings.set_point)
+    now = _tell_force(readings) if readings.force.size else ""
+    words = "set point {:.2f} N each" if readings.fingers else "set point {:.2f} N"
+    asked = "" if readings.set_point is None else localize(words, readings.set_point)
     top = pen.row(top, localize("Total force  {}", now), asked)
     recent = readings.force[readings.time >= readings.window[0]]
     asked_for = readings.set_point or 0.0
     largest = float(recent.max(initial=0.0))
     if asked_for:
-        largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
+        largest = min(max(largest, 1.2 * asked_for), MOST * asked_for * max(1, len(readings.fingers)))
     largest = max(largest, LEAST_FORCE)
     ends = (0.0, round_axis(0.0, largest)[1])
     box = pen.plot(readings, top, ends, "N")
@@ -170,6 +176,28 @@ def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
         y = box.y + readings.set_point / ends[1] * box.height
         pen.level(box, y, pen.look.set_point, 1.5, dashed=True)
     pen.curve(readings, readings.force, ends, box, pen.look.force)
+    for column, (_, color) in enumerate(readings.fingers):
+        pen.curve(readings, readings.finger_force[:, column], ends, box, color)
+    _draw_fingers(readings, pen, box.y - ROW * pen.scale)
+
+
+def _draw_fingers(readings: Readings, pen: Pen, top: float) -> None:
+    """List the force of each of several fingertips by number."""
+    now = readings.finger_force[-1] if len(readings.finger_force) else np.zeros(len(readings.fingers))
+    texts = zip(readings.fingers, now, strict=True)
+    entries = [(color, f"{number}: {force:.2f} N") for (number, color), force in texts]
+    pen.entries(top, _count_columns(pen.width / pen.scale), entries)
+
+
+def _count_columns(width: float) -> int:
+    """Return how many fingertips stand in a row of a width at a UI scale of 1, pixels."""
+    return int(width / FINGER)
+
+
+def _tell_force(readings: Readings) -> str:
+    """Return the text of the total force now."""
+    hardest = float(readings.finger_force[-1].max()) if readings.finger_force.size else None
+    return force_message(float(readings.force[-1]), beyond=readings.beyond, hardest=hardest)
 
 
 def _draw_heights(readings: Readings, pen: Pen, top: float) -> None:
@@ -220,10 +248,12 @@ def _draw_brief(readings: Readings, pen: Pen, top: float) -> None:
     """Write force, set point, simulated time and state in two rows."""
     now = localize("no force yet")
     if readings.force.size:
-        now = force_message(float(readings.force[-1]), beyond=readings.beyond)
-    asked = "" if readings.set_point is None else localize("of {:.2f} N", readings.set_point)
+        now = _tell_force(readings)
+    words = "{:.2f} N each" if readings.fingers else "of {:.2f} N"
+    asked = "" if readings.set_point is None else localize(words, readings.set_point)
     top = pen.row(top, now, asked)
-    pen.row(top, f"{float(readings.time[-1]) if readings.time.size else 0.0:.1f} s", describe_state(readings))
+    time = float(readings.time[-1]) if readings.time.size else 0.0
+    _draw_fingers(readings, pen, pen.row(top, f"{time:.1f} s", describe_state(readings)))
 
 
 class Section(NamedTuple):
@@ -244,21 +274,25 @@ def _measure_heights(readings: Readings) -> float:
     return ROW * (2 + math.ceil(len(readings.pins) / 3)) + PLOT + GAP if readings.pins else ROW + GAP
 
 
-COMPACT = Content((Section(lambda readings: 2 * ROW, _draw_brief),), 190.0)
+def _measure_fingers(readings: Readings, width: float) -> float:
+    return ROW * math.ceil(len(readings.fingers) / _count_columns(width - 2.0 * PADDING))
+
+
+#: Widths of the overlay at a UI scale of 1, in short and in full, and the space about it and in it, pixels.
+BRIEF, WIDE, MARGIN, PADDING = 190.0, 290.0, 12.0, 10.0
+COMPACT = Content((Section(lambda told: 2 * ROW + _measure_fingers(told, BRIEF), _draw_brief),), BRIEF)
 FULL = Content(
     (
         Section(lambda readings: 3 * ROW + GAP, _draw_head),
-        Section(lambda readings: 2 * ROW + PLOT + GAP, _draw_force),
+        Section(lambda told: 2 * ROW + PLOT + GAP + _measure_fingers(told, WIDE), _draw_force),
         Section(lambda readings: 0.0 if readings.top is None else 2.6 * ROW, _draw_scale),
         Section(_measure_heights, _draw_heights),
         Section(lambda readings: ROW * (1 + math.ceil(np.count_nonzero(readings.modes) / 2)), _draw_modes),
     ),
-    290.0,
+    WIDE,
 )
 #: Height that Blender's own text and gizmos take in corners of the view at a UI scale of 1, pixels.
 TAKEN = {"top_left": 54.0, "top_right": 220.0}
-#: Sizes at a UI scale of 1, pixels.
-MARGIN, PADDING = 12.0, 10.0
 #: Opacity of the box behind it all: the bed shines through a little.
 BACK_ALPHA = 0.95
 #: Most of the room's height that is taken: the bed is what one looks at.

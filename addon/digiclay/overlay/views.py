@@ -21,9 +21,10 @@ from ..core.base.modes import Mode
 from ..core.model.control_interface import find_set_point
 from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
+from ..device.instant import find_ellipsoids
 from ..device.node_tree import TOP_FORCE
 from ..sessions import running
-from .picture import Dot, Look, Picture, choose_colors
+from .picture import BLACK, WHITE, Dot, Look, Picture, Words, choose_colors, contrast
 from .sections import COMPACT, FULL, Readings, Room, find_room, lay_out
 
 #: How often the views are redrawn while nothing moves in them, s: the curves continue.
@@ -97,6 +98,8 @@ def read_session(
         time=trace.time,
         force=trace.force,
         pins=trace.pins,
+        fingers=tuple((number, palettes.finger_color(number)) for number in _list_numbers(session)),
+        finger_force=trace.finger_forces,
         heights=trace.heights,
         modes=np.bincount(session.state.mode(), minlength=len(Mode)),
         colors=tuple(colors[mode] for mode in Mode),
@@ -104,6 +107,11 @@ def read_session(
         top=view.read_setting(bed, TOP_FORCE, None) if view.shows_force(bed) else None,
         beyond=exceeds_law(session.system, session.state, session.pose),
     )
+
+
+def _list_numbers(session: running.Running) -> tuple[int, ...]:
+    """Return the numbers of several fingertips; of one there is nothing to tell apart."""
+    return session.numbers if len(session.numbers) > 1 else ()
 
 
 def _beds() -> list[Any]:
@@ -164,20 +172,31 @@ def _draw() -> None:
         content = FULL if bed.digiclay_display.overlay_full else COMPACT
         room, corner = find_free_room(context.area, context.region), preferences.get(context).overlay_corner
         picture = lay_out(read_session(bed, session, colors), chosen, room, scale, content, corner)
-    picture.dots += _marks(context, bed, session, chosen, picture, scale)
+    _mark(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)
 
 
-def _marks(
+def _mark(
     context: Any, bed: Any, session: running.Running, colors: Look, picture: Picture, scale: float
-) -> list[Dot]:
-    """Return a dot on every picked pin that the picture does not cover, in the color of its curve."""
-    pins = session.trace.pins
-    cells = session.system.grid.positions[list(pins)]
-    places = project(context, bed, np.column_stack([cells, session.state.row(0)[list(pins)]]))
-    marks = []
-    for (x, y), color in zip(places, colors.pins, strict=False):
-        hidden = any(0 <= x - box.x < box.width and 0 <= y - box.y < box.height for box in picture.boxes)
+) -> None:
+    """Add dots on picked pins in the colors of their curves, and numbered ones on several fingertips.
+
+    None covers the boxes of the picture.
+    """
+    pins, boxes = list(session.trace.pins), tuple(picture.boxes)
+    tops = np.column_stack([session.system.grid.positions[pins], session.state.row(0)[pins]])
+    numbers = _list_numbers(session)
+    tips = session.poses[:, :3].copy()
+    tips[:, 2] += [2.0 * finger.height for finger in find_ellipsoids(session.scene)]
+    marks = [(color, 4.0, "") for _, color in zip(pins, colors.pins, strict=False)]
+    marks += [(palettes.finger_color(number), 9.0, f"{number}") for number in numbers]
+    places = project(context, bed, np.concatenate([tops, tips[: len(numbers)]]))
+    for (x, y), (color, radius, text) in zip(places, marks, strict=True):
+        hidden = any(0 <= x - box.x < box.width and 0 <= y - box.y < box.height for box in boxes)
         if math.isfinite(x) and not hidden:
-            marks += [Dot(x, y, 5.5 * scale, colors.back), Dot(x, y, 4.0 * scale, color)]
-    return marks
+            rim = Dot(x, y, (radius + 1.5) * scale, colors.back)
+            picture.dots += [rim, Dot(x, y, radius * scale, color)]
+            if text:
+                ink = max(BLACK, WHITE, key=lambda ink: contrast(ink, color))
+                size, wide = 12.0 * scale, 3.4 * len(text) * scale
+                picture.words.append(Words(x - wide, y - 0.36 * size, size, ink, text))

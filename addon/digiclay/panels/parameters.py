@@ -8,11 +8,12 @@ from ..compat import bpy
 from ..core.base.quantity import list_quantities
 from ..core.control.methods import list_methods
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, import_parameters
-from ..core.scene.toml_table import PRESETS
+from ..core.scene.toml_table import FINGER_PARTS, PRESETS
 from ..roles import bed_of, is_edited
 from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import WHOLE, title
+from ..settings.devices import find_settings
 from ..settings.groups import method_of, method_property
 from ..settings.properties import part_group
 from ..ui_text import localize
@@ -103,8 +104,12 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
             settings = bed_of(context).digiclay
             column = self.layout.column(align=True)
             column.active, column.enabled = in_use(settings, section), not is_edited(context)
+            if section in FINGER_PARTS:
+                number, settings = find_settings(context)
+                if number > 1:
+                    column.label(text=localize("Fingertip {}", number))
             group = part_group(settings, section)
-            quantities = list_quantities(import_parameters(section, method_of(settings)))
+            quantities = list_quantities(import_parameters(section, method_of(bed_of(context).digiclay)))
             for name in (WHOLE + name if quantity.whole else name for name, quantity in quantities.items()):
                 place = column.row(align=True)
                 # A number's label stands in its field: beside it the sidebar would cut off the unit.

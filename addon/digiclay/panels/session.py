@@ -34,6 +34,9 @@ def session_panel(sidebar: Any, context: Any) -> None:
         _buttons(column, session)
         if session.recording is not None:
             column.label(text=localize("Recording: {:.1f} s", _measure_recording(session)), icon="REC")
+    row = sidebar.layout.row(align=True)
+    row.operator("digiclay.add_fingertip", icon="ADD")
+    row.operator_menu_enum("digiclay.add_hand", "side", icon="VIEW_PAN")
     words = (
         session.blocking_reason and localize("Waits: {}", session.blocking_reason)
         if session

@@ -28,7 +28,7 @@ from ..core.files.run_folder import name_unfinished
 from ..core.session.render_settings import Film, Moving, Turntable, name_frame
 from ..device import view
 from ..device.instant import Instant
-from ..roles import fingertip_of
+from ..roles import fingertips_of
 from . import stage
 from .legend import SHARE, draw_force_plot
 from .still import failure_reason, render_picture, stage_bed
@@ -136,8 +136,7 @@ def stage_film(
 def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
     """Set the stage for the frames of a bed that turns once about itself."""
     with stage_bed("Digital Clay Turntable", instant, looks) as (scene, bed):
-        tip = fingertip_of(bed)
-        if tip is not None and not looks.fingertip:
+        for tip in () if looks.fingertip else fingertips_of(bed).values():
             for part in (*tip.children_recursive, tip):
                 bpy.data.objects.remove(part)
         points = stage.outline(bed)
@@ -158,7 +157,8 @@ def _visible_points(
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     touching = rows[history["total_force"][rows] > 0.0]
     poses = history["fingertip"][touching if touching.size else rows]
-    extremes = np.unique([poses[:, :3].argmin(axis=0), poses[:, :3].argmax(axis=0)])
+    places = poses.reshape(-1, 7)[:, :3]  # of all fingertips, a row a pose
+    extremes = np.unique([places.argmin(axis=0), places.argmax(axis=0)]) // (len(places) // len(poses))
     instant = Instant.of(history, int(rows[0]), **sizes)
     position, height = np.asarray(history["position"]), history["height"][used]
     clouds = [

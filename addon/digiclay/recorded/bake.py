@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -15,15 +15,14 @@ from ..bridge import ATTRIBUTES
 from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_setting
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
-from ..core.model.fingertip import Fingertip, wrap_one
+from ..core.model.fingertip import Fingertip
 from ..core.scene.assembly import assemble
 from ..core.session import snapshot
 from ..core.session.live_session import simulate_path
 from ..core.session.take import Take
 from ..device import view
-from ..device.instant import pick_pose
 from ..device.node_tree import attribute, enabled, mesh_of, new_tree, node, number, sample, socket, store
-from ..roles import BAKE, ROLE, fingertip_of
+from ..roles import BAKE, PALM, ROLE, fingertips_of, owner_of
 
 #: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
 MOMENT = "Moment"
@@ -78,7 +77,7 @@ class BakedFrames:
     mode: NDArray[np.int8]
     #: (t, n), N.
     force: NDArray[np.float32]
-    #: (t, f, 7), of the fingertip.
+    #: (t, f, 7), of the fingertips.
     pose: Floats
 
 
@@ -107,8 +106,10 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
     yield BakedFrames(system.grid.positions, height, mode, force, take.poses[wanted])
 
 
-def apply(bed: Any, moments: BakedFrames, first: int, finger: Fingertip, *, keyframe_finger: bool) -> None:
-    """Give a bed a bake from a frame on, in place of an older one, and the fingertip keyframes if asked."""
+def apply(
+    bed: Any, moments: BakedFrames, first: int, fingers: Sequence[Fingertip], *, keyframe_fingers: bool
+) -> None:
+    """Give a bed a bake from a frame on, in place of an older one, and the fingertips keyframes if asked."""
     free(bed)
     count = len(moments.height)
     modifier = bed.modifiers.new(MODIFIER, "NODES")
@@ -126,13 +127,16 @@ def apply(bed: Any, moments: BakedFrames, first: int, finger: Fingertip, *, keyf
     for _, curve in _curves(bed):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
-    tip = fingertip_of(bed)
-    if keyframe_finger and tip is not None:
-        tip.animation_data_clear()
-        for row, pose in enumerate(moments.pose):
-            bridge.place_fingertip(tip, pick_pose(pose), finger)
-            tip.keyframe_insert("location", frame=first + row)
-            tip.keyframe_insert("rotation_quaternion", frame=first + row)
+    tips = list(fingertips_of(bed).values()) if keyframe_fingers else []
+    moving = [*dict.fromkeys(filter(None, (owner_of(tip, PALM) for tip in tips))), *tips]
+    for thing in moving:
+        thing.animation_data_clear()
+        thing.rotation_mode = "QUATERNION"
+    for row, poses in enumerate(moments.pose if tips else ()):
+        bridge.place_fingertips(bed, poses, fingers)
+        for thing in moving:
+            thing.keyframe_insert("location", frame=first + row)
+            thing.keyframe_insert("rotation_quaternion", frame=first + row)
 
 
 def is_baked(bed: Any) -> bool:
@@ -159,26 +163,26 @@ def free(bed: Any) -> bool:
 
 
 def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
-    """Read the path of an animated fingertip; yield the share done after each pose, at last the poses."""
+    """Read the paths of the fingertips as animated; yield the share done, at last the poses (t + 1, f, 7)."""
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
     rate = scene.render.fps / scene.render.fps_base
     count = int(np.floor((last - first) / rate / period + 1e-6))
     kept = scene.frame_current, scene.frame_subframe
-    poses = np.empty((count + 1, 7))
+    tips = len(fingertips_of(bed))
+    if not tips:
+        raise DigiclayError(f"{bed.name} has no fingertip: undo its removal.")
+    poses = np.empty((count + 1, tips, 7))
     try:
         for row in range(count + 1):
             whole, part = divmod(first + row * period * rate, 1.0)
             scene.frame_set(int(whole), subframe=part)
-            tip = fingertip_of(bed)
-            if tip is None:
-                raise DigiclayError(f"{bed.name} has no fingertip: undo its removal.")
-            poses[row] = bridge.pose(tip)
+            poses[row] = bridge.poses(bed)
             yield row / count
     finally:
         scene.frame_set(kept[0], subframe=kept[1])
-    yield wrap_one(poses)
+    yield poses
 
 
 def _modifier(bed: Any) -> Any | None:

@@ -18,6 +18,8 @@ class Running(LiveSession):
     #: `session_uid` of the bed, and its name for messages.
     uid: int
     name: str
+    #: Numbers of the fingertips, in the order of `poses`: they keep theirs when others come or go.
+    numbers: tuple[int, ...] = (1,)
     #: The state by `core.session.snapshot`; also in the bed's property.
     snapshot: bytes
     #: Counts ticks and never decreases, not even by undo.

@@ -42,22 +42,29 @@ CHUNK, PAUSE = 16, 10 * accuracy.PAUSE
 BESIDE = 0.4
 #: Time between two ticks, s, unless told.
 INTERVAL = 1.0 / 30.0
+#: Numbers of fingertips.
+Numbers = tuple[int, ...]
 #: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one that is put
 #: to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by 1e-6 m beside it.
 STILL = 2e-6
 
 
 def begin_session(
-    uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, tick: int = 0
-) -> tuple[Running, str]:
-    """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost."""
-    system = assemble(scene)
-    state, lost = _load_state(system, kept)
+    uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, tick: int = 0,
+    numbers: Numbers | None = None, was: Numbers | None = None,
+) -> tuple[Running, str]:  # fmt: skip
+    """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost.
+
+    `numbers`: of the fingertips; `was`: of those that the snapshot has.
+    """
+    system, numbers = assemble(scene), numbers or tuple(range(1, len(scene.fingers) + 1))
+    state, lost = _load_state(system, _change_fingers(scene, system, kept, was or numbers, numbers))
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
         scene=scene, system=system, state=state, poses=poses, uid=uid, name=name, snapshot=now, tick=tick + 1,
-        clock=live_session.Clock(), trace=recent_trace.start(system.period), monitor=accuracy.start(scene),
+        numbers=numbers, clock=live_session.Clock(), monitor=accuracy.start(scene),
+        trace=recent_trace.start(system.period, fingers=system.fingers),
         next_gesture=live_session.Moment(state.period, now, poses),
     )  # fmt: skip
     return running, lost
@@ -75,6 +82,27 @@ def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
         except StateError as error:
             refused = localize("The bed begins at rest. {}", error)
     return begin(system), refused
+
+
+def _change_fingers(
+    scene: Scene, system: System, kept: bytes | None, was: Numbers, numbers: Numbers
+) -> bytes | None:
+    """Return a snapshot of fingertips of some numbers as one of the fingertips that a system has."""
+    if kept is None or was == numbers:
+        return kept
+    former = assemble(replace(scene, fingers=scene.fingers[:1] * len(was)))
+    try:
+        state = snapshot.load(former, kept)
+    except StateError:  # what is wrong with it will be said
+        return kept
+    places = [was.index(number) if number in was else None for number in numbers]
+    return snapshot.dump(system, snapshot.change_fingers(former, system, state, places))
+
+
+def match_poses(poses: Floats, was: Numbers, others: Floats, numbers: Numbers) -> Floats:
+    """Return the poses (f, 7) of fingertips, by number: those they had, or else those of others (f, 7)."""
+    places = zip(numbers, others, strict=True)
+    return np.array([poses[was.index(number)] if number in was else other for number, other in places])
 
 
 def advance(
@@ -204,8 +232,16 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
     return replace(running, gestures=(*running.gestures, running.next_gesture)[-room:], next_gesture=None)
 
 
-def restore(running: Running, kept: bytes | None, poses: Floats, tick: int | None = None) -> Running:
-    """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends."""
+def restore(
+    running: Running, kept: bytes | None, poses: Floats, tick: int | None = None, was: Numbers | None = None
+) -> Running:
+    """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends.
+
+    `was`: numbers of the fingertips of the snapshot, unless they are those of the session.
+    """
+    if was is not None and was != running.numbers:
+        kept = _change_fingers(running.scene, running.system, kept, was, running.numbers)
+        poses = match_poses(poses, was, running.poses, running.numbers)
     state, _ = _load_state(running.system, kept)
     now = snapshot.dump(running.system, state)
     keep = running.recording
@@ -222,13 +258,29 @@ def restore(running: Running, kept: bytes | None, poses: Floats, tick: int | Non
     )  # fmt: skip
 
 
-def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
-    """Continue the session with other parameters; returns and raises as `begin_session`."""
-    if scene == running.scene:
+def change_scene(
+    running: Running, scene: Scene, numbers: Numbers | None = None, poses: Floats | None = None
+) -> tuple[Running, str]:
+    """Continue with other parameters, or fingertips, new ones at poses (f, 7); as `begin_session`."""
+    numbers = numbers or running.numbers
+    if scene == running.scene and numbers == running.numbers:
         return running, ""
+    if numbers[0] != running.numbers[0]:  # another fingertip has no part in its strokes
+        running = drop_strokes(running)
+    was, others = running.numbers, running.poses if poses is None else poses
     other, lost = begin_session(
-        running.uid, running.name, scene, running.poses, running.snapshot, running.tick
-    )
+        running.uid, running.name, scene, match_poses(running.poses, was, others, numbers), running.snapshot,
+        running.tick, numbers, was,
+    )  # fmt: skip
+
+    def change(moment: live_session.Moment) -> live_session.Moment:
+        kept = _change_fingers(scene, other.system, moment.snapshot, was, numbers)
+        assert kept is not None
+        return replace(moment, snapshot=kept, poses=match_poses(moment.poses, was, others, numbers))
+
+    if numbers != was:
+        start = running.stroke_start and change(running.stroke_start)
+        running = replace(running, gestures=tuple(map(change, running.gestures)), stroke_start=start)
     names = ["clock", "paused", "blocking_reason", "finished_strokes", "last_place"]
     names += [] if lost else ["gestures", "strokes", "stroke_start"]
     trace = recent_trace.pick(other.trace, running.trace.pins, other.system.grid.count)

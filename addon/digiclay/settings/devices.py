@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .. import bridge
+from ..compat import read_stored
 from ..core.base.errors import DigiclayError
 from ..core.base.quantity import list_quantities
 from ..core.control.blister import Blister
@@ -14,9 +15,9 @@ from ..core.control.virtual_master import VirtualMaster
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..core.scene.scene_source import load
-from ..core.scene.schema import Finger, Scene
-from ..core.scene.toml_table import PRESETS, resolve
-from ..roles import fingertip_of
+from ..core.scene.schema import Finger, Scene, import_parameters
+from ..core.scene.toml_table import FINGER_PARTS, PRESETS, resolve
+from ..roles import FINGERTIP, ROLE, bed_of, fingertips_of, owner_of
 from .declared import assign, read
 from .own_presets import path
 from .shown_units import SHOWN, to_si
@@ -178,22 +179,57 @@ def set_size(settings: Any, size: float) -> None:
     resize(settings, Fingertip(finger.length * share, finger.width * share, finger.height * share))
 
 
+def list_settings(bed: Any) -> tuple[Any, ...]:
+    """Return the settings that hold the parts of each finger: the bed's of the first, the others' own."""
+    tips = fingertips_of(bed).items()
+    return tuple(bed.digiclay if number == 1 else tip.digiclay for number, tip in tips) or (bed.digiclay,)
+
+
+def find_tip(owner: Any) -> Any | None:
+    """Return the fingertip whose settings an object holds: itself, or number 1 of a bed; None without."""
+    return owner if owner.get(ROLE) == FINGERTIP else fingertips_of(owner).get(1)
+
+
+def find_settings(context: Any) -> tuple[int, Any]:
+    """Return number and settings of the active fingertip, or those of a bed for its first one."""
+    bed: Any = bed_of(context)
+    thing: Any = context.object
+    tips = {tip: number for number, tip in fingertips_of(bed).items()}
+    while thing not in tips and thing != bed:
+        thing = thing.parent
+    number = tips.get(thing, 1)
+    return number, bed.digiclay if number == 1 else thing.digiclay
+
+
+def give_settings(bed: Any, tip: Any) -> None:
+    """Give a further fingertip the size and pulp of the first one, unless it has its own."""
+    if read_stored(tip, "digiclay"):
+        return
+    for section in FINGER_PARTS:
+        ours, own = getattr(bed.digiclay, section), getattr(tip.digiclay, section)
+        for name in list_quantities(import_parameters(section, "")):
+            setattr(own, name, getattr(ours, name))
+    bridge.resize_fingertip(tip, read_finger(tip.digiclay))
+
+
 def resize(settings: Any, finger: Fingertip) -> None:
-    """Give a bed's fingertip another size; its lowest point stays, its blister follows, if that is on."""
-    before, tip = read_finger(settings), fingertip_of(settings.id_data)
-    lowest = _pose(tip)
+    """Give a fingertip another size; its lowest point stays, and a bed's blister follows, if that is on."""
+    before, tip = read_finger(settings), find_tip(settings.id_data)
+    bed: Any = settings.id_data if tip is None else owner_of(tip)
+    lowest = _poses(bed)
     for name in ("length", "width", "height"):
         assign(settings.fingertip, Fingertip, name, getattr(finger, name))
     if tip is not None and lowest is not None:
-        bridge.place_fingertip(tip, lowest, read_finger(settings))
-    if settings.blister_follows and finger.width != before.width:
+        bridge.resize_fingertip(tip, read_finger(settings))
+        bridge.move_fingertips(bed, lowest, [bridge.finger_of(one) for one in fingertips_of(bed).values()])
+    if settings == bed.digiclay and settings.blister_follows and finger.width != before.width:
         _scale_blister(settings, before, finger)
 
 
-def _pose(tip: Any) -> Any | None:
-    """Return the pose of a fingertip; None where there is none, or it has no meaning."""
+def _poses(bed: Any) -> Any | None:
+    """Return the poses (f, 7) of the fingertips of a bed; None where they have no meaning."""
     try:
-        return None if tip is None or tip.parent is None else bridge.pose(tip)
+        return bridge.poses(bed)
     except DigiclayError:
         return None
 

@@ -14,7 +14,6 @@ from ..core.model.fingertip import Fingertip
 from ..core.model.layout import ARRANGEMENTS
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
 from ..core.scene.toml_table import PRESETS
-from ..roles import fingertip_of
 from ..ui_text import localize
 from . import devices
 from .declared import WHOLE, Update, choice, fill, flag, group, make_group, number, text, title, whole
@@ -107,16 +106,16 @@ def take_blister(settings: Any, context: Any) -> None:
 
 
 def take_arrangement(layout: Any, context: Any) -> None:
-    """Set the share of the contact law a cell carries, which depends on how close the cells stand."""
-    settings = layout.id_data.digiclay
+    """Set the share of the contact laws a cell carries, which depends on how close the cells stand."""
     share = ARRANGEMENTS[layout.arrangement].share
     values = {} if share is None else {"share": share}
-    fill(settings.contact, import_parameters("contact", ""), ("share",), values)
+    for own in devices.list_settings(layout.id_data):
+        fill(own.contact, import_parameters("contact", ""), ("share",), values)
 
 
 def take_size(fingertip: Any, context: Any) -> None:
     """Show the fingertip in its new size."""
-    tip = fingertip_of(fingertip.id_data)
+    tip = devices.find_tip(fingertip.id_data)
     if tip is not None:
         bridge.resize_fingertip(tip, devices.read_finger(fingertip.id_data.digiclay))
 

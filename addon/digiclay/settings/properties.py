@@ -17,7 +17,9 @@ from ..core.base.quantity import Parameters, list_quantities
 from ..core.control.methods import METHODS, find_method, list_methods
 from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
-from ..core.scene.toml_table import ABSENT, resolve
+from ..core.scene.toml_table import ABSENT, FINGER_PARTS, FINGERS, resolve
+from ..roles import fingertips_of
+from . import devices
 from .declared import Notes, read, title, write
 from .groups import CLASSES, SETTINGS, find_group, method_of
 from .shown_units import convert_units
@@ -59,11 +61,15 @@ class StoredSettings(NamedTuple):
     file: str
     #: As Blender stores them.
     values: dict[str, Any]
+    #: Numbers of the fingertips, and what further ones store of their own.
+    fingers: tuple[tuple[int, dict[str, Any]], ...]
 
 
 def read_stored_settings(bed: Any) -> StoredSettings:
     """Return what `read_scene` makes the scene of, in a small part of its time."""
-    return StoredSettings(bed.name, bpy.data.filepath, read_stored(bed, "digiclay"))
+    tips = fingertips_of(bed).items()
+    fingers = tuple((number, read_stored(tip, "digiclay") if number > 1 else {}) for number, tip in tips)
+    return StoredSettings(bed.name, bpy.data.filepath, read_stored(bed, "digiclay"), fingers)
 
 
 def scene_of(bed: Any) -> Scene:
@@ -88,22 +94,25 @@ def read_scene(bed: Any) -> Scene:
 def table_of(bed: Any) -> dict[str, Any]:
     """Return a bed's settings as the tables of a scene file."""
     settings = bed.digiclay
-    method, notes = method_of(settings), _notes(settings)
+    method = method_of(settings)
     formed = find_method(method).blister is not None  # refuses one that is not known here
     table: dict[str, Any] = {"name": _printable(bed.name), "preset": settings.preset}
+    each = devices.list_settings(bed)
+    fingers: list[dict[str, Any]] = [{} for _ in each]
     for section in SECTIONS:
-        if section in OPTIONAL and not getattr(settings, f"use_{section}"):
-            table[section] = ABSENT
-        elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
-            continue
-        elif section != "blister" or formed:
-            own = part_group(settings, section)
-            kind = import_parameters(section, method)
-            values = read(own, kind, notes.get(_key(section, method), {}), section)
-            table[section] = {key: _path(value) for key, value in values.items()}
+        holders = zip(each, fingers, strict=True) if section in FINGER_PARTS else [(settings, table)]
+        for own, part in holders:
+            if section in OPTIONAL and not getattr(settings, f"use_{section}"):
+                part[section] = ABSENT
+            elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
+                continue
+            elif section != "blister" or formed:
+                kind, notes = import_parameters(section, method), _notes(own).get(_key(section, method), {})
+                values = read(part_group(own, section), kind, notes, section)
+                part[section] = {key: _path(value) for key, value in values.items()}
     if settings.use_control:
         table["control"]["method"] = method
-    return table
+    return table | (fingers[0] if len(fingers) == 1 else {FINGERS: fingers})
 
 
 def write_scene(bed: Any, scene: Scene) -> None:
@@ -114,12 +123,22 @@ def write_scene(bed: Any, scene: Scene) -> None:
     setattr(settings, "method" if scene.method in METHODS else "own_method", scene.method)
     notes = _notes(settings)
     for section in SECTIONS:
-        part: Parameters | None = scene.section(section)
+        owner: Any = scene.fingers[0] if section in FINGER_PARTS else scene
+        part: Parameters | None = getattr(owner, section)
         if section in OPTIONAL:
             setattr(settings, f"use_{section}", part is not None)
         if part is not None:
-            own = part_group(settings, section)
-            notes[_key(section, scene.method)] = write(own, part)
+            notes[_key(section, scene.method)] = write(part_group(settings, section), part)
+    _keep_notes(settings, notes)
+    for own, finger in zip(devices.list_settings(bed), scene.fingers, strict=False):
+        parts = {section: getattr(finger, section) for section in FINGER_PARTS}
+        if own != settings:
+            given = {section: part for section, part in parts.items() if part is not None}
+            _keep_notes(own, {section: write(getattr(own, section), part) for section, part in given.items()})
+
+
+def _keep_notes(settings: Any, notes: dict[str, Notes]) -> None:
+    """Store what properties cannot hold, by part."""
     settings.notes = json.dumps({key: noted for key, noted in notes.items() if noted})
 
 

@@ -29,7 +29,7 @@ def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_se
     session = running.find(bed)
     assert session is not None
     assert beds.read_snapshot(bed) == snapshot.dump(session.system, session.state)
-    assert np.array_equal(beds.read_pose(bed), session.pose)
+    assert np.array_equal(beds.read_poses(bed), session.poses)
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
     assert exact(bed).min() < 39e-3
 

@@ -30,8 +30,8 @@ class RecentTrace:
     pins: tuple[int, ...]
     """The picked pins, at most `PICKED`."""
     rows: Floats
-    """(k, 3 + PICKED): Time, s; total force, N; set point, N, or NaN where there is none; heights of the
-    picked pins, m, NaN for those that are not there. Oldest first."""
+    """(k, 3 + PICKED + f): Time, s; total force, N; set point, N, or NaN where there is none; heights of the
+    picked pins, m, NaN for those that are not there; of several fingers the forces, N. Oldest first."""
 
     @property
     def time(self) -> Floats:
@@ -49,16 +49,20 @@ class RecentTrace:
         return self.rows[:, 2]
 
     @property
+    def finger_forces(self) -> Floats:
+        """Forces of several fingers, shape (k, f), N; (k, 0) of one."""
+        return self.rows[:, 3 + PICKED :]
+
+    @property
     def heights(self) -> Floats:
         """Heights of the picked pins, shape (k, number of pins), m."""
         return self.rows[:, 3 : 3 + len(self.pins)]
 
 
-def start(period: float, pins: Sequence[int] = ()) -> RecentTrace:
+def start(period: float, pins: Sequence[int] = (), fingers: int = 1) -> RecentTrace:
     """Return an empty trace for a control period, s. `period`, s; `pins`: whose heights are kept."""
-    return RecentTrace(
-        max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), np.empty((0, 3 + PICKED))
-    )
+    rows = np.empty((0, 3 + PICKED + (fingers if fingers > 1 else 0)))
+    return RecentTrace(max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), rows)
 
 
 def pick(trace: RecentTrace, pins: Sequence[int], count: int) -> RecentTrace:
@@ -67,7 +71,7 @@ def pick(trace: RecentTrace, pins: Sequence[int], count: int) -> RecentTrace:
     if kept == trace.pins:
         return trace
     rows = trace.rows.copy()
-    rows[:, 3:] = np.nan
+    rows[:, 3 : 3 + PICKED] = np.nan
     for column, pin in enumerate(kept):
         if pin in trace.pins:  # its past stays to be seen
             rows[:, 3 + column] = trace.rows[:, 3 + trace.pins.index(pin)]
@@ -110,7 +114,8 @@ def sample(system: System, state: State, set_point: SetPoint | None, pins: Seque
         (at,) = np.nonzero(active.cells == pin)
         heights[column] = float(active.block[0, at[0]] if at.size else state.rows[0, pin])
     wanted = find_set_point(set_point, np.count_nonzero(active.mode == Mode.FORCE_FOLLOW))
-    return [state.period * system.period, measure_total_force(system, state), float(wanted), *heights]
+    row = [state.period * system.period, measure_total_force(system, state), float(wanted), *heights]
+    return [*row, *state.finger_forces().tolist()] if system.fingers > 1 else row
 
 
 def extend(trace: RecentTrace, rows: list[list[float]]) -> RecentTrace:

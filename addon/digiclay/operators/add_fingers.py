@@ -1,0 +1,101 @@
+"""Further fingertips of a bed, alone or as a hand."""
+
+from typing import Any
+
+import numpy as np
+
+from .. import bridge
+from ..core.base.arrays import Floats
+from ..core.base.errors import DigiclayError
+from ..device import parts, view
+from ..device.instant import CLEARANCE
+from ..device.node_tree import ARROWS
+from ..roles import FINGERS, bed_of, fingertips_of
+from ..settings import devices
+from ..settings.declared import choice
+from ..ui_text import localize
+from .action import action
+from .add_bed import select_only
+from .poll_messages import linked, no_bed
+
+#: Distance that new fingertips keep from others, m: the masters of nearer ones would disturb each other.
+APART = 18e-3
+#: Fingertips of a right hand that lies relaxed, from its palm: x, y, m, thumb first; and where its wrist is.
+HAND = ((-30e-3, -6e-3), (-18e-3, 18e-3), (0.0, 24e-3), (18e-3, 19e-3), (30e-3, 4e-3))
+WRIST = (2e-3, -70e-3)
+#: How far beside the bed a place is looked for, m, and the steps.
+BESIDE, STEP = 80e-3, 3e-3
+
+
+@action("digiclay.add_fingertip", "Add Fingertip", no_bed, linked)
+def add_fingertip(operator: Any, context: Any) -> None:
+    """Add another fingertip to the bed; a running session takes it up"""
+    bed = bed_of(context)
+    parts.find_free_number(bed)
+    x, y = _find_place(bed, np.zeros((1, 2)))
+    (tip,) = _add(bed, np.array([[x, y, 0.0]]))
+    select_only(context, tip)
+
+
+@action(
+    "digiclay.add_hand", "Add Hand", no_bed, linked,
+    side=choice("Side", "Which hand", items=[("RIGHT", "Right", ""), ("LEFT", "Left", "")]),
+)  # fmt: skip
+def add_hand(operator: Any, context: Any) -> None:
+    """Add the five fingertips of a hand to the bed, on an empty that moves them as one"""
+    bed = bed_of(context)
+    count = len(fingertips_of(bed)) + len(HAND)
+    if count > len(FINGERS):
+        raise DigiclayError(localize(parts.TOO_MANY, len(FINGERS), count))
+    mirror = np.array([-1.0 if operator.side == "LEFT" else 1.0, 1.0])
+    places = np.array(HAND) * mirror
+    away = places - np.array(WRIST) * mirror
+    palm = parts.make_palm(bed.users_collection[0], bed)
+    x, y = _find_place(bed, places)
+    palm.location = np.array([x, y, _find_top(bed)]) * bridge.SCALE
+    palm.location.z += 2.0 * devices.read_finger(bed.digiclay).height * bridge.SCALE
+    context.view_layer.update()
+    _add(bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm)
+    select_only(context, palm)
+
+
+def _find_place(bed: Any, places: Floats) -> Floats:
+    """Return how far to move places (k, 2), m, to be apart from other fingertips: over the bed, or beside."""
+    taken = bridge.poses(bed)[:, :2] if fingertips_of(bed) else np.empty((0, 2))
+    reach = np.abs(bridge.read_cells(bed.data)["position"]).max(axis=0) + BESIDE
+    axes = (np.arange(-int(most / STEP), int(most / STEP) + 1) * STEP for most in reach)
+    moves = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    moves = moves[np.argsort((moves**2).sum(axis=1), kind="stable")]
+    away = np.linalg.norm((moves[:, None] + places)[:, :, None] - taken, axis=-1).min(
+        axis=(1, 2), initial=1.0
+    )
+    return np.asarray(moves[(away >= APART).argmax()])
+
+
+def _find_top(bed: Any) -> float:
+    """Return the height at which new fingertips stand clear of all pins, m."""
+    return float(bridge.read_cells(bed.data)["height"].max()) + CLEARANCE
+
+
+def _add(bed: Any, places: Floats, palm: Any = None) -> list[Any]:
+    """Add fingertips at places and headings (k, 3), m, rad, above the pins, on a palm; return them."""
+    made, top = [], _find_top(bed)
+    for x, y, heading in places:
+        number = parts.find_free_number(bed)
+        tip = parts.make_fingertip(bed.users_collection[0], bed, number, palm)
+        devices.give_settings(bed, tip)
+        parts.color_fingertip(tip, number, clear=bool(view.read_setting(bed, ARROWS, False)))
+        tip.location = np.array([x, y, top + devices.read_finger(tip.digiclay).height]) * bridge.SCALE
+        if palm is not None:
+            tip.location -= palm.location
+        tip.rotation_quaternion = np.cos(heading / 2.0), 0.0, 0.0, np.sin(heading / 2.0)
+        made.append(tip)
+    view.hold_parts(bed)
+    return made
+
+
+def entries(menu: Any, context: Any) -> None:
+    """Draw the entries in Add > Mesh while a bed is active."""
+    if bed_of(context) is not None:
+        menu.layout.operator(add_fingertip.bl_idname, icon="META_BALL")
+        menu.layout.operator_menu_enum(add_hand.bl_idname, "side", icon="VIEW_PAN")

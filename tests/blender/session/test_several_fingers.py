@@ -1,0 +1,248 @@
+"""Sessions with several fingertips, which come and go meanwhile: the session goes on with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge
+from digiclay.core.base.modes import COLORS
+from digiclay.core.scene.scene_source import load
+from digiclay.device import unit
+from digiclay.live import beds, handlers, tick
+from digiclay.overlay import views
+from digiclay.recorded import takes
+from digiclay.roles import fingertips_of
+from digiclay.sessions import running, sculpting
+
+from tests.blender.at_hand import looked, select
+from tests.blender.session.live import Clock, exact, only_bed, shown, started, waits
+
+#: Where fingertips press, by number: x and y, mm.
+PLACES = {1: (-10.0, -10.0), 2: (10.0, 10.0), 3: (10.0, -10.0)}
+
+
+@pytest.fixture(autouse=True)
+def watched() -> Iterator[None]:
+    """Look after beds as in a window."""
+    yield
+    unit.unregister()
+
+
+@pytest.fixture
+def pair(bed: Any) -> Any:
+    """A bed with two fingertips above it."""
+    unit.watch()
+    select(bed)
+    bpy.ops.digiclay.add_fingertip()
+    select(bed)
+    move(bed, {1: 46.0, 2: 46.0})
+    bpy.ops.ed.undo_push(message="Two")
+    looked()
+    return bed
+
+
+def move(bed: Any, heights: dict[int, float]) -> None:
+    """Put the lowest points of fingertips to heights, mm, each at its place."""
+    for number, z in heights.items():
+        # The semi-axis upwards is 8 mm: the empty is the ellipsoid's center.
+        tip = fingertips_of(bed)[number]
+        tip.location = np.array([*PLACES[number], z + 8.0]) * 1e-3 * bridge.SCALE
+
+
+def press(bed: Any, clock: Clock, *numbers: int, lift: bool = True) -> list[tick.Note]:
+    """Press fingertips 3 mm deep, and lift them; return the messages."""
+    notes = []
+    down = np.linspace(46.0, 37.0, 8)
+    for z in [*down, *[37.0] * 8, *([*down[::-1], *[46.0] * 8] if lift else [])]:
+        move(bed, dict.fromkeys(numbers, z))
+        notes += clock.tick()
+    return notes
+
+
+def depth(bed: Any, number: int) -> float:
+    """Return how far the pins below the place of a fingertip are pressed, mm."""
+    places = bridge.read_cells(bed.data)["position"]
+    under = np.linalg.norm(places - 1e-3 * np.array(PLACES[number]), axis=1) < 4e-3
+    return float(40.0 - 1e3 * exact(bed)[under].min())
+
+
+def test_each_fingertip_forms_and_is_recorded_and_told_with_its_own_force(pair: Any, clock: Clock) -> None:
+    started(pair)
+    running.put(sculpting.set_recording(running.find(pair), True))
+    move(pair, {1: 46.0, 2: 46.0})
+    assert press(pair, clock, 2, lift=False) == []
+    session = running.find(pair)
+    one, two = session.state.finger_forces()
+    assert (one, two > 0.01) == (0.0, True)
+    assert depth(pair, 2) > 1.0 > 0.01 > depth(pair, 1)
+    told = views.read_session(pair, session, COLORS)
+    assert [number for number, _ in told.fingers] == [1, 2]
+    np.testing.assert_array_equal(told.finger_force[-1], [one, two])
+    assert told.force[-1] == pytest.approx(one + two, rel=1e-9)
+    take = takes.read_recording(session)
+    assert take.poses.shape == (session.state.period + 1, 2, 7)
+    np.testing.assert_array_equal(beds.read_poses(pair), session.poses)
+    move(pair, {2: 46.0})
+    clock.tick(20)
+    press(pair, clock, 1, 2)
+    assert depth(pair, 1) > 1.0
+
+
+def test_a_fingertip_that_is_added_in_mid_session_forms_too(pair: Any, clock: Clock) -> None:
+    started(pair)
+    running.put(sculpting.set_recording(running.find(pair), True))
+    assert press(pair, clock, 1, 2) == []
+    before = exact(pair)
+    bpy.ops.digiclay.add_fingertip()
+    bpy.ops.ed.undo_push(message="Add")
+    looked()
+    notes = clock.tick()
+    assert ["kept as Take 1" in note.message for note in notes] == [True]
+    session = running.find(pair)
+    assert (session.numbers, len(session.poses)) == ((1, 2, 3), 3)
+    # What moves still moves on for a tick, nothing else.
+    assert np.abs(exact(pair) - before).max() < 1e-5
+    assert press(pair, clock, 3) == []
+    assert min(depth(pair, number) for number in (1, 2, 3)) > 1.0
+    depths = []
+    while running.find(pair).gestures:
+        bpy.ops.digiclay.session_rewind()
+        depths.append([depth(pair, number) for number in (1, 2, 3)])
+    # Back to where the third one had not touched, and on to before there was a third one.
+    assert any(min(one, two) > 1.0 > 0.1 > three for one, two, three in depths)
+    assert max(depths[-1]) < 0.01
+    assert clock.tick(3) == []
+
+
+@pytest.mark.parametrize("gone", [1, 2])
+@pytest.mark.parametrize("how", ["deleted", "removed", "unparented"])
+def test_the_session_goes_on_with_the_fingertips_that_are_left(
+    pair: Any, clock: Clock, gone: int, how: str
+) -> None:
+    started(pair)
+    press(pair, clock, 1, 2, lift=False)
+    left = 3 - gone
+    bpy.ops.ed.undo_push(message="Pressed")
+    if how == "deleted":
+        select(fingertips_of(pair)[gone])
+        bpy.ops.object.delete()
+    elif how == "removed":
+        bpy.data.objects.remove(fingertips_of(pair)[gone])
+    else:
+        fingertips_of(pair)[gone].parent = None
+    bpy.ops.ed.undo_push(message="Delete")
+    looked()
+    assert [note for note in clock.tick(20) if note.level != "INFO"] == []
+    session = running.find(pair)
+    assert (session.numbers, session.blocking_reason) == ((left,), "")
+    assert session.state.finger_forces().shape == (1,)
+    deep = depth(pair, left)
+    assert press(pair, clock, left) == []
+    assert depth(pair, left) > deep - 1.0
+    bpy.ops.ed.undo()
+    looked()
+    clock.tick(handlers.STALE)
+    bed = only_bed()
+    assert tuple(fingertips_of(bed)) == (1, 2)
+    assert running.find(bed).numbers == (1, 2)
+    assert press(bed, clock, 1, 2) == []
+
+
+def test_a_session_waits_without_any_fingertip(pair: Any, clock: Clock) -> None:
+    started(pair)
+    for tip in fingertips_of(pair).values():
+        bpy.data.objects.remove(tip)
+    waits(pair, clock, words="fingertip is deleted")
+
+
+def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock) -> None:
+    started(pair)
+    move(pair, {1: 46.0, 2: 45.0})
+    clock.tick(5)
+    before = bridge.poses(pair)
+    running.put(sculpting.queue_stroke(running.find(pair), -10e-3, -10e-3, 4e-3)[0])
+    clock.tick(10)
+    now = bridge.poses(pair)
+    np.testing.assert_allclose(now[1], before[1], rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert np.abs(now[0] - before[0]).max() > 1e-3
+    assert depth(pair, 1) > 1.0 > 0.01 > depth(pair, 2)
+
+
+def keyframe(pair: Any) -> None:
+    """Have both fingertips pressed down and lifted from frame 1 to 20, one after the other."""
+    for number, frames in ((1, (1, 5, 10)), (2, (10, 15, 20))):
+        for frame, z in zip(frames, (46.0, 37.0, 46.0), strict=True):
+            move(pair, {number: z})
+            fingertips_of(pair)[number].keyframe_insert("location", frame=frame)
+
+
+def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exported(
+    pair: Any, clock: Clock, tmp_path: Path
+) -> None:
+    started(pair)
+    running.put(sculpting.set_recording(running.find(pair), True))
+    press(pair, clock, 1, 2)
+    formed = exact(pair)
+    tick.stop(pair.session_uid)
+    looked()
+    bpy.ops.digiclay.take_replay()
+    np.testing.assert_array_equal(exact(pair), formed)
+    bpy.ops.digiclay.take_export(filepath=str(tmp_path / "pair.toml"))
+    assert len(load(tmp_path / "pair.toml").fingers) == 2
+    assert bpy.ops.digiclay.bake(source="TAKE") == {"FINISHED"}
+    take = takes.read(pair)
+    bpy.context.scene.frame_set(20)
+    row = round(19 / 24 / take.scene.simulation.control_period)
+    np.testing.assert_allclose(bridge.poses(pair), take.poses[row], rtol=0, atol=1e-6)  # Blender's 32 bits
+    bpy.ops.digiclay.bake_free()
+    for tip in fingertips_of(pair).values():
+        tip.animation_data_clear()
+    keyframe(pair)
+    assert bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=20) == {"FINISHED"}
+    bpy.context.scene.frame_set(20)
+    graph = bpy.context.evaluated_depsgraph_get()
+    tops = np.array([item.matrix_world.translation.z for item in graph.object_instances if item.is_instance])
+    assert tops.size > 0
+
+
+ODD: dict[str, Callable[[Any], object]] = {
+    "scaled to nothing": lambda tip: tip.scale.zero(),
+    "no finger at a finite place": lambda tip: setattr(tip, "location", (np.nan, 0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("what", ODD)
+def test_an_odd_fingertip_has_the_session_wait_and_nothing_is_lost(
+    pair: Any, clock: Clock, what: str
+) -> None:
+    started(pair)
+    press(pair, clock, 1, 2)
+    before = exact(pair)
+    ODD[what](fingertips_of(pair)[2])
+    waits(pair, clock, words="scaled to nothing")
+    np.testing.assert_array_equal(exact(pair), before)
+    np.testing.assert_allclose(shown(pair), before, rtol=0, atol=1e-8)
+
+
+def test_the_state_of_two_is_continued_by_three_and_by_one(pair: Any, clock: Clock) -> None:
+    started(pair)
+    press(pair, clock, 1, 2)
+    tick.stop(pair.session_uid)
+    formed = exact(pair)
+    bpy.ops.digiclay.add_fingertip()
+    looked()
+    started(pair)
+    assert running.find(pair).numbers == (1, 2, 3)
+    np.testing.assert_array_equal(running.find(pair).state.row(0), formed)
+    tick.stop(pair.session_uid)
+    for number in (1, 3):
+        bpy.data.objects.remove(fingertips_of(pair)[number])
+    looked()
+    started(pair)
+    assert running.find(pair).numbers == (2,)
+    np.testing.assert_array_equal(running.find(pair).state.row(0), formed)

@@ -1,0 +1,305 @@
+"""Further fingertips of a bed, and hands: added, moved, copied, deleted, undone, appended as the first is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge
+from digiclay.device.palettes import FINGERS as COLORS
+from digiclay.roles import BALL, PALM, ROLE, ellipsoid, fingertips_of, is_linked
+from digiclay.settings import properties
+
+from tests.blender.at_hand import added, beds, done, looked, redone, select, undone
+
+pytestmark = pytest.mark.usefixtures("watched")
+
+
+def with_finger() -> Any:
+    """Add a bed with two fingertips."""
+    bed = added()
+    assert bpy.ops.digiclay.add_fingertip() == {"FINISHED"}
+    done("Add Fingertip")
+    return bed
+
+
+def with_hand(side: str = "RIGHT") -> Any:
+    """Add a bed with a hand beside its fingertip; the palm is active."""
+    bed = added()
+    assert bpy.ops.digiclay.add_hand(side=side) == {"FINISHED"}
+    done("Add Hand")
+    return bed
+
+
+def palms() -> list[Any]:
+    """Return the palms that stand in a collection."""
+    return [thing for thing in bpy.data.objects if thing.get(ROLE) == PALM and is_linked(thing)]
+
+
+def sound(bed: Any, *numbers: int) -> bool:
+    """Tell whether a bed has fingertips of these numbers, each with an ellipsoid of its own that stands."""
+    tips = fingertips_of(bed)
+    balls = {ellipsoid(tip) for tip in tips.values()}
+    scene = set(bpy.context.scene.objects)
+    whole = len(balls) == len(tips) and None not in balls and {*tips.values(), *balls} <= scene
+    return whole and tuple(tips) == numbers and len(properties.read_scene(bed).fingers) == len(numbers)
+
+
+def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself() -> None:
+    bed = with_finger()
+    bpy.ops.digiclay.add_hand()
+    done("Add Hand")
+    assert sound(bed, *range(1, 8))
+    poses = bridge.poses(bed)
+    away = np.linalg.norm(poses[:, None, :2] - poses[:, :2], axis=-1)[~np.eye(7, dtype=bool)]
+    assert away.min() >= 18e-3 - 1e-6  # Blender's 32 bits
+    assert poses[:, 2].min() > bridge.read_cells(bed.data)["height"].max()
+    before, second = properties.read_scene(bed), fingertips_of(bed)[2]
+    second.digiclay.fingertip.width *= 1.5
+    looked()
+    after = properties.read_scene(bed)
+    assert after.fingers[1].fingertip.width == pytest.approx(1.5 * before.fingers[0].fingertip.width)
+    assert [one for number, one in enumerate(after.fingers) if number != 1] == [before.fingers[0]] * 6
+    assert (after.blister, bridge.finger_of(second)) == (before.blister, after.fingers[1].fingertip)
+    bed.digiclay.fingertip.whole_width *= 0.5  # the first one's, which the blister follows
+    last = properties.read_scene(bed)
+    assert last.fingers[1:] == after.fingers[1:]
+    assert last.fingers[0] != after.fingers[0]
+    assert last.blister != after.blister
+
+
+def test_a_fingertip_whose_own_size_is_set_stays_where_its_lowest_point_is() -> None:
+    bed = with_hand()
+    palms()[0].rotation_euler = (0.2, 0.1, 0.7)
+    looked()
+    before = bridge.poses(bed)
+    fingertips_of(bed)[4].digiclay.fingertip.whole_height *= 1.7
+    looked()
+    np.testing.assert_allclose(bridge.poses(bed), before, rtol=0, atol=1e-6)  # Blender's 32 bits
+
+
+@pytest.mark.parametrize("hand", [False, True], ids=["of the bed", "of a hand"])
+def test_a_copy_of_a_fingertip_is_a_further_one_with_the_size_of_the_one_copied(hand: bool) -> None:
+    bed = with_hand() if hand else added()
+    last = len(fingertips_of(bed))
+    if hand:
+        fingertips_of(bed)[last].digiclay.fingertip.length = 7.0
+    bed.digiclay.fingertip.width = 6.0
+    select(fingertips_of(bed)[last])
+    bpy.ops.object.duplicate()
+    bpy.context.object.location.x += 0.3
+    done("Duplicate")
+    assert sound(bed, *range(1, last + 2))
+    tips = fingertips_of(bed)
+    assert tips[last].parent == tips[last + 1].parent
+    fingers = properties.read_scene(bed).fingers
+    assert fingers[-1] == fingers[-2]
+    undone()
+    assert sound(beds()[0], *range(1, last + 1))
+    redone()
+    assert sound(beds()[0], *range(1, last + 2))
+
+
+def test_a_deleted_fingertip_leaves_its_number_to_the_next_one_and_comes_back_with_undo() -> None:
+    bed = with_finger()
+    bpy.ops.digiclay.add_fingertip()
+    done("Add Fingertip")
+    select(fingertips_of(bed)[2])
+    bpy.ops.object.delete()
+    done("Delete")
+    assert sound(bed, 1, 3)
+    undone()
+    assert sound(beds()[0], 1, 2, 3)
+    redone()
+    (bed,) = beds()
+    assert sound(bed, 1, 3)
+    select(bed)
+    bpy.ops.digiclay.add_fingertip()
+    done("Add Fingertip")
+    assert sound(bed, 1, 2, 3)
+    select(*fingertips_of(bed).values())
+    bpy.ops.object.delete()
+    done("Delete")
+    assert fingertips_of(bed) == {}
+
+
+@pytest.mark.parametrize("where", ["bed", "palm"])
+def test_a_hand_moves_is_hidden_and_is_deleted_with_its_palm(where: str) -> None:
+    bed = with_hand()
+    palm, before = palms()[0], bridge.poses(bed)
+    palm.location.x += 0.1
+    looked()
+    moved = bridge.poses(bed) - before
+    np.testing.assert_allclose(moved[:, 0], [0.0] + [0.01] * 5, rtol=0, atol=1e-6)  # Blender's 32 bits
+    whole = bed if where == "bed" else palm
+    whole.hide_set(True)
+    done("Hide")
+    hidden = [tip.hide_get() for tip in fingertips_of(bed).values()]
+    assert hidden == [where == "bed"] + [True] * 5
+    whole.hide_set(False)
+    done("Show")
+    assert not any(tip.hide_get() for tip in fingertips_of(bed).values())
+    select(whole)
+    bpy.ops.object.delete()
+    done("Delete")
+    assert palms() == []
+    if where == "bed":
+        assert len(bpy.context.scene.objects) == 0
+    else:
+        assert sound(bed, 1)
+        assert len(bpy.context.scene.objects) == 3
+    undone()
+    (bed,) = beds()
+    assert sound(bed, *range(1, 7))
+    assert [tip.parent for tip in fingertips_of(bed).values()] == [bed] + palms() * 5
+    redone()
+    assert palms() == []
+
+
+COPIES: dict[str, Callable[[Any], object]] = {
+    "the bed": lambda bed: select(bed),
+    "the bed and its palm": lambda bed: select(palms()[0], bed),
+    "the bed and one fingertip": lambda bed: select(fingertips_of(bed)[3], bed),
+    "all": lambda bed: (
+        bpy.ops.object.select_all(action="SELECT"),
+        select(*bpy.context.selected_objects, bed),
+    ),
+}
+
+
+@pytest.mark.parametrize("what", COPIES)
+def test_a_copy_of_a_bed_has_a_hand_of_its_own(what: str) -> None:
+    bed = with_hand()
+    fingertips_of(bed)[5].digiclay.fingertip.length = 7.0
+    before, scene = bridge.poses(bed), properties.read_scene(bed)
+    COPIES[what](bed)
+    bpy.ops.object.duplicate()
+    done("Duplicate")
+    copy = next(one for one in beds() if one != bed)
+    assert sound(bed, *range(1, 7))
+    assert sound(copy, *range(1, 7))
+    assert sorted(palm.parent.name for palm in palms()) == sorted([bed.name, copy.name])
+    assert len(bpy.context.scene.objects) == 2 * (1 + 2 * 6 + 1)
+    for each in (bed, copy):
+        np.testing.assert_allclose(bridge.poses(each), before, rtol=0, atol=1e-6)  # Blender's 32 bits
+        assert properties.read_scene(each).fingers == scene.fingers
+    undone()
+    assert len(beds()) == 1
+    assert sound(beds()[0], *range(1, 7))
+
+
+def test_a_copy_of_a_palm_alone_is_another_hand() -> None:
+    bed = with_hand()
+    select(palms()[0])
+    bpy.ops.object.duplicate()
+    bpy.context.object.location.y += 0.5
+    done("Duplicate")
+    assert sound(bed, *range(1, 12))
+    assert len(palms()) == 2
+    poses = bridge.poses(bed)
+    np.testing.assert_allclose(poses[6:, :3] - poses[1:6, :3], [[0.0, 0.05, 0.0]] * 5, rtol=0, atol=1e-6)
+
+
+def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by_its_fingertips() -> None:
+    bed = with_hand()
+    palm, wanted = palms()[0], bridge.poses(bed)
+    own = [tuple(tip.location) for tip in palm.children]
+    fingers = [bridge.finger_of(tip) for tip in fingertips_of(bed).values()]
+    wanted[1:, :3] += [0.01, -0.02, 0.003]
+    bridge.move_fingertips(bed, wanted, fingers)
+    looked()
+    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)  # Blender's 32 bits
+    np.testing.assert_allclose([tuple(tip.location) for tip in palm.children], own, rtol=0, atol=1e-5)
+    stood = tuple(palm.location)
+    wanted[3, 2] += 0.002
+    bridge.move_fingertips(bed, wanted, fingers)
+    looked()
+    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(palm.location, stood, rtol=0, atol=1e-5)
+    wanted[2, 1] += 0.002  # of one alone, as a press stroke moves the first one
+    bridge.move_fingertips(bed, wanted[:3], fingers)
+    looked()
+    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)
+
+
+def test_a_bed_has_at_most_32_fingertips() -> None:
+    bed = added()
+    for _ in range(6):
+        bpy.ops.digiclay.add_hand(side="LEFT")
+    bpy.ops.digiclay.add_fingertip()
+    done("Add")
+    assert sound(bed, *range(1, 33))
+    objects = len(bpy.data.objects)
+    for add in (bpy.ops.digiclay.add_fingertip, bpy.ops.digiclay.add_hand):
+        with pytest.raises(
+            RuntimeError, match=r"^Error: A bed has at most 32 fingertips \(got 3[37]\)\.\s*$"
+        ):
+            add()
+    assert len(bpy.data.objects) == objects
+    select(fingertips_of(bed)[7])
+    bpy.ops.object.duplicate()
+    done("Duplicate")  # it stays what it looks like, and touches nothing
+    assert tuple(fingertips_of(bed)) == tuple(range(1, 33))
+
+
+@pytest.mark.parametrize("how", ["append", "link"])
+def test_a_bed_of_another_file_comes_with_its_hand(tmp_path: Path, how: str) -> None:
+    bed = with_hand()
+    before, name = bridge.poses(bed), bed.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    looked()
+    source = {"directory": str(tmp_path / "bed.blend" / "Object") + "/", "filename": name}
+    if how == "append":
+        bpy.ops.wm.append(**source)
+    else:
+        bpy.ops.wm.link(**source)
+        done("Link")
+        select(bpy.context.scene.objects[0])
+        bpy.ops.object.make_local(type="ALL")
+    done("Append")
+    (bed,) = beds()
+    assert sound(bed, *range(1, 7))
+    np.testing.assert_allclose(bridge.poses(bed), before, rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert len(bpy.context.scene.objects) == 1 + 2 * 6 + 1
+
+
+def test_a_copy_of_a_fingertip_that_a_loaded_file_has_stays_one_to_look_at(tmp_path: Path) -> None:
+    bed = added()
+    (tip,) = fingertips_of(bed).values()
+    stray = tip.copy()
+    stray[BALL] = None
+    bpy.context.collection.objects.link(stray)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bed.blend"))
+    done("Open")
+    assert tuple(fingertips_of(beds()[0])) == (1,)
+
+
+def read_linear(color: tuple[float, ...]) -> np.ndarray:
+    """Return an sRGB color in linear light."""
+    shown = np.array(color)
+    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+
+
+#: Linear light as people without one kind of cones see it: Machado, Oliveira and Fernandes 2009.
+VISION = {
+    "all cones": np.eye(3),
+    "no long": [[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0520]],
+    "no middle": [[0.3673, 0.8607, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9690]],
+    "no short": [[1.2555, -0.0768, -0.1788], [-0.0784, 0.9308, 0.1476], [0.0047, 0.6914, 0.3039]],
+}
+
+
+@pytest.mark.parametrize("vision", VISION)
+def test_ten_fingertips_are_told_apart_by_their_colors(vision: str) -> None:
+    light = np.clip(np.array([read_linear(color) for color in COLORS]) @ np.array(VISION[vision]).T, 0.0, 1.0)
+    cones = np.cbrt(light @ [[0.4122, 0.2119, 0.0883], [0.5363, 0.6807, 0.2817], [0.0514, 0.1074, 0.6300]])
+    lab = cones @ [[0.2105, 1.9780, 0.0259], [0.7936, -2.4286, 0.7828], [-0.0041, 0.4506, -0.8087]]
+    apart = np.linalg.norm(lab[:, None] - lab, axis=-1)[~np.eye(len(COLORS), dtype=bool)]
+    # Distances of OKLab: 0.02 is just seen; those of Tol's muted set, which is made for it, begin at 0.05.
+    assert (len(COLORS), apart.min() > 0.12) == (10, True)
