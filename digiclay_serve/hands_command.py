@@ -18,10 +18,9 @@ from digiclay.commands.arguments import Options, add_command, add_options, milli
 from digiclay.commands.stop import Stop, refuse_without
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, OutputError
-from digiclay.core.model.fingertip import LEVEL
 
 from .hts import Hands
-from .protocol import VARIABLE, Poses, choose_token, pack_poses
+from .protocol import VARIABLE, choose_token
 
 EXAMPLES = """\
 examples:
@@ -72,18 +71,18 @@ def carry_out(arguments: argparse.Namespace) -> int:
         raise OutputError(f"digiclay hands needs the token of the server: --token, or {VARIABLE}.")
     token, pad = choose_token(arguments.token)[0], (arguments.height, arguments.size, arguments.depth)
     source = Hands(arguments.height) if arguments.source == "hts" else Pad(*pad)
-    packets = read_packets(arguments.play) if arguments.play else None
     with Stop() as stop:
         try:
-            asyncio.run(_pass_on(arguments, source, packets, token, stop))
+            asyncio.run(_pass_on(arguments, source, token, stop))
         except OSError as error:
             where = f": {error.filename}" if error.filename else ""
             raise OutputError(f"digiclay hands has ended: {error.strerror or error}{where}.") from None
     return 0
 
 
-async def _pass_on(arguments: argparse.Namespace, source: Any, packets: Any, token: str, stop: Stop) -> None:
+async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop: Stop) -> None:
     """Pass what comes on to the server; fingers that rest are named again and again."""
+    packets = read_packets(arguments.play) if arguments.play else None
     came, told = asyncio.Event(), -math.inf
     async with AsyncExitStack() as stack:
         file = stack.enter_context(arguments.record.open("x", encoding="utf-8")) if arguments.record else None
@@ -106,16 +105,16 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, packets: Any, tok
             came.set()
 
         send = await stack.enter_async_context(_connect(arguments.to, token, tell))
-        player = None if packets is None else asyncio.ensure_future(_play(packets, take))
         if packets is None:
             await _listen(stack, arguments.host, arguments.port or PORTS[arguments.source], take)
-        while not stop() and not (player and player.done()):
+        late = time.monotonic() - packets[0][0] if packets else 0.0
+        while not stop() and packets != []:
             with suppress(TimeoutError):
-                await asyncio.wait_for(came.wait(), AGAIN)
+                await asyncio.wait_for(came.wait(), AGAIN if packets is None else AGAIN / 10.0)
             came.clear()
+            while packets and packets[0][0] + late <= time.monotonic():
+                take(packets.pop(0)[1])
             await send(source.fingers(time.monotonic()))
-        if player:
-            player.cancel()
 
 
 async def _listen(stack: AsyncExitStack, host: str, port: int, take: Callable[[bytes], None]) -> None:
@@ -150,14 +149,6 @@ def read_packets(path: Path) -> list[tuple[float, bytes]]:
     return packets
 
 
-async def _play(packets: list[tuple[float, bytes]], take: Callable[[bytes], None]) -> None:
-    """Give the packets of a recording at the times they came."""
-    late = time.monotonic() - packets[0][0] if packets else 0.0
-    for at, data in packets:
-        await asyncio.sleep(at + late - time.monotonic())
-        take(data)
-
-
 @asynccontextmanager
 async def _connect(address: str, token: str, tell: Callable[[object], None]) -> AsyncIterator[Send]:
     """Give the function that sends fingers to the server at an address; what it refuses is told."""
@@ -167,7 +158,7 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
 
     from .osc_door import format_osc
 
-    parts, number = urlsplit(address), 0
+    parts = urlsplit(address)
     try:
         if parts.scheme not in ("ws", "osc") or not parts.hostname or not parts.port:
             raise ValueError
@@ -194,15 +185,12 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
         return
 
     async def send(fingers: Mapping[int, Floats]) -> None:
-        nonlocal number
-        number = (number + 1) % 2**32
-        poses = tuple((one, (*place.tolist(), *LEVEL)) for one, place in fingers.items())
-        await server.send(pack_poses(Poses(poses, tuple(fingers), number)))
+        places = [{"id": one, "position": place.tolist()} for one, place in fingers.items()]
+        await server.send(json.dumps({"type": "poses", "fingers": places}))
 
     async def take_answers() -> None:
         async for message in server:
-            answer = json.loads(message)
-            if answer["type"] == "error":
+            if (answer := json.loads(message))["type"] == "error":
                 tell(f"server: {answer['message']}")
 
     header = {"Authorization": f"Bearer {token}"}

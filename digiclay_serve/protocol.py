@@ -54,14 +54,14 @@ def is_token(given: object, token: str) -> bool:
 
 VERSION = 1
 MARK = b"DC"
-STATE, POSE, RESET, POSES = 1, 2, 3, 4
+STATE, POSE, RESET = 1, 2, 3
 #: Mark, version, kind, and the pins of a frame or the number of a request.
 HEAD = struct.Struct("<2sBBI")
 #: Period, number of the last pose taken up, flags, time, total force, pose.
 BODY = struct.Struct("<QII9d")
 POSITION = struct.Struct("<7d")
-#: Identity and pose of a finger in a request; identity, force, pose in a frame.
-FINGER, FELT = struct.Struct("<I7d"), struct.Struct("<q8d")
+#: Identity, force and pose of a finger in a frame.
+FINGER = struct.Struct("<q8d")
 #: Most fingers of a session.
 MOST_FINGERS = 32
 #: No request is larger, bytes.
@@ -292,7 +292,7 @@ def _check_keys(message: dict[str, Any], allowed: set[str]) -> None:
         raise ParameterError("message", "", rule, repr(unknown[0])[:40])
 
 
-def read_binary(data: bytes) -> Pose | Poses | Reset:
+def read_binary(data: bytes) -> Pose | Reset:
     """Read a request in binary. Raises ParameterError when it is none."""
     if len(data) < HEAD.size or data[:2] != MARK:
         raise ParameterError("message", "", f"must begin with {MARK.decode()}", repr(data[:8]))
@@ -300,9 +300,6 @@ def read_binary(data: bytes) -> Pose | Poses | Reset:
     _check_version(version)
     if kind == RESET and len(data) == HEAD.size:
         return Reset()
-    if kind == POSES and (len(data) - HEAD.size) % FINGER.size == 0:
-        fingers = [(identity, pose) for identity, *pose in FINGER.iter_unpack(data[HEAD.size :])]
-        return check_fingers(fingers, None, number)
     if kind != POSE or len(data) != HEAD.size + POSITION.size:
         rule = f"must be a pose, kind {POSE} of {HEAD.size + POSITION.size} bytes, or a reset, kind {RESET}"
         raise ParameterError("message", "", rule, f"kind {kind} of {len(data)} bytes")
@@ -314,18 +311,12 @@ def pack_pose(request: Pose) -> bytes:
     return HEAD.pack(MARK, VERSION, POSE, request.number) + POSITION.pack(*request.pose)
 
 
-def pack_poses(request: Poses) -> bytes:
-    """Write poses in binary: those alive have one."""
-    fingers = (FINGER.pack(identity, *pose) for identity, pose in request.fingers)
-    return b"".join([HEAD.pack(MARK, VERSION, POSES, request.number), *fingers])
-
-
 def pack_frame(frame: Frame) -> bytes:
     """Write a frame in binary."""
     head = (frame.period, frame.number, frame.flags, frame.time, frame.total_force)
     body = BODY.pack(*head, *frame.pose.tolist())
     pins = (np.asarray(values, "<f4").tobytes() for values in (frame.heights, frame.forces))
-    fingers = (FELT.pack(identity, force, *pose) for identity, force, pose in frame.fingers)
+    fingers = (FINGER.pack(identity, force, *pose) for identity, force, pose in frame.fingers)
     return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins, *fingers])
 
 
@@ -334,12 +325,12 @@ def unpack_frame(data: bytes) -> Frame:
     start = HEAD.size + BODY.size
     mark, version, kind, pins = HEAD.unpack_from(data) if len(data) >= start else (b"", 0, 0, 0)
     end = start + 8 * pins
-    if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) < end or (len(data) - end) % FELT.size:
+    if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) < end or (len(data) - end) % FINGER.size:
         rule = f"must be a state, kind {STATE} of version {VERSION}"
         raise ParameterError("frame", "", rule, f"kind {kind} of {len(data)} bytes")
     period, number, flags, time, force, *pose = BODY.unpack_from(data, HEAD.size)
     heights, forces = np.frombuffer(data, "<f4", 2 * pins, start).reshape(2, pins)
-    fingers = tuple((each[0], each[1], each[2:]) for each in FELT.iter_unpack(data[end:]))
+    fingers = tuple((each[0], each[1], each[2:]) for each in FINGER.iter_unpack(data[end:]))
     return Frame(period, number, time, force, np.array(pose), heights, forces, flags, fingers)
 
 

@@ -11,7 +11,6 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -19,6 +18,7 @@ from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputErro
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
+from digiclay.core.model.contact import Contact
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -41,7 +41,7 @@ from .tracked_fingers import (
     CLEAR,
     PARKED,
     TRACKING,
-    Contact,
+    Felt,
     Tracking,
     Tracks,
     advance,
@@ -55,17 +55,6 @@ KEEP = 0.5
 ARM = 0.02
 #: How far around a fingertip pins are looked at, m: whatever is under it, and what it could run into.
 AROUND = 0.015
-
-
-class Pulp(NamedTuple):
-    """What `feel` needs of the fingers' laws: a row a finger, a column a filter of the relaxation."""
-
-    #: (f,): 1/m; and stiffness of a cell at first touch, N/m.
-    exponent: Floats
-    touch: Floats
-    #: (f, k): shares of the filters, and their rates, 1/s.
-    shares: Floats
-    rates: Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,8 +76,7 @@ class Session(LiveSession):
     #: Of fingers with identities, after so many messages with them.
     tracks: Tracks
     named: int = 0
-    #: Laws of the fingers, and filters (f, k) of what has relaxed of their forces, N.
-    pulp: Pulp
+    #: (f, k): filters of what has relaxed of their forces, N.
     relaxed: Floats
 
 
@@ -101,14 +89,14 @@ def _begin_at_rest(scene: Scene, system: System, limits: Limits, tracking: Track
     """Return the session of a bed at rest; a fingertip in the place of another one is not there."""
     state = begin(system)
     first = sample_poses(scene.trajectories(), np.zeros(1))[0]
-    poses = np.array([clamp_pose(pose, system.cell.actuator.stroke) for pose in first])
+    poses = clamp_pose(first, system.cell.actuator.stroke)
     for row in range(1, len(poses)):
         if (poses[:row] == poses[row]).all(1).any():
             poses[row, 2] = PARKED
     kept = Moment(0, snapshot.dump(system, state), poses)
     return Session(
         scene=scene, system=system, state=state, poses=poses, kept=kept, limits=limits, tracking=tracking,
-        tracks=begin_tracks(poses), pulp=(pulp := describe_pulp(scene)), relaxed=np.zeros_like(pulp.rates),
+        tracks=begin_tracks(poses), relaxed=np.zeros((len(poses), _read_pulp(scene)[1].size)),
     )  # fmt: skip
 
 
@@ -117,16 +105,14 @@ def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, fl
 
     And the height, m, over which they go there at once. An identity that is not named lifts.
     """
-    if not order.named:
-        targets, clear = session.poses.copy(), math.inf
-    else:
-        tracks, felt = session.tracks, feel(session)
+    targets, clear = session.poses.copy(), math.inf
+    if order.named:
+        tracks, felt, time = session.tracks, feel(session), count * session.system.period
         if order.named != session.named:
             tracks = name_fingers(tracks, order.fingers)
-        time = count * session.system.period
         tracks, targets = advance(tracks, session.tracking, felt, time)
-        relaxed = session.relaxed
-        relaxed = relaxed - np.expm1(-time * session.pulp.rates) * (felt.tension[:, None] - relaxed)
+        _, rates = _read_pulp(session.scene)
+        relaxed = session.relaxed - np.expm1(-time * rates) * (felt.tension[:, None] - session.relaxed)
         session = replace(session, tracks=tracks, named=order.named, relaxed=relaxed)
         clear = felt.peak + CLEAR
     if order.pose is not None:
@@ -134,31 +120,23 @@ def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, fl
     return session, targets, clear
 
 
-def feel(session: Session) -> Contact:
-    """Return what the fingertips feel."""
+def feel(session: Session) -> Felt:
+    """Return what the fingertips feel, by the laws of the first."""
     state, system, poses = session.state, session.system, session.poses
     heights, pressed = state.row(0), state.row(system.rows.force) > 0.0
     near = ((system.grid.positions - poses[:, None, :2]) ** 2).sum(2) < AROUND**2
-    force, pulp = state.finger_forces(), session.pulp
+    force, law = state.finger_forces(), session.scene.fingers[0].contact or Contact()
     # What grows is the tension: the force and what has relaxed of it meanwhile.
-    tension = force + (pulp.shares * session.relaxed).sum(1)
-    stiffness = pulp.exponent * tension + pulp.touch * (near & pressed).sum(1)
+    tension = force + session.relaxed @ _read_pulp(session.scene)[0]
+    stiffness = law.exponent * tension + law.stiffness * law.share * (near & pressed).sum(1)
     top = np.where(near, heights, 0.0).max(1)
-    return Contact(poses, force, tension, stiffness, top, 1.0 / pulp.exponent, float(heights.max()))
+    return Felt(poses, force, tension, stiffness, top, 1.0 / law.exponent, float(heights.max()))
 
 
-def describe_pulp(scene: Scene) -> Pulp:
-    """Return what `feel` needs of the fingers of a scene."""
-    laws = [finger.contact for finger in scene.fingers]
-    filters = [
-        (one.shares, one.rates[:, 0]) if (one := finger.relaxation) else () for finger in scene.fingers
-    ]
-    table = np.zeros((2, len(laws), max(len(pair[0]) if pair else 0 for pair in filters)))
-    for row, pair in enumerate(filters):
-        if pair:
-            table[:, row, : len(pair[0])] = pair
-    exponent = np.array([law.exponent if law else 1.0 for law in laws])
-    return Pulp(exponent, np.array([law.stiffness * law.share if law else 0.0 for law in laws]), *table)
+def _read_pulp(scene: Scene) -> tuple[Floats, Floats]:
+    """Return shares and rates, 1/s, of the filters of the first finger's relaxation, (k,)."""
+    pulp = scene.fingers[0].relaxation
+    return (pulp.shares, pulp.rates[:, 0]) if pulp else (np.zeros(0), np.zeros(0))
 
 
 def follow(session: Session, targets: Floats, number: int, count: int, clear: float = math.inf) -> Session:
@@ -172,7 +150,7 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
     system = session.system
     if session.refused is not None and np.array_equal(targets, session.refused):
         targets = session.poses
-    goals = np.array([clamp_pose(target, system.cell.actuator.stroke) for target in targets])
+    goals = clamp_pose(targets, system.cell.actuator.stroke)
     way = session.limits.speed * system.period * count
     ends = np.array([_limit_way(*each, way, clear) for each in zip(session.poses, goals, strict=True)])
     start = session.poses

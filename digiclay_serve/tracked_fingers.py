@@ -42,7 +42,7 @@ class Tracking:
 TRACKING = Tracking()
 
 
-class Contact(NamedTuple):
+class Felt(NamedTuple):
     """What the fingertips feel: a row a finger."""
 
     #: (f, 7), simulated.
@@ -51,9 +51,10 @@ class Contact(NamedTuple):
     force: Floats
     tension: Floats
     stiffness: Floats
-    #: (f,): highest pin around each, m; and depth at which the force of a pin has grown e times, m.
+    #: (f,): highest pin around each, m.
     top: Floats
-    growth: Floats
+    #: Depth in which the force of a pin grows e times, m.
+    growth: float
     #: Highest pin of the bed, m.
     peak: float
 
@@ -124,7 +125,7 @@ def _find_exchanged(
     return ids
 
 
-def advance(tracks: Tracks, tracking: Tracking, felt: Contact, time: float) -> tuple[Tracks, Floats]:
+def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tuple[Tracks, Floats]:
     """Return the tracks after a time, s, and where the fingertips are to be then (f, 7)."""
     unnamed = tracks.unnamed + time
     ids = np.where(unnamed >= tracking.lift * (1.0 - 1e-9), -1, tracks.identities)
@@ -167,7 +168,7 @@ def _share(cutoff: float | Floats, time: float) -> float | Floats:
     return 1.0 / (1.0 + 1.0 / (2.0 * math.pi * time * cutoff))
 
 
-def give_way(height: Floats, felt: Contact, coupling: float) -> Floats:
+def give_way(height: Floats, felt: Felt, coupling: float) -> Floats:
     """Return the heights (f,), m, of fingertips on springs, N/m, from tracked ones at `height`.
 
     In balance with the force at the new height, which its stiffness foretells: no step is too long, and no

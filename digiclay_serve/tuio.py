@@ -10,12 +10,9 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from pythonosc.osc_packet import OscPacket
 
-#: Time after which a pad is gone, s: one that is touched repeats itself each second.
-GONE = 1.2
-#: Pressure of a finger on a pad that has none.
-USUAL = 0.5
-#: Most contacts between two lists of those alive.
-MOST = 256
+#: Time after which a pad is gone, s: one that is touched repeats itself each second. Pressure where it has
+#: none. Most contacts between two lists of those alive.
+GONE, USUAL, MOST = 1.2, 0.5, 256
 
 
 @dataclass(frozen=True)
@@ -26,45 +23,38 @@ class Pad:
     height: float
     size: float
     depth: float
-    #: Position from the upper left corner and pressure, 0 to 1, of each contact.
-    contacts: dict[int, tuple[float, float, float] | None] = field(default_factory=dict)
-    alive: tuple[int, ...] = ()
+    #: Position from the upper left corner and pressure, 0 to 1, of those alive; None before the first.
+    contacts: dict[int, list[float] | None] = field(default_factory=dict)
     #: s.
     heard: float = 0.0
 
     def take(self, data: bytes, now: float) -> Pad:
         """Take a datagram at a time, s. Raises ParameterError for one that is none."""
+        contacts = self.contacts
         try:
-            messages = [(each.message.address, each.message.params) for each in OscPacket(data).messages]
-            pad = self
-            for address, values in messages:
-                pad = pad._take_message(address, values)
+            for each in OscPacket(data).messages:
+                contacts = _take_message(contacts, each.message.address, each.message.params)
         except Exception:  # python-osc raises errors of many kinds over bytes that are no OSC
             raise ParameterError("datagram", "", "must be TUIO 1.1 or 2.0", repr(data[:40])) from None
-        return replace(pad, heard=now)
-
-    def _take_message(self, address: str, values: list[Any]) -> Pad:
-        kind = values[0] if address == "/tuio/2Dcur" else address
-        if kind == "set":
-            return self._touch(values[1], *values[2:4], USUAL)
-        if kind == "/tuio2/ptr":
-            return self._touch(values[0], *values[3:5], values[8] or USUAL)
-        if kind in ("alive", "/tuio2/alv"):
-            alive = tuple(int(one) % 2**32 for one in values if one != "alive")
-            return replace(self, alive=alive, contacts={one: self.contacts.get(one) for one in alive})
-        return self
-
-    def _touch(self, identity: int, *touch: float) -> Pad:
-        if len(self.contacts) > MOST or not np.isfinite(touch).all():
-            raise ValueError
-        x, y, pressure = np.clip(touch, 0.0, 1.0).tolist()
-        return replace(self, contacts={**self.contacts, int(identity) % 2**32: (x, y, pressure)})
+        return replace(self, contacts=contacts, heard=now)
 
     def fingers(self, now: float) -> dict[int, Floats]:
         """Return the lowest points (3,), m, of the fingers that are there at a time, s, by identity."""
-        there = {one: touch for one in self.alive if (touch := self.contacts.get(one))}
-        size, height, depth = self.size, self.height, self.depth
-        return {} if now - self.heard > GONE else {
-            one: np.array([size * (x - 0.5), size * (0.5 - y), height - depth * pressure])
-            for one, (x, y, pressure) in there.items()
-        }  # fmt: skip
+        scale = np.array([self.size, -self.size, -self.depth])
+        corner = np.array([-0.5 * self.size, 0.5 * self.size, self.height])
+        there = self.contacts.items() if now - self.heard <= GONE else ()
+        return {one: corner + scale * touch for one, touch in there if touch}
+
+
+def _take_message(contacts: dict[int, Any], address: str, values: list[Any]) -> dict[int, Any]:
+    """Return the contacts after a message; raise an error of any kind over anything that is none."""
+    kind = values[0] if address == "/tuio/2Dcur" else address
+    if kind in ("alive", "/tuio2/alv"):
+        return {int(one) % 2**32: contacts.get(int(one) % 2**32) for one in values if one != "alive"}
+    if kind not in ("set", "/tuio2/ptr"):
+        return contacts
+    one, *touch = [*values[1:4], USUAL] if kind == "set" else [*values[:1], *values[3:5], values[8] or USUAL]
+    x, y, pressure = np.clip(touch, 0.0, 1.0).tolist()
+    if len(contacts) > MOST or not np.isfinite(touch).all():
+        raise ValueError
+    return {**contacts, int(one) % 2**32: [x, y, pressure]}

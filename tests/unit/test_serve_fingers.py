@@ -19,10 +19,10 @@ from digiclay_serve.door_link import DoorLink, FrequentError
 from digiclay_serve.doors import LAYOUT, Order, make_slot, pack_order, unpack_order
 from digiclay_serve.hts import Hands
 from digiclay_serve.osc_door import read_osc, read_request
-from digiclay_serve.protocol import Bed, Poses, check_fingers, pack_poses, read_binary, read_json
+from digiclay_serve.protocol import Bed, Poses, check_fingers, read_json
 from digiclay_serve.tracked_fingers import (
     PARKED,
-    Contact,
+    Felt,
     Tracking,
     advance,
     begin_tracks,
@@ -53,7 +53,6 @@ def test_poses_are_the_same_in_all_formats() -> None:
         {"id": 3, "position": [0, 0, 0.04], "orientation": [0, 0, 0, 2]},
     ]
     assert read_json(json.dumps({"type": "poses", "number": 9, "fingers": fingers})) == wanted
-    assert read_binary(pack_poses(wanted)) == wanted
     sent = osc("/digiclay/poses", "token", 9, 7, *PLACE, 3, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 2.0)
     assert read_request(*read_osc(sent)[1:]) == wanted
     # An identity that is alive without a pose stays where it was.
@@ -137,12 +136,10 @@ def test_an_order_keeps_what_is_alive_and_its_bytes_are_read_as_they_were_writte
 # From tracked to simulated
 
 
-def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.04) -> Contact:
+def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.04) -> Felt:
     """Return what fingertips feel, all the same."""
     each = np.ones(len(poses))
-    return Contact(
-        np.array(poses, float), force * each, force * each, stiffness * each, top * each, 5e-4 * each, top
-    )
+    return Felt(np.array(poses, float), force * each, force * each, stiffness * each, top * each, 5e-4, top)
 
 
 def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]]]:
