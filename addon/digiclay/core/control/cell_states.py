@@ -70,7 +70,8 @@ _MEMBERS = {arrow.source: np.isin(np.arange(len(Mode)), arrow.source) for arrow 
 class Patch(NamedTuple):
     """Memory of the controller: centroid of the forces when last felt, m, direction of travel, losses.
 
-    `edge`: height of the surface around the blister, m; `felt`: whether some cell is under the fingertip.
+    `edge`: height of the surface around the blister, m; `felt`: whether some cell is under the fingertip;
+    `radius`: how far from the centroid cells are pressed, m.
     """
 
     x: float = 0.0
@@ -79,6 +80,7 @@ class Patch(NamedTuple):
     edge: float = 0.0
     felt: bool = False
     losses: int = 0
+    radius: float = 0.0
 
     @property
     def place(self) -> tuple[float, float] | None:
@@ -160,10 +162,16 @@ class CellStatesControl:
 
     #: A cell remembers how many periods it has been critical.
     rows = 1
+    pin_rows = (0,)
 
     def begin(self) -> Patch:
         """Return the memory before a session."""
         return Patch()
+
+    def find_blister(self, memory: Patch) -> tuple[float, float, float, float]:
+        """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
+        x, y = memory.place or (0.0, 0.0)
+        return x, y, memory.radius + self.blister.radius if memory.place else -1.0, memory.edge
 
     def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, Disc | None]:
         """Find where the fingertip presses, and how far its blister can reach; see `Controller`."""
@@ -182,7 +190,8 @@ class CellStatesControl:
         elif math.hypot(x - memory.x, y - memory.y) > self.parameters.jump:
             memory = memory._replace(heading=Heading(x, y), losses=memory.losses + 1)
         heading = update_heading(memory.heading, x, y, self.parameters.travel)
-        return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
+        memory = memory._replace(x=x, y=y, heading=heading, radius=radius)
+        return memory, (x, y, radius + self.blister.edge_radius)
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Commands]:
         """Apply the transitions of every cell, then the control of its mode; see `Controller`."""

@@ -75,8 +75,6 @@ class HandControl:
     """One for all at once, where the formulas of the method hold for many."""
     capture: Floats
     """(f,): How far from each finger a pressed pin may be its own, m."""
-    skirt: float
-    """How much farther than its blister a disc of control reaches, m."""
     felt: float
     """Force from which on a pin tells of a new finger, N."""
 
@@ -109,15 +107,15 @@ class HandControl:
             owner[pressed] = self._assign(memory, seen.quadratic_basis[:, pressed])
         fingers, given = self.method.command(list(memory.fingers), self, seen, owner, columns)
         memory = memory._replace(fingers=tuple(fingers))
-        orders = Commands(seen.target.copy(), seen.mode.copy(), np.zeros(seen.target.size))
-        pairs: list[tuple[Any, Any]] = list(zip(orders, given, strict=True))
-        for all_cells, own in pairs:
-            all_cells[columns.flat] = own
+        chosen = np.empty(seen.target.size, np.intp)
+        chosen[columns.flat] = np.arange(columns.flat.size)
         if columns.double.size:
-            chosen = self._choose(memory, seen.quadratic_basis, columns, given.target)
-            for all_cells, own in pairs:
-                all_cells[columns.double] = own[chosen]
-        return memory, orders
+            chosen[columns.double] = self._choose(memory, seen, columns, given.target)
+        # What is remembered of a pin's command is that of the command obeyed, for all fingers.
+        count = int(self.runs[0].rows)
+        for row in getattr(self.runs[0], "pin_rows", ()):
+            seen.own[row::count] = seen.own[columns.finger[chosen] * count + row, np.arange(chosen.size)]
+        return memory, Commands(*(own[chosen] for own in given))
 
     @cached_property
     def method(self) -> Together | OneByOne:
@@ -157,16 +155,18 @@ class HandControl:
             owner = np.where((owner == NOBODY) & (apart <= self.capture[finger] ** 2), finger, owner)
         return owner
 
-    def _choose(self, memory: Hands, basis: Floats, columns: Columns, target: Floats) -> Cells:
+    def _choose(self, memory: Hands, seen: Measurement, columns: Columns, target: Floats) -> Cells:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
         copies = columns.copies
-        fingers, (x, y) = columns.finger[copies], basis[1:3, columns.double]
-        discs = np.array(memory.discs)
-        near_x, near_y, radius = discs[fingers].transpose(2, 0, 1)
-        reach = radius - self.skirt
-        inside = (x - near_x) ** 2 + (y - near_y) ** 2 <= reach * np.abs(reach)
-        grounds = np.array([own.edge for own in memory.fingers])
-        off = np.where(inside, np.abs(target[copies] - grounds[fingers]), -1.0)
+        fingers, (x, y) = columns.finger[copies], seen.quadratic_basis[1:3, columns.double]
+        blisters = np.array(
+            [run.find_blister(own) for run, own in zip(self.runs, memory.fingers, strict=True)]
+        )
+        at_x, at_y, radius, ground = blisters[fingers].transpose(2, 0, 1)
+        inside = (x - at_x) ** 2 + (y - at_y) ** 2 <= radius * np.abs(radius)
+        # Outside of all blisters pins are led, or left as they are.
+        aside = np.where(target[copies] == seen.target[columns.double], -1.0, -0.5)
+        off = np.where(inside, np.abs(target[copies] - ground), aside)
         chosen: Cells = np.take_along_axis(copies, off.argmax(axis=0)[None], 0)[0]
         return chosen
 
@@ -284,10 +284,10 @@ def take_part(seen: Measurement, cells: Cells, own: slice) -> Measurement:
 
 
 def join_fingers(
-    controllers: Sequence[Controller], together: Any, sizes: Sequence[float], skirt: float, felt: float
+    controllers: Sequence[Controller], together: Any, sizes: Sequence[float], felt: float
 ) -> HandControl:
     """Return the controller of several fingers, of largest semi-axes, m; see `HandControl`."""
-    return HandControl(tuple(controllers), together, CAPTURE * np.array(sizes), skirt, felt)
+    return HandControl(tuple(controllers), together, CAPTURE * np.array(sizes), felt)
 
 
 def follows_finger(controller: Controller) -> bool:

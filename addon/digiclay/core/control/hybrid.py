@@ -202,9 +202,20 @@ class HybridControl:
         """State rows a cell needs."""
         return self.pulp.filters + OWN_ROWS + self.servo.rows
 
+    @property
+    def pin_rows(self) -> tuple[int, ...]:
+        """Rows of the command a cell follows, whoever gave it: how far it is led, and its speeds."""
+        at = self._at
+        return at.lead, *range(self.rows)[at.speeds]
+
     def begin(self) -> Follower:
         """Return the memory before a session."""
         return Follower(due=self._unknown)
+
+    def find_blister(self, memory: Follower) -> tuple[float, float, float, float]:
+        """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
+        x, y = memory.place or (0.0, 0.0)
+        return x, y, self.blister.radius if memory.place else -1.0, memory.edge
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the fingertip; see `Controller`."""

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from ..control.device_info import DeviceInfo
 
 
-#: The steppers that know how to move cells whose numbers differ from column to column.
-CLOSED_FORM = ("bernoulli", "richardson")
+#: Cells that several fingers press: module and function of the plan.
+TOGETHER = ("steppers.press_together", "plan_together")
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,6 @@ def _assemble_hands(scene: Scene) -> System:
     """Build the system of a scene with several fingers."""
     from ..engine.pairs import HandSelection, HandSystem
     from ..model.fingers import MOST_FINGERS, join_touches
-    from ..steppers.press_together import plan_together
 
     if not 0 < len(scene.fingers) <= MOST_FINGERS:
         raise ParameterError("scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(len(scene.fingers)))
@@ -134,7 +133,7 @@ def _assemble_hands(scene: Scene) -> System:
     selection = HandSelection(system.grid, rows, cell, system.period, system.fastest)
     by_set = system.by_set or bool(scene.control and find_method(scene.method).by_set)
     own = {"cell": cell, "controller": controller, "selection": selection, "rows": rows, "by_set": by_set}
-    together = plan_together(cells, first.line, first.steps) if kept else None
+    together = import_part(*TOGETHER)(cells, first.line, first.steps) if kept else None
     plans = tuple(motion.plan for motion in motions)
     return HandSystem(**common | own, cells=cells, plans=plans, press_together=together)
 
@@ -237,6 +236,5 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     if not follows_finger(controllers[0]):
         return controllers[0]
     sizes = [max(touch.fingertip.length, touch.fingertip.width) for touch in touches if touch]
-    skirt = scene.blister.edge_radius - scene.blister.radius if scene.blister else 0.0
     felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
-    return join_fingers(controllers, join_controllers(controllers), sizes, skirt, felt)
+    return join_fingers(controllers, join_controllers(controllers), sizes, felt)
