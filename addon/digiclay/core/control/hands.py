@@ -22,6 +22,8 @@ from .servo import BatchControl
 
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
 CAPTURE = 1.2
+#: How far from a finger pins are under it, as a share of that.
+UNDER = 0.5
 #: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
 BEYOND = 1e3
 #: No finger.
@@ -110,7 +112,7 @@ class HandControl:
         chosen = np.empty(seen.target.size, np.intp)
         chosen[columns.flat] = np.arange(columns.flat.size)
         if columns.double.size:
-            chosen[columns.double] = self._choose(memory, seen, columns, given.target)
+            chosen[columns.double] = self._choose(memory, seen, owner, columns, given.target)
         # What is remembered of a pin's command is that of the command obeyed, for all fingers.
         count = int(self.runs[0].rows)
         for row in getattr(self.runs[0], "pin_rows", ()):
@@ -155,7 +157,9 @@ class HandControl:
             owner = np.where((owner == NOBODY) & (apart <= self.capture[finger] ** 2), finger, owner)
         return owner
 
-    def _choose(self, memory: Hands, seen: Measurement, columns: Columns, target: Floats) -> Cells:
+    def _choose(
+        self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
+    ) -> Cells:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
         copies = columns.copies
         fingers, (x, y) = columns.finger[copies], seen.quadratic_basis[1:3, columns.double]
@@ -163,10 +167,15 @@ class HandControl:
             [run.find_blister(own) for run, own in zip(self.runs, memory.fingers, strict=True)]
         )
         at_x, at_y, radius, ground = blisters[fingers].transpose(2, 0, 1)
-        inside = (x - at_x) ** 2 + (y - at_y) ** 2 <= radius * np.abs(radius)
+        apart = np.hypot(x - at_x, y - at_y)
+        inside = apart <= radius
         # Outside of all blisters pins are led, or left as they are.
         aside = np.where(target[copies] == seen.target[columns.double], -1.0, -0.5)
         off = np.where(inside, np.abs(target[copies] - ground), aside)
+        # Under a fingertip its own blister is obeyed, and where it presses before all.
+        under = inside & (apart <= UNDER * self.capture[fingers])
+        off = np.where(under, 1.0 - apart, off)
+        off = np.where(owner[columns.double] == fingers, 2.0, off)
         chosen: Cells = np.take_along_axis(copies, off.argmax(axis=0)[None], 0)[0]
         return chosen
 
