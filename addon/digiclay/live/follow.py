@@ -1,4 +1,4 @@
-"""Following of a server: the fingertip of a session is where that of `digiclay serve` is. No Blender.
+"""Following of a server: fingertips of a session are where those of `digiclay serve` are. No Blender.
 
 A tick looks for datagrams and never waits for one. UDP suits that: a pose that is lost is not missed, since
 the next one is newer, and a server that stalls leaves nothing half-read.
@@ -10,6 +10,7 @@ import ipaddress
 import math
 import socket
 import struct
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -20,9 +21,11 @@ from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..ui_text import localize
 
-SUBSCRIBE, STATE = "/digiclay/subscribe", "/digiclay/state"
-#: Period, number, time, total force, pose.
-VALUES = struct.Struct(">qq9d")
+SUBSCRIBE, STATE, FINGERS = "/digiclay/subscribe", "/digiclay/state", "/digiclay/fingers"
+#: Period, number, time, total force, pose; identity, force and pose of a finger.
+VALUES, FINGER = struct.Struct(">qq9d"), struct.Struct(">q8d")
+#: Height of a fingertip whose identity is gone, m.
+LIFTED = 1.0
 #: Name of this machine; others are not looked up, since that would wait for a network.
 LOCAL = "localhost"
 RULE = "The address must be HOST:PORT, such as 127.0.0.1:8766, with a numeric host (got {})."
@@ -58,7 +61,22 @@ def read_pose(data: bytes) -> Floats | None:
     head = _pad(STATE) + _pad(",hh" + 9 * "d")
     if not data.startswith(head) or len(data) != len(head) + VALUES.size:
         return None
-    pose = np.array(VALUES.unpack_from(data, len(head))[4:])
+    return _check_pose(VALUES.unpack_from(data, len(head))[4:])
+
+
+def read_fingers(data: bytes) -> dict[int, Floats] | None:
+    """Return the poses (7,) of fingers by identity in a datagram; None where there are no usable ones."""
+    count = data[len(_pad(FINGERS)) :].partition(b"\0")[0].count(b"d") // 8
+    head = _pad(FINGERS) + _pad(",h" + count * "hdddddddd")
+    if not data.startswith(head) or len(data) != len(head) + 8 + count * FINGER.size:
+        return None
+    found = {one: _check_pose(pose) for one, _, *pose in FINGER.iter_unpack(data[len(head) + 8 :])}
+    return {one: pose for one, pose in found.items() if pose is not None}
+
+
+def _check_pose(values: Sequence[float]) -> Floats | None:
+    """Return a pose (7,); None for one that is none."""
+    pose = np.array(values)
     length = float(np.linalg.norm(pose[3:])) if np.abs(pose).max() < 1e100 else 0.0
     # NaN fails the comparisons.
     return pose if abs(length - 1.0) < 1e-6 and np.isfinite(pose).all() else None
@@ -95,6 +113,9 @@ class Following:
     heard: float | None = None
     #: The newest one (7,); None before the first.
     pose: Floats | None = None
+    #: The newest ones by identity, of a server with several fingertips; who has those of the bed, () before.
+    fingers: Mapping[int, Floats] = field(default_factory=dict)
+    seats: tuple[int | None, ...] = ()
     #: Whether its silence has been reported.
     silent: bool = False
 
@@ -144,12 +165,12 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
         with suppress(OSError):  # the port is closed now, or the network is busy: it is repeated soon
             following.door.send(pack_subscription(following.token, RATE))
         following = replace(following, asked=now)
-    (pose, closed), words = _receive(following.door), ""
+    (pose, fingers, closed), words = _receive(following), ""
     heard = now if following.heard is None else following.heard
     if pose is not None:
         if following.silent:
             words = localize("The server at {} is heard again", following.address)
-        following = replace(following, pose=pose, heard=now, silent=False)
+        following = replace(following, pose=pose, fingers=fingers, heard=now, silent=False)
     elif not following.silent and (closed or now - heard >= SILENT):
         following = replace(following, silent=True)
         words = localize(ENDED if closed else UNHEARD, following.address)
@@ -159,17 +180,41 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     return following.pose, words
 
 
-def _receive(door: socket.socket) -> tuple[Floats | None, bool]:
-    """Return the newest pose that has come, None for none; and whether the port is closed."""
-    newest, closed = None, False
+def place(uid: int, poses: Floats) -> Floats:
+    """Return the poses (f, 7) of a bed's fingertips with those of the server: one for each identity.
+
+    An identity that appears gets the first that has none; the fingertip of one that is gone is lifted.
+    """
+    following, placed = SERVERS.by_bed[uid], poses.copy()
+    before = (*following.seats, *[None] * len(poses))[: len(poses)]
+    seats = [one if one in following.fingers else None for one in before]
+    for one in following.fingers:
+        if one not in seats and None in seats:
+            seats[seats.index(None)] = one
+    for row, (was, now) in enumerate(zip(before, seats, strict=True)):
+        if now is not None:
+            placed[row] = following.fingers[now]
+        elif was is not None:
+            placed[row, 2] = LIFTED
+    if following.pose is not None and not following.fingers:
+        placed[0] = following.pose
+    if following.fingers or following.seats:
+        SERVERS.by_bed[uid] = replace(following, seats=tuple(seats))
+    return placed
+
+
+def _receive(following: Following) -> tuple[Floats | None, Mapping[int, Floats], bool]:
+    """Return the newest pose that has come, None for none; the newest fingers; whether the port is closed."""
+    newest, fingers, closed = None, following.fingers, False
     for _ in range(MOST):
         try:
-            data = door.recv(2048)
+            data = following.door.recv(4096)
         except BlockingIOError:
             break
         except OSError as error:
             closed = closed or isinstance(error, ConnectionError)
             continue
-        pose = read_pose(data)
+        pose, named = read_pose(data), read_fingers(data)
         newest = newest if pose is None else pose
-    return newest, closed
+        fingers = fingers if named is None else named
+    return newest, fingers, closed

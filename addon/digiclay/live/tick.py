@@ -162,7 +162,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         # The fingertip of a stroke is where the session has put it.
         poses = session.poses if session.strokes else bridge.poses(bed)
         if followed is not None and not session.strokes:
-            poses[0] = followed
+            poses = follow.place(session.uid, poses)
         later = sculpting.advance(
             session, poses, now, most, view.picked_pins(bed), loop.find_interval(context)
         )
@@ -174,9 +174,10 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
     # Whatever is written into the bed, Blender draws.
     if loop.LOOP.in_haste and later.finished_strokes == session.finished_strokes:
         return
+    following = follow.find(session.uid)
     moved = bool(session.strokes) or followed is not None
     if moved:
-        _move_fingers(bed, later)
+        _move_fingers(bed, later, max(1, len(following.seats) if following else 0))
     beds.write(bed, later, before)
     # Drawing costs most: where nothing has changed, nothing is redrawn.
     if before.stale or before.blocking_reason or changes or not np.array_equal(seen, _visible_rows(later)):

@@ -19,6 +19,7 @@ from digiclay.live.follow import pack_subscription, parse_address, read_pose
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 
+from tests.blender.at_hand import select
 from tests.blender.session.live import FLOAT32, TICK, Clock, exact, started
 from tests.timeouts import TIMEOUT
 
@@ -75,6 +76,42 @@ def test_bed_and_fingertip_follow_the_poses(bed: Any, clock: Clock, server: sock
     # The empty is the ellipsoid's center, 8 mm above its lowest point.
     assert fingertip_of(bed).location.z == pytest.approx(0.45, abs=10 * FLOAT32)
     assert exact(bed).min() < 39.9e-3
+
+
+def named(*fingers: tuple[int, float]) -> list[bytes]:
+    """Return a frame of a server with several fingertips: identities, and heights at 10 mm times each."""
+    values = [value for one, z in fingers for value in (one, 0.1, 0.01 * one, 0.0, z, 1.0, 0.0, 0.0, 0.0)]
+    tags = b",h" + len(fingers) * b"hdddddddd"
+    head = b"/digiclay/fingers\0\0\0" + tags + bytes(4 - len(tags) % 4)
+    return [
+        state(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+        head + struct.pack(">q" + len(fingers) * "q8d", 1, *values),
+    ]
+
+
+def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    select(bed)
+    bpy.ops.digiclay.add_fingertip()
+    select(bed)
+    address = followed(bed, server, clock)
+    frames = [
+        (named((2, 0.045)), [(20.0, 45.0), None]),
+        (named((2, 0.044), (1, 0.05)), [(20.0, 44.0), (10.0, 50.0)]),
+        (named((1, 0.038), (2, 0.043), (7, 0.03)), [(20.0, 43.0), (10.0, 38.0)]),  # 7 finds none free
+        (named((1, 0.039)), [(20.0, 1000.0), (10.0, 39.0)]),
+        (named((7, 0.041), (1, 0.039)), [(70.0, 41.0), (10.0, 39.0)]),
+        (named((7, float("nan")), (1, 0.04)), [(70.0, 1000.0), (10.0, 40.0)]),
+        ([named((1, 0.02))[1][:-4], named((1, 0.041))[1] + b"\0"], [(70.0, 1000.0), (10.0, 40.0)]),
+        (named(), [(0.0, 1000.0), (10.0, 1000.0)]),
+    ]
+    for datagrams, places in frames:
+        arrived(server, address, *datagrams)
+        assert clock.tick() == []
+        poses = running.find(bed).poses
+        for pose, where in zip(poses, places, strict=True):
+            assert where is None or pose[[0, 2]] * 1e3 == pytest.approx(where, abs=1e3 * FLOAT32)
 
 
 def test_garbage_and_poses_that_are_none_do_nothing(bed: Any, clock: Clock, server: socket.socket) -> None:
