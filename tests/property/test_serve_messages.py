@@ -25,10 +25,10 @@ whole = st.integers(0, 2**32 - 1)
 heights = st.lists(st.floats(0.0, 0.09375, width=32), min_size=1, max_size=30)
 
 
-def frame_of(pose: list[float], values: list[float], flags: int) -> protocol.Frame:
-    """Return a frame of some pins."""
-    pins = np.array(values, np.float32)
-    return protocol.Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags)
+def frame_of(pose: list[float], values: list[float], flags: int, who: list[int]) -> protocol.Frame:
+    """Return a frame of some pins and fingers."""
+    pins, fingers = np.array(values, np.float32), tuple((one, 0.25, tuple(pose)) for one in who)
+    return protocol.Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags, fingers)
 
 
 def refusal(read: Callable[[Any], Any], data: Any) -> str:
@@ -49,13 +49,24 @@ def test_a_pose_is_read_as_it_was_written_in_both_formats(values: list[float], n
     assert math.hypot(*wanted.pose[3:]) == pytest.approx(1.0)
 
 
-@given(st.builds(frame_of, poses, heights, st.integers(0, 2**31 - 1)))
+@given(
+    st.builds(frame_of, poses, heights, st.integers(0, 2**31 - 1), st.lists(whole | st.just(-1), max_size=32))
+)
 def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: protocol.Frame) -> None:
     read = protocol.unpack_frame(protocol.pack_frame(frame))
     said = json.loads(protocol.format_frame(frame))
     datagrams = [OscMessage(one) for one in format_osc_frame(frame, "pins")]
     told = {one.address.removeprefix("/digiclay/"): one.params for one in datagrams}
     assert next(iter(told.items())) == ("flags", [2**40, frame.flags]) == ("flags", [2**40, read.flags])
+    there = [finger for finger in frame.fingers if finger[0] >= 0]  # -1: nobody has it
+    assert read.fingers == frame.fingers
+    assert told.get("fingers", [2**40])[1:] == [
+        value for one, *rest in there for value in (one, rest[0], *rest[1])
+    ]
+    named = [
+        (one["id"], one["force"], (*one["position"], *one["orientation"])) for one in said.get("fingers", [])
+    ]
+    assert named == there
     assert said["flags"] == [flag.name.lower() for flag in protocol.Flag if frame.flags & flag]
     state = told["state"]
     scalars = [said[name] for name in ("period", "number", "time", "total_force")]

@@ -242,6 +242,80 @@ def test_a_signal_ends_a_server_whose_doors_hang_and_finishes_its_take(tmp_path:
     assert "doors that did not answer" in report["counts"]
 
 
+# Fingers with identities, and tracked hands
+
+
+def fingers_after(client: ClientConnection, *identities: int) -> dict[int, dict[str, Any]]:
+    """Return the fingers of the first frame that has those with some identities."""
+    while True:
+        said = json.loads(client.recv(TIMEOUT))
+        found = {one["id"]: one for one in said["fingers"]} if said["type"] == "state" else {-1: {}}
+        if set(found) == set(identities):
+            return found
+
+
+def test_a_session_has_fingers_by_identity_as_long_as_they_are_named(tmp_path: Path) -> None:
+    places = {5: [-0.006, 0.0, 0.039], 9: [0.006, 0.0, 0.038]}
+    fingers = [{"id": one, "position": place} for one, place in places.items()]
+    bad = [{"id": 7, "position": [0, 0, float("nan")]}]
+    with serve(tmp_path, "--fingers", "2") as one, one.connect("?rate=200") as client:
+        assert json.loads(client.recv(TIMEOUT))["fingers"] == 2
+        found: dict[int, dict[str, Any]] = {}
+        while {name: each["position"] for name, each in found.items()} != places:
+            client.send(json.dumps({"type": "poses", "fingers": fingers}))
+            found = fingers_after(client, *places)
+        assert min(each["force"] for each in found.values()) > 0.0
+        client.send(json.dumps({"type": "poses", "fingers": [*bad, *fingers[1:]], "alive": [9]}))
+        refusal = ""
+        while not refusal:
+            refusal = json.loads(client.recv(TIMEOUT)).get("message", "")
+        assert refusal.startswith("Finger 7: pose must be finite numbers")
+        began = time.monotonic()
+        fingers_after(client)  # nobody is named any more
+        assert time.monotonic() - began < 5.0  # 0.1 s by design; the machine may be busy
+        state = json.loads(client.recv(TIMEOUT))
+        while state["total_force"] > 0.0:
+            state = json.loads(client.recv(TIMEOUT))
+
+
+def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path: Path) -> None:
+    numbers = ", ".join(["0.01"] * 63)
+    lines = f"Left wrist:, 0, 1, 0, 0, 0, 0, 1\nLeft landmarks:, {numbers}\n".encode()
+    path = os.pathsep.join([str(Path(__file__).parents[2] / "addon"), str(Path(__file__).parents[2])])
+    environment = {**os.environ, "PYTHONPATH": path, "DIGICLAY_SERVE_TOKEN": TOKEN}
+    with serve(tmp_path, "--fingers", "5") as one, one.connect("?rate=200") as client:
+        command = [sys.executable, "-m", "digiclay", "hands", "--to", f"ws://127.0.0.1:{one.port}"]
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        listen = [*command, "--port", str(port), "--record", "hands.txt"]
+        with (
+            subprocess.Popen(
+                listen, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True,
+                preexec_fn=partial(signal.signal, signal.SIGINT, signal.default_int_handler),
+            ) as hands,
+            ExitStack() as stack,
+        ):  # fmt: skip
+            stack.callback(hands.kill)
+            assert hands.stdout is not None
+            assert "listening" in hands.stdout.readline()
+            with socket.create_connection(("127.0.0.1", port)) as quest:
+                for _ in range(20):
+                    quest.sendall(lines)
+                    time.sleep(0.01)
+            fingers_after(client, 0, 1, 2, 3, 4)
+            hands.send_signal(signal.SIGINT)
+            assert hands.wait(TIMEOUT) == 0
+        fingers_after(client)
+        one_second = time.monotonic() + 2.5  # the lease of the first
+        while time.monotonic() < one_second:
+            client.recv(TIMEOUT)
+        osc = ["--to", f"osc://127.0.0.1:{one.osc_port}", "--play", "hands.txt"]
+        played = subprocess.Popen([*command, *osc], cwd=tmp_path, env=environment)
+        fingers_after(client, 0, 1, 2, 3, 4)
+        assert played.wait(TIMEOUT) == 0
+
+
 # OSC, and the example of a pin display, with a pty as its serial line
 
 pin_display = load_example("pin_display")
