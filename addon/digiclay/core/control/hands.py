@@ -117,7 +117,7 @@ class HandControl:
         count = int(self.runs[0].rows)
         for row in getattr(self.runs[0], "pin_rows", ()):
             seen.own[row::count] = seen.own[columns.finger[chosen] * count + row, np.arange(chosen.size)]
-        return memory, Commands(*(own[chosen] for own in given))
+        return memory, Commands(given.target[chosen], given.mode[chosen], given.command[chosen])
 
     @cached_property
     def method(self) -> Together | OneByOne:

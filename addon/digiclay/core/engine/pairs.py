@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Cells, Flags, Floats, find_copies
+from ..base.arrays import Cells, Flags, Floats, any_true, find_copies
 from ..model.fingers import HandPeriod, HandTouch
+from ..model.fingertip import compute_reach
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
 from ..model.physics import Cell
 from .active_set import KEPT, Selection
@@ -32,6 +33,18 @@ class HandSelection(Selection):
 
     #: Discs are arrays (f,), the highest pin one number.
     larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
+
+    def update(self, state: State, finger: Any, control: Any) -> State:
+        """Return a state whose active cells are all that can change in a period; see `Selection`."""
+        active, periods = state.active, state.active.known
+        if finger is None or control is not None or active.reach is None or state.period >= active.until:
+            return super().update(state, finger, control)
+        # How far along its path the set serves is worked out once.
+        path, last = periods.get("path", (None, 0))
+        if path is not finger.path:
+            last = finger.number + count_inside(active, finger.path.windows[finger.number :])
+            periods["path"] = finger.path, last
+        return state if finger.number < last else super().update(state, finger, control)
 
     def serves(self, active: ActiveSet, period: int, window: Any, control: Discs | None) -> bool:
         """Return whether a set has all cells that can change; orders may ask for a disc more."""
@@ -76,6 +89,16 @@ class HandSelection(Selection):
         return taken
 
 
+def count_inside(active: ActiveSet, windows: Floats) -> int:
+    """Return in how many of t periods, the first, all windows (t, 6, f) stay within the reach of a set."""
+    reach = compute_reach(np.moveaxis(windows, 1, 0), active.peak)
+    assert active.reach is not None
+    assert reach is not None
+    (x, y, radius), (at_x, at_y, limit) = reach, active.reach
+    inside = (np.hypot(x - at_x, y - at_y) + radius <= limit * (1.0 + RELATIVE_TOLERANCE)).all(axis=1)
+    return int(np.argmin([*inside, False]))
+
+
 def find_pairs(active: ActiveSet) -> Flags:
     """Return which near cells each of the fingertips may touch, (f, k)."""
     assert active.reach is not None
@@ -102,10 +125,9 @@ class HandSystem(System):
 
     def move(self, active: ActiveSet, finger: Any) -> None:
         """Move active cells through a control period under their queued commands, in place."""
-        movements: dict[Any, Any] = active.movements
-        if self not in movements:
-            movements[self] = HandMovement(self, active)
-        movements[self](finger)
+        if self not in active.known:
+            active.known[self] = HandMovement(self, active)
+        active.known[self](finger)
 
 
 class Pairs:
@@ -114,11 +136,8 @@ class Pairs:
     def __init__(self, system: HandSystem, active: ActiveSet, fingers: list[int], others: Cells) -> None:
         cell, rows, width = system.cells[fingers[0]], system.rows, active.cells.size
         inside = find_pairs(active) if active.near else np.zeros((system.fingers, 0), np.bool_)
-        self.basis = [
-            (finger, active.quadratic_basis[:, : active.near][:, inside[finger]])
-            for finger in fingers
-            if inside[finger].any()
-        ]
+        near = active.quadratic_basis[:, : active.near]
+        self.bases = [(finger, near[:, inside[finger]]) for finger in fingers if any_true(inside[finger])]
         finger, self.cells = (part.astype(np.intp) for part in inside[fingers].nonzero())
         self.fingers = np.array(fingers)[finger]
         self.columns = columns = np.concatenate([self.cells, others])
@@ -135,16 +154,32 @@ class Pairs:
         self.lag = slice(self.pulp.stop, self.pulp.stop + cell.lag.rows)
         self.move = system.stepper.prepare(system.plans[fingers[0]], self.own, count)
 
-    def advance(self, block: Floats, finger: HandPeriod | None, instants: int) -> Floats:
-        """Move the pairs of a block, whose filters and forces are set in place; return undersides (p, k)."""
+    def advance(self, block: Floats, finger: HandPeriod | None, instants: int) -> Moved:
+        """Move the pairs of a block; their filters and forces are set in place, no heights."""
         flat, count = block.reshape(-1), self.cells.size
-        np.take(flat, self.index, out=self.own)
+        np.take(flat, self.index, out=self.own, mode="clip")  # another mode copies
+        before, forces = self.own.copy(), flat.take(self.forces)
         under = np.empty((instants, 0))
-        if self.basis and finger is not None:
-            under = np.concatenate([finger.under(number, basis) for number, basis in self.basis], axis=1)
-        flat[self.forces] = self.move(under)
+        if self.bases and finger is not None:
+            under = finger.under(self.bases)
+        after = self.move(under)
+        flat[self.forces] = after
         flat[self.filters] = self.own[self.pulp, :count]
-        return under
+        return Moved(before[:, :count], self.own[0, :count], (forces > 0.0) | (after > 0.0), under)
+
+
+class Moved(NamedTuple):
+    """Pairs in a control period, (k,): rows before, heights after, whether each presses, and undersides."""
+
+    before: Floats
+    height: Floats
+    presses: Flags
+    under: Floats
+
+
+def join_moved(moved: list[Moved]) -> Moved:
+    """Return the pairs of all groups, one after the other."""
+    return Moved(*(np.concatenate(part, axis=-1) for part in zip(*moved, strict=True)))
 
 
 class HandMovement:
@@ -166,32 +201,27 @@ class HandMovement:
         """Move the cells on by one control period, in place."""
         system, active = self._system, self._active
         rows, block, near = system.rows, active.block, active.near
-        before = block.take(self._double, axis=1) if self._double.size else None
-        under = [group.advance(block, finger, system.instants.size) for group in self._groups]
+        moved = [group.advance(block, finger, system.instants.size) for group in self._groups]
         for group in self._groups:
             block[0, group.columns] = group.own[0]
             block[system.cell.lag_rows, group.columns] = group.own[group.lag]
-        if before is not None:
-            heights = np.concatenate([group.own[0, : group.cells.size] for group in self._groups])
-            block[0, self._double] = heights[self._copies].min(axis=0)
-            self._press_together(before, np.concatenate(under, axis=1))
+        if self._double.size:
+            one = moved[0] if len(moved) == 1 else join_moved(moved)
+            block[0, self._double] = np.minimum.reduce(one.height[self._copies])
+            pressed = np.count_nonzero(one.presses[self._copies], axis=0) > 1
+            if any_true(pressed):
+                self._press_together(one, pressed)
         np.add.reduce(block[rows.pressing, :near], axis=0, out=block[rows.force, :near])
 
-    def _press_together(self, before: Floats, under: Floats) -> None:
-        """Move the cells again that several fingers press; `before` (r, g): rows of all that they may."""
-        system, block = self._system, self._active.block
+    def _press_together(self, moved: Moved, pressed: Flags) -> None:
+        """Move cells again, (g,) of those with several pairs, that several fingers press."""
+        system, block, (first, *_) = self._system, self._active.block, self._groups
         assert system.press_together is not None
-        rows, touch = system.rows, system.cell.touch
-        pressing = block[rows.pressing].take(self._double, axis=1)
-        pressed = np.count_nonzero((pressing > 0.0) | (before[rows.pressing] > 0.0), axis=0) > 1
-        if not pressed.any():
-            return
-        cells, copies, before = self._double[pressed], self._copies[:, pressed], before[:, pressed]
-        fingers, lag = self._fingers[copies], before[system.cell.lag_rows.start : rows.target]
-        size = (touch.pulp.rows if touch else 0) // system.fingers
-        filter_rows = 1 + fingers * size + np.arange(size)[:, None, None]
-        filters = before[filter_rows, np.arange(cells.size)]
-        height, filters, force = system.press_together(before[0], lag, filters, under[:, copies], fingers)
+        cells, copies = self._double[pressed], self._copies[:, pressed]
+        fingers, size = self._fingers[copies], len(first.filters)
+        height, valves = moved.before[0, copies[0]], moved.before[first.pulp.stop :, copies[0]]
+        filters, under = moved.before[first.pulp][:, copies], moved.under[:, copies]
+        height, filters, force = system.press_together(height, valves, filters, under, fingers)
         block[0, cells] = height
-        block[filter_rows, cells] = filters
-        block[rows.pressing.start + fingers, cells] = force
+        block[1 + fingers * size + np.arange(size)[:, None, None], cells] = filters
+        block[system.rows.pressing.start + fingers, cells] = force

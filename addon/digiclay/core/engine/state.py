@@ -143,6 +143,11 @@ class ActiveSet:
         )
 
     @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What several fingers have worked out for these cells."""
+        return {}
+
+    @cached_property
     def driven(self) -> Floats:
         """What a stepper works on."""
         return self.block[self.rows.driven]

@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Floats
-from .fingertip import Window
+from .fingertip import Window, compute_underside
 from .interfaces import Pulp
-from .touch import FingerPath, Touch, trace_finger
+from .touch import AHEAD, FingerPath, Touch, trace_finger
 
+#: Fingers, and for each the basis of places, (6, k), see `FingerPath.under`.
+Places = list[tuple[int, Floats]]
 #: Most fingers of a scene.
 MOST_FINGERS = 32
 
@@ -51,17 +54,43 @@ class HandTouch(Touch):
 
 
 @dataclass(eq=False)
-class HandPeriod:
-    """Fingertip paths in one control period."""
+class HandPath:
+    """Paths of f fingertips over t control periods."""
 
     paths: tuple[FingerPath, ...]
+    windows: Floats
+    """(t, 6, f)."""
+
+    def __post_init__(self) -> None:
+        # The undersides computed last: over which places, from which period on.
+        self._last: tuple[Any, int, Floats] = (None, 0, np.empty((0, 0, 0)))
+
+    def under(self, number: int, bases: Places) -> Floats:
+        """Return the undersides in a period over each finger's places, one after the other, (p, k), m."""
+        known, first, unders = self._last
+        if known is not bases or not first <= number < first + len(unders):
+            several = slice(number, number + AHEAD)
+            parts = [(self.paths[finger], basis) for finger, basis in bases]
+            made = [
+                compute_underside(path.forms[several], path.join[several], basis) for path, basis in parts
+            ]
+            first, unders = number, np.concatenate(made, axis=2)
+            self._last = (bases, first, unders)
+        under: Floats = unders[number - first]
+        return under
+
+
+class HandPeriod(NamedTuple):
+    """Fingertip paths in one control period."""
+
+    path: HandPath
     number: int
     window: Window
     """(6, f)."""
 
-    def under(self, finger: int, basis: Floats) -> Floats:
-        """Return a finger's underside at the period's p instants over places (6, k), shape (p, k), m."""
-        return self.paths[finger].under(self.number, basis)
+    def under(self, bases: Places) -> Floats:
+        """Return the undersides over each finger's places, one after the other, (p, k), m."""
+        return self.path.under(self.number, bases)
 
 
 def join_touches(touches: Sequence[Touch]) -> HandTouch:
@@ -76,4 +105,5 @@ def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
     """Return the paths of f fingertips in each of t periods, of poses (t, p, f, 7)."""
     paths = tuple(trace_finger(own.fingertip, poses[:, :, i]) for i, own in enumerate(touch.each))
     windows = np.stack([np.array(path.windows) for path in paths], axis=-1)
-    return [HandPeriod(paths, number, window) for number, window in enumerate(windows)]
+    path = HandPath(paths, windows)
+    return [HandPeriod(path, number, window) for number, window in enumerate(windows)]
