@@ -169,6 +169,7 @@ class Bed(NamedTuple):
 
 BEDS = (
     Bed(25, 25, 3e-3, 2e-3, 8e-3), Bed(100, 100, 3e-3, 2e-3, 16e-3), Bed(100, 100, 1.5e-3, 1e-3, 16e-3),
+    Bed(200, 200, 3e-3, 2e-3, 32e-3),
 )  # fmt: skip
 #: Ticks that are timed, with --quick and without.
 QUICK, FULL = 120, 3000
