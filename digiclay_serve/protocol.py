@@ -108,7 +108,7 @@ class Flag(IntFlag):
 
     #: The contact law does not hold: `core.model.touch`.
     BEYOND_A_FINGER = 1
-    #: Total force and forces were larger, and are reduced to the ceiling by one factor.
+    #: A finger's force was larger, and all are reduced by one factor: no finger has more than the ceiling.
     FORCE_LIMITED = 2
     #: The fingertip is on its way to the pose asked for, at its largest speed.
     POSE_LIMITED = 4
@@ -118,7 +118,7 @@ class Flag(IntFlag):
 class Limits:
     """Limits of what a session hands out to clients that may drive a motor; docs/serve.md has the sources."""
 
-    #: Largest total force, N: that up to which fingerpads were measured. The paper's pins, 0.157 N each at
+    #: Largest force of a finger, N: up to it fingerpads were measured. The paper's pins, 0.157 N each at
     #: the pressure of their reservoir, reach it with 13, more than lie under the contact of a fingertip.
     force: float = MOST_FORCE
     #: Largest speed of a point of the fingertip, m/s: that of a robot's tool with people beside it, by ISO
@@ -148,7 +148,7 @@ class Bed:
     period: float
     #: Of the pins, m; none of a bed of more than 10,000.
     positions: tuple[tuple[float, float], ...]
-    #: Largest total force handed out, N, and largest speed of the fingertip, m/s.
+    #: Largest force of a finger handed out, N, and largest speed of the fingertip, m/s.
     most_force: float = LIMITS.force
     most_speed: float = LIMITS.speed
     #: Number of fingertips.

@@ -49,7 +49,7 @@ def add(commands: Any) -> None:
         "--osc-port N": (port, f"of OSC, 0: any; default: {OSC_PORT}", OSC_PORT),
         "--token T": f"token of the clients; default: {VARIABLE}, or one at random",
         "--most-force N": (
-            _within(1e-3, 1e3, "N"), f"largest total force handed out, N; default: {force:g}", force,
+            _within(1e-3, 1e3, "N"), f"largest force of a finger handed out, N; default: {force:g}", force,
         ),
         "--most-speed MM/S": (
             _within(1.0, 1e4, "mm/s"),

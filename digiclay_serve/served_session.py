@@ -124,7 +124,8 @@ def feel(session: Session) -> Felt:
     """Return what the fingertips feel, by the laws of the first."""
     state, system, poses = session.state, session.system, session.poses
     heights, pressed = state.row(0), state.row(system.rows.force) > 0.0
-    near = ((system.grid.positions - poses[:, None, :2]) ** 2).sum(2) < AROUND**2
+    x, y = system.grid.positions.T
+    near = (x - poses[:, :1]) ** 2 + (y - poses[:, 1:2]) ** 2 < AROUND**2
     force, law = state.finger_forces(), session.scene.fingers[0].contact or Contact()
     # What grows is the tension: the force and what has relaxed of it meanwhile.
     tension = force + session.relaxed @ _read_pulp(session.scene)[0]
@@ -205,14 +206,16 @@ def record(session: Session, room: int) -> Session:
 def make_frame(session: Session) -> Frame:
     """Return the state for other programs: no more force than the limit, and flags."""
     state, system, most = session.state, session.system, session.limits.force
-    forces, each = state.row(system.rows.force), state.finger_forces()
+    forces = state.row(system.rows.force)
     total = float(forces.sum())
+    each = state.finger_forces() if system.fingers > 1 else np.array([total])
     flags = Flag.POSE_LIMITED if session.behind else Flag(0)
     if any(exceeds_law(system, state, pose) for pose in session.poses):
         flags |= Flag.BEYOND_A_FINGER
-    if total > most:
+    if (largest := float(each.max())) > most:
         flags |= Flag.FORCE_LIMITED
-        forces, each, total = forces * (most / total), each * (most / total), most
+        share = most / largest
+        forces, each, total = forces * share, each * share, total * share if system.fingers > 1 else most
     pins = state.row(0).astype(np.float32), forces.astype(np.float32)
     time = state.period * system.period
     rows = session.tracks.identities.tolist(), each.tolist(), map(tuple, session.poses.tolist())

@@ -28,6 +28,7 @@ from digiclay_serve.served_session import (
     record,
     reset,
 )
+from digiclay_serve.tracked_fingers import PARKED
 from tests.scene_files import left
 from tests.timeouts import wait_until
 
@@ -92,6 +93,24 @@ def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, fl
         assert (frame.total_force >= most) == bool(frame.flags & Flag.FORCE_LIMITED)
         assert frame.total_force <= most
     assert (seen, frame.pose[2]) == (flags, height)
+
+
+def test_the_ceiling_is_each_fingers() -> None:
+    bed = resolve({**SMALL, "layout": {"rows": 7, "columns": 15}, "trajectory": WAIT})
+    session = begin_session(replace(bed, fingers=3 * bed.fingers), replace(LIMITS, force=0.2))
+    assert session.poses[:, 2].tolist() == [0.05, PARKED, PARKED]
+    lowest = np.array([[-0.015, 0.0, 0.0385], [0.015, 0.0, 0.0395], [0.0, 0.0, PARKED]])
+    for _ in range(60):
+        session = follow(session, np.hstack([lowest, np.eye(4)[[0, 0, 0]]]), 3, 1, 0.045)
+        frame = make_frame(session)
+        each = [force for _, force, _ in frame.fingers]
+        assert max(each) <= 0.2 * (1.0 + 1e-12)  # rounding
+        assert frame.total_force == pytest.approx(sum(each)) == pytest.approx(frame.forces.sum(), rel=1e-5)
+        assert each[2] == 0.0
+    assert frame.flags & Flag.FORCE_LIMITED
+    assert each[0] == pytest.approx(0.2)
+    assert 0.0 < each[1] < 0.2
+    assert [pose[2] for *_, pose in frame.fingers] == lowest[:, 2].tolist()
 
 
 @pytest.mark.parametrize(
