@@ -13,8 +13,7 @@ import numpy as np
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.quantity import find_nearest_name
 from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
-from digiclay.core.metrics.summary import compute_metrics, perceive, sum_cells
-from digiclay.core.model.fingertip import require_one
+from digiclay.core.metrics.summary import compute_metrics, perceive
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.schema import Scene
@@ -36,36 +35,45 @@ Pose = tuple[float, float, float, float, float, float, float]
 
 #: Turn, pitch and roll, rad.
 Turn = tuple[float, float, float]
+LEVEL: Turn = (0.0, 0.0, 0.0)
+#: Interpolation, and the poses of each fingertip.
+Drawn = tuple[Any, ...]
 #: How far a fingertip is lifted at the end, m, in which time, and how long it then stays away, s.
 AWAY, LIFTED, SETTLED = 40e-3, 0.3, 1.5
 #: Seed of the random drags, and how far their fingertips are pitched and rolled, rad: 30 degrees in all.
 DRAG_SEED, TILT = 1, 0.37
 
 
-def with_path(scene: Scene, poses: Sequence[Pose], interpolation: str = "smooth") -> Scene:
-    """Return a scene with a path of its fingertip, as long as that path."""
+def with_paths(scene: Scene, interpolation: str, *paths: Sequence[Pose]) -> Scene:
+    """Return a scene with its first fingertip once on each of some paths, as long as they are."""
     rest = scene.actuator.rest_height
-    points = tuple(
-        Waypoint(t, (1e-3 * x, 1e-3 * y, rest + 1e-3 * z), _turn(turn, pitch, roll))
-        for t, x, y, z, turn, pitch, roll in poses
-    )
-    return _follow(scene, Path(interpolation, points))
+    ways = []
+    for poses in paths:
+        points = tuple(
+            Waypoint(t, (1e-3 * x, 1e-3 * y, rest + 1e-3 * z), _turn(turn, pitch, roll))
+            for t, x, y, z, turn, pitch, roll in poses
+        )
+        ways.append(Path(interpolation, points))
+    return _follow(scene, ways)
 
 
-def _follow(scene: Scene, path: Path) -> Scene:
-    """Return a scene with a path of its fingertip, as long as that path."""
-    timing = replace(scene.simulation, duration=path.waypoints[-1].time)
-    return scene.with_sections(trajectory=path, simulation=timing)
+def _follow(scene: Scene, paths: Sequence[Path]) -> Scene:
+    """Return a scene with its first fingertip once on each of some paths, as long as they are."""
+    timing = replace(scene.simulation, duration=max(path.waypoints[-1].time for path in paths))
+    fingers = tuple(replace(scene.fingers[0], trajectory=path) for path in paths)
+    return replace(scene, fingers=fingers, simulation=timing)
 
 
 def lift_off(scene: Scene) -> Scene:
     """Return a scene that ends with a quick lift, and a rest in which pins come to their final heights."""
-    path = require_one(scene.fingers).trajectory
-    last = path.waypoints[-1]
-    away = (*last.position[:2], max(last.position[2], scene.actuator.rest_height) + AWAY)
-    end = last.time + LIFTED
-    after = tuple(replace(last, time=t, position=away) for t in (end, end + SETTLED))
-    return _follow(scene, replace(path, waypoints=(*path.waypoints, *after)))
+    paths = []
+    for path in (finger.trajectory for finger in scene.fingers):
+        last = path.waypoints[-1]
+        away = (*last.position[:2], max(last.position[2], scene.actuator.rest_height) + AWAY)
+        end = last.time + LIFTED
+        after = tuple(replace(last, time=t, position=away) for t in (end, end + SETTLED))
+        paths.append(replace(path, waypoints=(*path.waypoints, *after)))
+    return _follow(scene, paths)
 
 
 def _turn(turn: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
@@ -80,7 +88,7 @@ def _turn(turn: float, pitch: float, roll: float) -> tuple[float, float, float, 
     )
 
 
-def _lift(x: float, y: float, height: float, turn: Turn = (0.0, 0.0, 0.0)) -> list[Pose]:
+def _lift(x: float, y: float, height: float, turn: Turn = LEVEL) -> list[Pose]:
     """Return a press of 3 mm in 0.8 s, then 5 mm/s to a height, mm, and a rest there."""
     up = 1.1 + max(abs(height + 3.0) / 5.0, 0.3) * 1.2
     ways = ((0.0, 1.5), (0.8, -3.0), (1.1, -3.0), (up, height), (up + 0.4, height))
@@ -88,7 +96,7 @@ def _lift(x: float, y: float, height: float, turn: Turn = (0.0, 0.0, 0.0)) -> li
 
 
 def _drag(
-    x: float, y: float, height: float, speed: float, hold: float = 0.5, turn: Turn = (0.0, 0.0, 0.0)
+    x: float, y: float, height: float, speed: float, hold: float = 0.5, turn: Turn = LEVEL
 ) -> list[Pose]:
     """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
     poses = _lift(x, y, height, turn)
@@ -101,8 +109,8 @@ def drag_row(turn: float, pitch: float) -> list[Pose]:
     return _drag(-20.0, 1.5, -1.5, 15.0, turn=(turn, pitch, 0.0))
 
 
-def list_paths() -> dict[str, tuple[str, list[Pose]]]:
-    """Return the paths by name: interpolation and poses."""
+def list_paths() -> dict[str, Drawn]:
+    """Return the paths of one fingertip by name."""
     eight = _lift(0.0, 0.0, 8.0)
     for angle in np.linspace(0.0, 2.0 * math.pi, 81)[1:].tolist():
         time = eight[4][0] + 10.0 * angle / (2.0 * math.pi)
@@ -122,7 +130,30 @@ def list_paths() -> dict[str, tuple[str, list[Pose]]]:
     }
 
 
-def draw_drags(count: int) -> list[tuple[str, list[Pose]]]:
+def list_hands() -> dict[str, Drawn]:
+    """Return the paths of several fingertips by name."""
+    pinch, five = [], []
+    for y in (-1.0, 1.0):
+        points = ((4.0, -18.0, 6.0 * y), (4.4, -18.0, 6.0 * y), (7.4, 18.0, 6.0 * y), (7.9, 18.0, 6.0 * y))
+        pinch.append([*_lift(-18.0, 10.0 * y, 0.0), *((*at, 7.0, *LEVEL) for at in points)])
+    for start in np.linspace(0.0, 2.0 * math.pi, 6)[:-1].tolist():
+        turned = [(0.0, 0.0), (5.5, 0.3), (7.0, 0.0), (8.5, -0.3), (10.0, 0.0)]
+        arc = [(t, 16.0 * math.cos(start + angle), 16.0 * math.sin(start + angle)) for t, angle in turned]
+        five.append([*_lift(*arc[0][1:], 7.0), *((*at, 7.0, *LEVEL) for at in arc[1:])])
+    # The second one starts so much later that it passes 11 mm behind the first.
+    along, later = _drag(-20.0, 0.0, 6.0, 12.0), 11.0 * math.sqrt(2.0) / 12.0
+    wait = (0.0, *(0.0,) * 4, *(later,) * 3)
+    repeated = zip([*along[:5], *along[4:]], wait, strict=True)
+    across = [(pose[0] + more, 0.0, pose[1], pose[3], *LEVEL) for pose, more in repeated]
+    return {
+        "two-hands": ("smooth", _drag(-20.0, -12.0, 8.0, 12.0), _drag(20.0, 12.0, -8.0, 12.0)),
+        "pinch": ("smooth", *pinch),
+        "crossing": ("linear", along, across),
+        "five-fingers": ("smooth", *five),
+    }
+
+
+def draw_drags(count: int) -> list[Drawn]:
     """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, the fingertip turned."""
     random, drags = np.random.default_rng(DRAG_SEED), []
     for number in range(count):
@@ -158,7 +189,7 @@ LIMITS: dict[str, Drag | Lift] = {"ridge-limit": Drag(), "lift-limit": Lift()}
 #: Between which speeds, m/s.
 LOW, HIGH = 5e-3, 80e-3
 #: All trajectories, and those of a quick suite.
-GROUPS = (SESSION, *list_paths(), *PHASES, RANDOM, *LIMITS)
+GROUPS = (SESSION, *list_paths(), *list_hands(), *PHASES, RANDOM, *LIMITS)
 QUICK = ("ridge-25", "surface", "lift")
 
 #: Metrics of a trial.
@@ -207,9 +238,8 @@ def place_trial(scene: Scene, trajectory: str) -> tuple[Scene, Callable[[Scene, 
     if trajectory == SESSION:
         return recorded, measure_trial
     group, _, number = trajectory.partition("-")
-    drawn = draw_drags(int(number))[-1] if group == RANDOM else list_paths()[trajectory]
-    interpolation, poses = drawn
-    return lift_off(with_path(recorded, poses, interpolation)), measure_trial
+    drawn = draw_drags(int(number))[-1] if group == RANDOM else (list_paths() | list_hands())[trajectory]
+    return lift_off(with_paths(recorded, *drawn)), measure_trial
 
 
 def measure_trial(
@@ -230,7 +260,7 @@ def measure_trial(
         figures |= {"rfd": own["rfd_session"], "losses": float(judged.losses)}
         figures["contact_loss_share"] = judged.loss_share
         figures |= perceive(figures["rfd"], figures["set_point"], figures["ridge_unevenness"])
-    relief = measure_relief(scene, done.history, sum_cells(done.history).following, figures["ridge_offset"])
+    relief = measure_relief(scene, done.history, figures["ridge_offset"])
     figures |= {"relief_rms": relief.rms, "relief_largest": relief.largest}
     figures["period_cost"] = spent / done.periods
     return {"figures": {name: figures.get(name) for name in OUTCOMES}}

@@ -18,7 +18,7 @@ from digiclay.core.session.run_scene import Result, run
 from digiclay.core.studies.speed_limits import Drag, Lift, track
 
 from benchmarks.method_figures import list_models, run_mismatched
-from digiclay_study.method_trials import drag_row, with_path
+from digiclay_study.method_trials import drag_row, with_paths
 from tests.assemble import path, record, sample
 
 REST = 40.0
@@ -65,7 +65,7 @@ def test_it_holds_the_force_better_than_method_i_turned_finger_or_not(turn: floa
 def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn: float, pitch: float) -> None:
     poses = drag_row(np.radians(turn), np.radians(pitch))
     bed = {"columns": 25, "rows": 15}
-    one, three = (run(with_path(device(method, layout=bed), poses, "linear")).metrics for method in BOTH)
+    one, three = (run(with_paths(device(method, layout=bed), "linear", poses)).metrics for method in BOTH)
     assert three["contact_loss_share"] == 0.0
     # Measured 0.39 and 0.38; 2.8 and 0.9 by a filter of the angle, flat 90 degrees off where it begins.
     assert three["rfd"] < 0.6 * one["rfd"]

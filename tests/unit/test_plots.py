@@ -240,3 +240,44 @@ def test_a_sweep_over_two_axes_leaves_pictures_and_over_three_a_table_only(here,
     assert main([*sweep, *(f"--vary={axis}" for axis in three), "--out", "three"]) == 0
     assert "3 axes: a table only, no pictures" in capsys.readouterr().out
     assert list((here / "three").glob("*.png")) == []
+
+
+def two_fingers(fingers: int = 2) -> dict[str, np.ndarray]:
+    """The drag by several fingertips side by side, which lift one after the other."""
+    case, share = drag(), 1.0 / fingers
+    last = 3.0 + np.arange(fingers)
+    touching = (case["time"][:, None] > 1.0) & (case["time"][:, None] < last)
+    case["finger_force"] = share * 0.4 * touching
+    case["fingertip"] = np.repeat(case["fingertip"][:, None], fingers, axis=1)
+    case["fingertip"][..., 1] = np.linspace(-9e-3, 9e-3, fingers)
+    return case
+
+
+def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
+    case = two_fingers()
+    session, surface = plots.session_figure(case, SetPoint(0.2)), plots.surface_figure(case)
+    force, heights, plan = axes(session, "force"), axes(session, "heights"), axes(surface, "map")
+    lines = force.get_lines()
+    for line, own in zip(lines, case["finger_force"].T, strict=False):
+        np.testing.assert_array_equal(line.get_ydata(), own)
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 3
+    assert (force.get_xlabel(), force.get_ylabel()) == ("time (s)", "force (N)")
+    legends = [[text.get_text() for text in part.get_legend().get_texts()] for part in (heights, force)]
+    assert legends == [["1", "2"], ["1", "2", "set point 0.2 N", "in contact"]]
+    # The color of a cell is that of its fingertip, which is over it in the middle of its contact.
+    assert [line.get_color() for line in heights.get_lines()] == [line.get_color() for line in lines[:2]]
+    reached = case["position"][plots.session_cells(case)]
+    halfway = [case["fingertip"][row, finger, :2] for finger, row in enumerate((40, 50))]
+    np.testing.assert_allclose(reached, halfway, rtol=0, atol=2.2e-3)  # half a diagonal of a cell
+    assert [line.get_label() for line in plan.get_lines()][:4] == [
+        "lifted",
+        "in contact",
+        "_lifted",
+        "_in contact",
+    ]
+    assert np.nanmax(plan.get_lines()[1].get_xdata()) < np.nanmax(plan.get_lines()[3].get_xdata())
+
+
+def test_no_two_of_32_fingertips_are_drawn_alike():
+    lines = axes(plots.session_figure(two_fingers(32), None), "force").get_lines()
+    assert len({(line.get_color(), str(line._dash_pattern)) for line in lines}) == 32

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from digiclay import __version__
 from digiclay.cli import main
+from digiclay.core.base.modes import Mode
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
@@ -173,6 +174,33 @@ def test_every_trajectory_can_be_placed_and_judged_and_random_drags_follow_their
         assert placed[name].trajectories()[0].poses(np.array([1e3]))[0, 2] > 75e-3
 
 
+@pytest.mark.parametrize(
+    ("name", "fingers", "nearest"),
+    [("two-hands", 2, 24e-3), ("pinch", 2, 12e-3), ("crossing", 2, 11e-3), ("five-fingers", 5, 18.5e-3)],
+)
+def test_fingers_of_a_trajectory_come_as_near_as_it_says(name: str, fingers: int, nearest: float) -> None:
+    placed, _ = place_trial(resolve({}), name)
+    ways = [path.poses(np.arange(0.0, 9.0, 1e-3))[:, :2] for path in placed.trajectories()]
+    assert len(ways) == fingers
+    apart = [np.hypot(*(a - b).T).min() for place, a in enumerate(ways) for b in ways[:place]]
+    # A path is smooth between its waypoints.
+    assert min(apart) == pytest.approx(nearest, abs=0.2e-3)
+
+
+def test_a_trial_of_several_fingers_is_judged_by_the_worst() -> None:
+    scene = resolve({"layout": {"rows": 15, "columns": 25}, "control": {"method": "virtual_master"}})
+    placed, measure = place_trial(scene, "two-hands")
+    short = replace(placed, simulation=replace(placed.simulation, duration=4.0))
+    both = measure(short, None)["figures"]
+    each = [measure(replace(short, fingers=(finger,)), None)["figures"] for finger in short.fingers]
+    # Apart as they are, each is as alone; the sum of both would be 0.4 N off.
+    for name in ("rfd", "max_total_force", "lag_max"):
+        assert both[name] == pytest.approx(max(one[name] for one in each), rel=0.05)
+    assert both["losses"] == sum(one["losses"] for one in each)
+    # And neither is off the relief that both draw.
+    assert both["relief_largest"] is None or both["relief_largest"] < 4e-3
+
+
 def placed_lift(method: str) -> tuple[Scene, Any]:
     """Return the league's lift on a small bed, and what measures it."""
     scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": method}})
@@ -199,11 +227,12 @@ def test_a_relief_that_is_nominal_has_no_error() -> None:
     place = assemble(scene).grid.positions
     following = np.full(61, 5)
     history = {"fingertip": tip, "position": place, "total_force": np.full(61, 0.4)}
+    history["mode"] = np.full((61, len(place)), Mode.FORCE_FOLLOW)
     rest = scene.actuator.rest_height
     # One row in four is taken.
     thin = {**history, "fingertip": tip[::4]}
     history["height"] = (rest + find_nominal(scene, thin, following[::4], 1.5e-3))[None]
-    assert measure_relief(scene, history, following, 1.5e-3).largest == pytest.approx(0.0, abs=1e-12)
-    off = measure_relief(scene, history, following, 1.0e-3)
+    assert measure_relief(scene, history, 1.5e-3).largest == pytest.approx(0.0, abs=1e-12)
+    off = measure_relief(scene, history, 1.0e-3)
     assert off.largest == pytest.approx(0.5e-3)
-    assert measure_relief(scene, history, following, None).rms is None
+    assert measure_relief(scene, history, None).rms is None

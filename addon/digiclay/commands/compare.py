@@ -15,7 +15,7 @@ from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
 from ..core.files.run_folder import check_folder, find_name, write_folder
 from ..core.metrics.metric_table import SPEEDS
-from ..core.metrics.summary import sum_cells
+from ..core.metrics.summary import find_worst_finger, sum_cells
 from ..core.model.control_interface import find_set_point
 from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
@@ -123,14 +123,17 @@ def carry_out(arguments: argparse.Namespace) -> int:
             with Bar(sys.stderr, method, scene.simulation.control_period, quiet=arguments.quiet) as bar:
                 done = run(replace(scene, recorder=Recorder()), progress=bar)
             measured[method] = done.figures | (_speeds(scene) if arguments.speed else {})
-            wanted = find_set_point(scene.set_point, sum_cells(done.history).following)
-            forces[method] = done.history["time"], done.history["total_force"], wanted
+            _, worst = find_worst_finger(done.history, scene.set_point)
+            wanted = find_set_point(scene.set_point, sum_cells(worst).following)
+            forces[method] = worst["time"], worst["total_force"], wanted
             beyond[method] = done.metrics.get("beyond_a_finger", "")
         units = {name: metric.unit for name, metric in {**RUN_METRICS, **SPEEDS}.items()}
         content = {"scene": scene.name, "methods": measured, "units": units, "beyond_a_finger": beyond}
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
-        save(comparison(measured, forces, scene.name), folder / "compare.png")
+        several = len(scene.fingers) > 1
+        called = "force of the worst finger" if several else "total force"
+        save(comparison(measured, forces, scene.name, called), folder / "compare.png")
     notes = [f"{method}: {words}" for method, words in beyond.items() if words]
     notes += [f"Followed: {Criterion()}."] if arguments.speed else []
     say(arguments, *table(measured), *notes, f"written to {out}")

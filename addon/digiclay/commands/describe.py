@@ -12,7 +12,7 @@ from ..core.base.quantity import Parameters, Quantity, list_quantities
 from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
-from ..core.scene.schema import SECTIONS, Scene
+from ..core.scene.schema import FINGER_SECTIONS, SECTIONS, Scene
 from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
 from ..core.shapes.fitting import fit_shape
 from .arguments import add_command, add_options, add_scene, scene_of
@@ -54,12 +54,23 @@ def list_parameters(scene: Scene) -> Iterator[str]:
     """Give two lines for each parameter of the parts of a scene: key and value; meaning, range, source."""
     yield "Sources: P the paper, D derived, C chosen, or a reference of docs/nomenclature.md."
     for section in SECTIONS:
-        part = scene.section(section)
-        for name, declared in list_quantities(part).items() if part else ():
-            yield f"{section}.{name} = {write_value(getattr(part, name))} {declared.unit}".rstrip()
-            parts = describe_meaning(declared), write_range(declared), declared.source
-            text = "; ".join(filter(None, parts))
-            yield textwrap.fill(text, 110, initial_indent="    ", subsequent_indent="    ")
+        for fingers, part in _list_parts(scene, section):
+            owner = f"finger #{fingers}.{section}" if fingers else section
+            for name, declared in list_quantities(part).items() if part else ():
+                yield f"{owner}.{name} = {write_value(getattr(part, name))} {declared.unit}".rstrip()
+                parts = describe_meaning(declared), write_range(declared), declared.source
+                text = "; ".join(filter(None, parts))
+                yield textwrap.fill(text, 110, initial_indent="    ", subsequent_indent="    ")
+
+
+def _list_parts(scene: Scene, section: str) -> list[tuple[str, Any]]:
+    """Return the different parts of a section, and the numbers of their fingers where several differ."""
+    if section not in FINGER_SECTIONS:
+        return [("", scene.section(section))]
+    owners: dict[Any, list[str]] = {}
+    for number, finger in enumerate(scene.fingers, 1):
+        owners.setdefault(getattr(finger, section), []).append(str(number))
+    return [(", ".join(numbers) if len(owners) > 1 else "", part) for part, numbers in owners.items()]
 
 
 def describe_meaning(declared: Quantity) -> str:
@@ -84,9 +95,10 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     yield scene.name + (f": {scene.description.strip()}" if scene.description else "")
     yield f"\nThe line from finger to pins (preset {scene.preset})"
     for place, section in PLACES:
-        part = scene.section(section)
-        method = f"{scene.method}: " if section == "control" else ""
-        yield _filled(place, "left out" if part is None else method + _parameters(part))
+        for fingers, part in _list_parts(scene, section):
+            method = f"{scene.method}: " if section == "control" else ""
+            own = "left out" if part is None else method + _parameters(part)
+            yield _filled(place, f"of {fingers}: {own}" if fingers else own)
     if scene.shape:
         yield _filled("shape", fit_shape(scene.shape, system.grid, scene.actuator).describe())
     simulation = scene.simulation

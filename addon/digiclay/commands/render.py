@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.base.errors import DigiclayError
 from ..core.files.run_folder import claim_files
-from ..core.metrics.summary import compute_metrics
+from ..core.metrics.summary import compute_metrics, find_worst_finger
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
@@ -70,7 +70,7 @@ PICTURE = "pins.png"
 #: How a picture looks by default.
 STILL = Still(width=1600, height=1000, engine="cycles")
 #: What drawing needs of a history.
-ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force")
+ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force", "finger_force")
 #: Options of one kind of picture only; --rate is of both.
 OF_FILMS, OF_TURNTABLES = ("rate", "speed", "start", "stop", "strip"), ("rate", "frames")
 
@@ -168,8 +168,10 @@ def stage_moving(
     from ..pictures.film import stage_film, stage_turntable
 
     if isinstance(looks, Film):
-        set_point = compute_metrics(history, scene.set_point)["set_point"]
-        return stage_film(history, looks, set_point=set_point, **sizes(scene))
+        number, worst = find_worst_finger(history, scene.set_point)
+        force = ("total force" if worst is history else f"force of finger {number}"), worst["total_force"]
+        set_point = compute_metrics(worst, scene.set_point)["set_point"]
+        return stage_film(history, looks, force, set_point=set_point, **sizes(scene))
     return stage_turntable(_find_instant(scene, history, looks, row), looks)
 
 

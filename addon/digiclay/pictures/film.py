@@ -105,9 +105,13 @@ class Shots:
 
 @contextmanager
 def stage_film(
-    history: Mapping[str, NDArray[Any]], looks: Film, *, set_point: float | None = None, **sizes: Any
-) -> Iterator[Shots]:
-    """Set the stage for the frames of a film; `sizes`: `pitch`, `actuator`, `finger` of `Instant.of`."""
+    history: Mapping[str, NDArray[Any]], looks: Film, plotted: tuple[str, Floats], *,
+    set_point: float | None = None, **sizes: Any,
+) -> Iterator[Shots]:  # fmt: skip
+    """Set the stage for the frames of a film. `plotted`: a force, (t,), N, and what it is called.
+
+    `sizes`: `pitch`, `actuator`, `finger` of `Instant.of`.
+    """
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     height = history["height"][used]
@@ -120,8 +124,8 @@ def stage_film(
             modes=[Mode(int(code)) for code in np.unique(history["mode"][used])],
             margins=(left, right, below + (SHARE if looks.strip else 0.0), above),
         )  # fmt: skip
-        time, force = history["time"], history["total_force"]
-        chart = draw_force_plot(front, time[used], force[used], set_point) if looks.strip else None
+        time, (called, force) = history["time"], plotted
+        chart = draw_force_plot(front, time[used], force[used], set_point, called) if looks.strip else None
 
         def show(frame: int) -> None:
             row = int(rows[frame])

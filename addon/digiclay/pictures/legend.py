@@ -176,6 +176,8 @@ LEAST = 0.05
 class ForcePlot:
     """Force plot of one film."""
 
+    #: What the force is called.
+    called: str
     #: Objects that change from frame to frame.
     been: Any
     cursor: Any
@@ -190,7 +192,7 @@ class ForcePlot:
     per_second: float
 
     def show(self, time: float, force: float) -> None:
-        """Show an instant: its time, s, and the total force then, N. `time`, s; `force`, N."""
+        """Show an instant: its time, s, and the force then, N."""
         now = (time - self.first) * self.per_second
         place = np.minimum(self.place, now)
         # Columns still to come are drawn together at the cursor, as a face of no width.
@@ -199,12 +201,14 @@ class ForcePlot:
         self.been.data.update()
         behind = self.cursor.location.z / self.been.location.z
         self.cursor.location.x = (self.been.location.x + now) * behind
-        self.force.data.body = f"total force {force:.2f} N"
+        self.force.data.body = f"{self.called} {force:.2f} N"
         self.time.data.body = f"{time:.2f} s"
 
 
-def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float | None) -> ForcePlot:
-    """Draw the strip of a session: times (t,), s, total forces (t,) and set point, N."""
+def draw_force_plot(
+    front: Front, time: Floats, force: Floats, set_point: float | None, called: str = "total force"
+) -> ForcePlot:
+    """Draw the strip of a session: times (t,), s, forces (t,) and set point, N, and what they are called."""
     left, right = LEFT * front.width, -LEFT * front.width
     bottom = -0.95 * front.height
     full = 2.0 * SHARE * front.height
@@ -228,9 +232,11 @@ def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float 
         front.box("set point", (left, at - thick), (right, at + thick), ASKED, 2)
         front.write(f"set point {set_point:.2f} N", size, 0.0, above, ASKED, "CENTER")
     cursor = front.box("cursor", (left, bottom), (left + 1.5 * thick, bottom + rise), INK, 1)
-    label = front.write("total force", size, left, above, INK)
+    label = front.write(called, size, left, above, INK)
     moment = front.write("time", size, right, above, FADED, "RIGHT")
-    return ForcePlot(areas[1], cursor, label, moment, place, height, float(time[0]), (right - left) / lasts)
+    return ForcePlot(
+        called, areas[1], cursor, label, moment, place, height, float(time[0]), (right - left) / lasts
+    )
 
 
 def reduce_columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:

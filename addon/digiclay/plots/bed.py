@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.base.arrays import Floats
-from ..core.metrics.summary import find_contact_rows
+from ..core.metrics.summary import find_contact_rows, split_fingers
 from ..core.surface.formed import find_grid_shape, make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
 
@@ -148,16 +148,19 @@ def draw_map(axes: Any, history: History, title: str) -> None:
 
 
 def draw_path(axes: Axes, history: History) -> None:
-    """Draw the path of the fingertip on axes of `draw_map`: a line in contact, dots while lifted."""
+    """Draw the path of each fingertip on axes of `draw_map`: a line in contact, dots while lifted."""
     from matplotlib.patheffects import withStroke
 
-    touching = find_contact_rows(array(history, "total_force"))[:, None]
-    finger, frame = array(history, "fingertip")[:, :2] * MM, axes.axis()
-    lifted, pressed = np.where(touching, np.nan, finger).T, np.where(touching, finger, np.nan).T
+    frame = axes.axis()
     dots: dict[str, Any] = {"color": "white", "linestyle": (0, (0.1, 2.2)), "dash_capstyle": "round"}
     dark, pale = withStroke(linewidth=3.6, foreground=INK), withStroke(linewidth=4.2, foreground="white")
-    axes.plot(*lifted, label="lifted", path_effects=[dark], **dots)
-    axes.plot(*pressed, label="in contact", path_effects=[pale], color=LINES[1], linewidth=2.4)
+    for number, own in enumerate(split_fingers(history)):
+        touching = find_contact_rows(own["total_force"])[:, None]
+        finger = np.asarray(own["fingertip"])[:, :2] * MM
+        lifted, pressed = np.where(touching, np.nan, finger).T, np.where(touching, finger, np.nan).T
+        axes.plot(*lifted, label="_" * (number > 0) + "lifted", path_effects=[dark], **dots)
+        line: dict[str, Any] = {"path_effects": [pale], "color": LINES[1], "linewidth": 2.4}
+        axes.plot(*pressed, label="_" * (number > 0) + "in contact", **line)
     axes.axis(frame)
     legend_above(axes)
 

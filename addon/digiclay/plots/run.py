@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.metrics.metric_table import METRICS
-from ..core.metrics.summary import compute_metrics, find_contact_rows, sum_cells
+from ..core.metrics.summary import compute_metrics, find_contact_rows, split_fingers, sum_cells
 from ..core.model.control_interface import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
 from .figure import DASHES, INK, LINES, MM, SHADE, canvas, legend_above
@@ -19,6 +19,8 @@ if TYPE_CHECKING:  # only named in annotations
 
 #: Letter of each chosen cell, in the order in which the fingertip passes them.
 LETTERS = "ABCDEF"
+#: Lines of fingers beyond the sixth have the same colors again.
+STYLES = ("-", ":", (0, (1, 1, 4, 1)), (0, (8, 1)), (0, (3, 1)), (0, (6, 2, 1, 2)))
 #: Metrics in the picture of a session.
 FIGURES = ("rfd", "rfd_shaping", "max_total_force", "contact_loss_share", "lag_mean", "height_range")
 
@@ -27,9 +29,12 @@ def session_cells(history: History) -> list[int]:
     """Choose up to six cells along the fingertip path in contact, evenly spaced.
 
     They are different, in the order in which the fingertip passes them, the first and the last
-    contact among them. Without any contact they are those that moved most.
+    contact among them. Without any contact they are those that moved most. Of several fingertips each of the
+    first six has the cell under it in the middle of its contact.
     """
     count = len(LETTERS)
+    if "finger_force" in history:
+        return _find_middle_cells(history)[:count]
     position, height = array(history, "position"), array(history, "height")
     touching = np.flatnonzero(find_contact_rows(array(history, "total_force")))
     if not len(touching):
@@ -45,18 +50,30 @@ def session_cells(history: History) -> list[int]:
     return list(dict.fromkeys(nearest.tolist()))
 
 
+def _find_middle_cells(history: History) -> list[int]:
+    """Return the cell under each fingertip in the middle of its contact, or where it begins without any."""
+    position, cells = array(history, "position"), []
+    for own in split_fingers(history):
+        touching = np.flatnonzero(find_contact_rows(own["total_force"]))
+        place = own["fingertip"][touching[len(touching) // 2] if len(touching) else 0, :2]
+        cells.append(int(np.argmin(np.sum((position - place) ** 2, axis=1))))
+    return cells
+
+
 def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     """Draw heights of chosen cells and the total force over time, as the paper's Fig. 8 does.
 
-    Without a `set_point` neither it nor a deviation from it is shown. The axes are, by label: ``heights``,
-    ``force``, ``map`` with its ``scale``, and ``figures``.
+    Of several fingertips it is the force of each. Without a `set_point` neither it nor a deviation from it is
+    shown. The axes are, by label: ``heights``, ``force``, ``map`` with its ``scale``, and ``figures``.
     """
+    several = "finger_force" in history
+    letters = [str(number) for number in range(1, len(LINES) + 1)] if several else LETTERS
     time, height = array(history, "time"), array(history, "height")
     with canvas(12.5, 6.3) as (figure, place):
         heights, plan = place("heights", 0.8, 2.95, 6.95, 3.0), place("map", 8.62, 3.1, 3.12, 2.85)
         force, figures = place("force", 0.8, 0.65, 6.95, 1.7), place("figures", 8.62, 0.65, 3.78, 1.7)
         draw_map(plan, history, "Where the cells are")
-        for name, color, cell in zip(LETTERS, LINES, session_cells(history), strict=False):
+        for name, color, cell in zip(letters, LINES, session_cells(history), strict=False):
             heights.plot(time, height[:, cell] * MM, color=color, label=name)
             spot = array(history, "position")[cell] * MM
             disc = {"markersize": 16, "markeredgecolor": color, "markeredgewidth": 2.6, "clip_on": False}
@@ -68,11 +85,12 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         shade_contact(heights, history)
         wanted, label = None, ""
         if set_point is not None:
-            wanted = set_point.total(sum_cells(history).following)
+            fingers = [set_point.total(sum_cells(own).following) for own in split_fingers(history)]
+            wanted = np.fmax.reduce(fingers)  # the same of all fingers, where it does not depend on cells
             label = f"set point {set_point.force:g} N{' a cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
-        force.set_title("Total force on the fingertip")
+        force.set_title("Forces" if several else "Total force on the fingertip")
         legend_above(heights)
         for axes in (heights, force):
             axes.yaxis.set_label_coords(-0.075, 0.5)
@@ -81,13 +99,23 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
 
 
 def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: str) -> None:
-    """Draw the total force over time, the one asked for (t,), N, dashed, and when the fingertip touches."""
-    time, total = array(history, "time"), array(history, "total_force")
-    axes.plot(time, total, color=INK, linewidth=1.3, label="total force")
+    """Draw the total force over time, the one asked for (t,), N, dashed, and when the fingertip touches.
+
+    Of several fingertips the force of each.
+    """
+    time, asked = array(history, "time"), LINES[1]
+    if "finger_force" in history:
+        asked = INK
+        for number, own in enumerate(array(history, "finger_force").T):
+            again, color = divmod(number, len(LINES))
+            look: dict[str, Any] = {"color": LINES[color], "linestyle": STYLES[again], "linewidth": 1.1}
+            axes.plot(time, own, label=str(number + 1), **look)
+    else:
+        axes.plot(time, array(history, "total_force"), color=INK, linewidth=1.3, label="total force")
     if wanted is not None:
-        axes.plot(time, wanted, color=LINES[1], linewidth=1.3, linestyle=DASHES, label=label)
+        axes.plot(time, wanted, color=asked, linewidth=1.3, linestyle=DASHES, label=label)
     shade_contact(axes, history, "in contact")
-    legend_above(axes)
+    legend_above(axes, columns=40)
 
 
 def shade_contact(axes: Axes, history: History, label: str | None = None) -> None:

@@ -130,10 +130,11 @@ def comparison(
     found: Mapping[str, Mapping[str, float | None]],
     forces: Mapping[str, tuple[Any, Any, Any]],
     name: str,
+    called: str = "total force",
 ) -> Any:
-    """Draw the total force over time, and a bar a method for each metric.
+    """Draw a force over time, by default the total one, and a bar a method for each metric.
 
-    `forces`: time, s, total force, N, and the total force asked for, NaN where none is, by method.
+    `forces`: time, s, force, N, and the one asked for, NaN where none is, by method.
     """
     colors = {method: LINES[i % len(LINES)] for i, method in enumerate(found)}
     bar = 0.3
@@ -146,7 +147,7 @@ def comparison(
             force.plot(time, total, color=colors[method], linewidth=1.4, label=method)
             force.plot(time, wanted, color=colors[method], zorder=2.5, **dashed)
         force.plot([], [], color=INK, label="set points", **dashed)
-        force.set(xlabel="time (s)", ylabel="total force (N)", ylim=(0.0, None), title="Total force")
+        force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), title=called.capitalize())
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
         legend_above(force)
         for number, key in enumerate(PANELS):

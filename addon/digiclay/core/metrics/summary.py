@@ -9,8 +9,9 @@ exerts is exactly zero.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -324,6 +325,44 @@ def measure_touchdown(
     return passed, measure_settling_time(time[first], beyond / wanted, 0.0, BAND)
 
 
+def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """Give the history of each finger; a pin's force counts for the nearest, where two press it."""
+    if "finger_force" not in history:
+        yield history
+        return
+    common = {name: values for name, values in history.items() if name != "finger_force"}
+    tips, (x, y) = history["fingertip"], history["position"].T
+    owner, least = np.zeros(history["force"].shape, np.int8), np.full(history["force"].shape, np.inf)
+    for finger in range(tips.shape[1]):
+        apart = (x - tips[:, finger, :1]) ** 2 + (y - tips[:, finger, 1:2]) ** 2
+        owner[apart < least] = finger
+        np.minimum(least, apart, out=least)
+    for finger, total in enumerate(history["finger_force"].T):
+        own = owner == finger
+        force = np.where(own, history["force"], 0.0)
+        found = force.sum(axis=1)
+        # All of a finger together are exact.
+        force *= np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
+        rows = {"force": force, "mode": np.where(own, history["mode"], np.int8(Mode.REST))}
+        yield {**common, **rows, "total_force": total, "fingertip": tips[:, finger]}
+
+
+def take_largest(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:
+    """Return the largest of each metric of the fingers: a sum would hide that one is lost."""
+    return {
+        name: max((value for one in each if (value := one[name]) is not None), default=None)
+        for name in each[0]
+    }
+
+
+def find_worst_finger(
+    history: Mapping[str, Any], set_point: SetPoint | None
+) -> tuple[int, Mapping[str, Any]]:
+    """Return the number, from 1 on, and the history of the finger with the largest RFD."""
+    fingers = enumerate(split_fingers(history), 1)
+    return max(fingers, key=lambda one: compute_metrics(one[1], set_point)["rfd"] or 0.0)
+
+
 #: All cells.
 ALL = slice(None)
 
@@ -341,8 +380,11 @@ def compute_cell_area(position: ArrayLike) -> float | None:
 def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
     """Return every metric of a session by the keys of `METRICS`, SI; None without a basis, never a NaN.
 
-    `history`: the arrays of ``history.npz``. Raises ParameterError when the history has no rows.
+    `history`: the arrays of ``history.npz``; of several fingers see `take_largest`. Raises ParameterError
+    when the history has no rows.
     """
+    if "finger_force" in history:
+        return take_largest([compute_metrics(own, set_point) for own in split_fingers(history)])
     time = np.asarray(history["time"], dtype=np.float64)
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")

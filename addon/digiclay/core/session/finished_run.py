@@ -24,14 +24,14 @@ from .memory_limit import measure_available_memory
 HISTORY = "history.npz"
 #: No number of a run is as large: sums of squares are finite.
 LARGEST = 1e100
-#: Shape of each array of a history, t rows of n cells.
+#: Shape of each array of a history, t rows of n cells under f fingers; of one finger without that axis.
 SHAPES: dict[str, tuple[str | int, ...]] = {
     "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
-    "fingertip": ("t", 7), "total_force": ("t",), "position": ("n", 2),
-    "beyond_a_finger": ("t",),
+    "fingertip": ("t", "f", 7), "total_force": ("t",), "position": ("n", 2),
+    "finger_force": ("t", "f"), "beyond_a_finger": ("t",),
 }  # fmt: skip
 #: Arrays that not every run has.
-LATER = ("beyond_a_finger",)
+LATER = ("finger_force", "beyond_a_finger")
 #: Types of an array that does not hold numbers: their kinds, and what they are called.
 KINDS = {"mode": ("i", "whole numbers"), "beyond_a_finger": ("b", "truth values")}
 
@@ -78,9 +78,10 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     if not 0 < rows <= most:
         rule = f"must have from 1 to the {most:,} rows of its scene's {scene.periods:,} control periods"
         raise OutputError(f"{path} {rule} (got {rows:,}).")
-    sizes = {"n": scene.cells, "t": rows}
+    sizes = {"n": scene.cells, "t": rows, "f": len(scene.fingers)}
     for name, head in heads.items():
-        shape = tuple(sizes[size] if isinstance(size, str) else size for size in SHAPES[name])
+        axes = (size for size in SHAPES[name] if size != "f" or len(scene.fingers) > 1)
+        shape = tuple(sizes[size] if isinstance(size, str) else size for size in axes)
         if head.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
         kinds, called = KINDS.get(name, ("if", "numbers"))

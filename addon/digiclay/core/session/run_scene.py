@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
-from ..base.modes import Mode
 from ..engine.simulation import begin, periods
 from ..engine.system import System
 from ..metrics.metric_table import ERRORS, METRICS, RUN
-from ..metrics.summary import compute_metrics
+from ..metrics.summary import compute_metrics, split_fingers, take_largest
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
 from ..scene.assembly import assemble
@@ -129,43 +128,21 @@ def evaluate(
         "total_force": rows["force"].sum(axis=1),
         "position": system.grid.positions,
     }
-    own = split_fingers(history)
-    each = [compute_metrics(one, scene.set_point) for one in own]
-    # Of several fingers the largest of each: a sum would hide that one is lost.
-    metrics: dict[str, Any] = {
-        name: max((value for one in each if (value := one[name]) is not None), default=None)
-        for name in each[0]
-    }
+    each, depths = [], []
+    for finger, own in zip(scene.fingers, split_fingers(history), strict=True):
+        each.append(compute_metrics(own, scene.set_point))
+        if system.cell.touch is not None and finger.fingertip:
+            depths.append(find_indentations(finger.fingertip, own))
+    metrics: dict[str, Any] = take_largest(each)
     if system.fingers > 1:
         metrics["fingers"] = each
-    tips = [finger.fingertip for finger in scene.fingers]
-    if system.cell.touch is not None:
-        pairs = zip(tips, own, strict=True)
-        depth = np.max([find_indentations(tip, one) for tip, one in pairs if tip], axis=0)
+    if depths:
+        depth = np.max(depths, axis=0)
         metrics["max_indentation"] = float(depth.max())
         metrics["beyond_a_finger"] = describe_excess(metrics["max_total_force"], metrics["max_indentation"])
         if metrics["beyond_a_finger"]:
             history["beyond_a_finger"] = is_beyond(history["total_force"], depth)
     return replace(report(scene, ended, metrics, versions), history=history)
-
-
-def split_fingers(history: History) -> list[History]:
-    """Return the history of each finger; a pin's force counts for the nearest, where two press it."""
-    if "finger_force" not in history:
-        return [history]
-    tips, (x, y) = history["fingertip"], history["position"].T
-    apart = [(x - tip[:, :1]) ** 2 + (y - tip[:, 1:2]) ** 2 for tip in tips[..., :2].transpose(1, 0, 2)]
-    nearest = np.argmin(apart, axis=0)
-    parts = []
-    for finger, total in enumerate(history["finger_force"].T):
-        own = nearest == finger
-        force = np.where(own, history["force"], 0.0)
-        found = force.sum(axis=1)
-        # All of a finger together are exact.
-        force *= np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
-        rows = {"force": force, "mode": np.where(own, history["mode"], np.int8(Mode.REST))}
-        parts.append({**history, **rows, "total_force": total, "fingertip": tips[:, finger]})
-    return parts
 
 
 def report(

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
+from ..base.modes import Mode
 from ..control.blister import Blister
-from ..metrics.summary import compute_cell_area, find_contact_rows, find_stretches
+from ..metrics.summary import compute_cell_area, find_contact_rows, find_stretches, split_fingers
 from ..scene.schema import Scene
 
 #: Rows of a history of which one is taken.
@@ -52,21 +53,25 @@ def find_nominal(
     return np.where(boss > 0.0, boss, crease)
 
 
-def measure_relief(
-    scene: Scene, history: Mapping[str, NDArray[Any]], following: NDArray[Any], pressed: float | None
-) -> ReliefError:
-    """Return how far the final heights are from the nominal ones."""
+def measure_relief(scene: Scene, history: Mapping[str, NDArray[Any]], pressed: float | None) -> ReliefError:
+    """Return how far the final heights are from the nominal ones, of all fingers together."""
     if scene.blister is None or pressed is None:
         return ReliefError(None, None)
-    touching = find_contact_rows(history["total_force"]) & (following > 0)
-    rows = np.flatnonzero(touching)[::THINNED]
-    path = {"fingertip": history["fingertip"][rows], "position": history["position"]}
-    nominal = find_nominal(scene, path, following[rows], pressed)
-    covered = nominal != 0.0
-    for stretch in find_stretches(touching):
-        for row in (stretch.start, stretch.stop - 1):
-            center = history["fingertip"][row, :2]
-            covered &= np.hypot(*(history["position"] - center).T) > scene.blister.radius
+    nominal = np.zeros(scene.cells)
+    clear = np.ones(scene.cells, dtype=bool)
+    for own in split_fingers(history):
+        following = np.count_nonzero(own["mode"] == Mode.FORCE_FOLLOW, axis=1)
+        touching = find_contact_rows(own["total_force"]) & (following > 0)
+        rows = np.flatnonzero(touching)[::THINNED]
+        path = {"fingertip": own["fingertip"][rows], "position": own["position"]}
+        found = find_nominal(scene, path, following[rows], pressed)
+        boss = np.maximum(nominal, found)
+        nominal = np.where(boss > 0.0, boss, np.minimum(nominal, found))
+        for stretch in find_stretches(touching):
+            for row in (stretch.start, stretch.stop - 1):
+                away = own["position"] - own["fingertip"][row, :2]
+                clear &= np.hypot(*away.T) > scene.blister.radius
+    covered = (nominal != 0.0) & clear
     if not np.any(covered):
         return ReliefError(None, None)
     off = (history["height"][-1] - scene.actuator.rest_height - nominal)[covered]

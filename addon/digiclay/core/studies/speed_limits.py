@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..metrics.summary import compute_rfd, find_contact_ends, measure_lag, sum_cells
+from ..metrics.summary import compute_rfd, find_contact_ends, measure_lag, split_fingers, sum_cells
 from ..model.control_interface import find_set_point
 from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
@@ -120,7 +120,7 @@ def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result
 
 
 def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, float, float]:
-    """Return a scene with a drag or a lift as its trajectory, and start and end of the judged phase, s.
+    """Return a scene whose first fingertip alone drags or lifts, and start and end of the judged phase, s.
 
     Refuses a bed that the fingertip would leave.
     """
@@ -130,7 +130,8 @@ def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, floa
         raise ParameterError("layout", "columns", rule, f"{wide:g} m")
     path, start, end = way.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)
-    return scene.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()), start, end
+    alone = replace(scene, fingers=scene.fingers[:1])
+    return alone.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()), start, end
 
 
 def judge(done: Result, start: float, end: float, speed: float) -> Follows:
@@ -185,8 +186,11 @@ def find_free_speed(scene: Scene) -> float:
 
 
 def find_unintended_losses(done: Result) -> list[float]:
-    """Return when contact ended, s, though the fingertip rose no faster than a pin can just then."""
+    """Return when contact of a fingertip ended, s, though it rose no faster than a pin can just then."""
     limit, moments = find_free_speed(done.scene), done.history["time"]
-    rise = np.gradient(done.history["fingertip"][:, 2], moments)
-    lost = find_contact_ends(moments, done.history["total_force"])
-    return [float(t) for t in lost if rise[(moments > t - 0.2) & (moments <= t + 0.1)].max() <= limit]
+    losses: list[float] = []
+    for own in split_fingers(done.history):
+        rise = np.gradient(own["fingertip"][:, 2], moments)
+        lost = find_contact_ends(moments, own["total_force"]).tolist()
+        losses += [t for t in lost if rise[(moments > t - 0.2) & (moments <= t + 0.1)].max() <= limit]
+    return losses
