@@ -10,9 +10,11 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
+from digiclay.core.scene.scene_source import load
 from digiclay.device.palettes import FINGERS as COLORS
+from digiclay.recorded import takes
 from digiclay.roles import BALL, PALM, ROLE, ellipsoid, fingertips_of, is_linked
-from digiclay.settings import properties
+from digiclay.settings import own_presets, properties
 
 from tests.blender.at_hand import added, beds, done, looked, redone, select, undone
 
@@ -278,6 +280,47 @@ def test_a_copy_of_a_fingertip_that_a_loaded_file_has_stays_one_to_look_at(tmp_p
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bed.blend"))
     done("Open")
     assert tuple(fingertips_of(beds()[0])) == (1,)
+
+
+TWO = """\
+layout = {rows = 13, columns = 13}
+[[finger]]
+fingertip.width = 6e-3
+trajectory = {waypoints = [
+  {time = 0.0, position = [-8e-3, 0.0, 45e-3]}, {time = 0.2, position = [-8e-3, 0.0, 38e-3]},
+]}
+[[finger]]
+contact.stiffness = 300.0
+trajectory = {waypoints = [
+  {time = 0.0, position = [8e-3, 2e-3, 47e-3]}, {time = 0.2, position = [8e-3, 2e-3, 38e-3]},
+]}
+"""
+
+
+def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_first_one(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "two.toml"
+    path.write_text(TWO, encoding="utf-8")
+    assert bpy.ops.digiclay.open_scene(filepath=str(path)) == {"FINISHED"}
+    done("Open")
+    (bed,) = beds()
+    assert sound(bed, 1, 2)
+    scene, made = load(path), properties.read_scene(bed)
+    parts = [[(one.fingertip, one.contact, one.relaxation) for one in each.fingers] for each in (scene, made)]
+    assert parts[0] == parts[1]
+    # 32 bits of a few tenths of a Blender unit.
+    start = [[-8e-3, 0.0, 45e-3], [8e-3, 2e-3, 47e-3]]
+    np.testing.assert_allclose(bridge.poses(bed)[:, :3], start, rtol=0, atol=1e-7)
+    assert [bridge.finger_of(tip) for tip in fingertips_of(bed).values()] == [one for one, *_ in parts[0]]
+    assert takes.read(bed).poses.shape[1:] == (2, 7)
+    bpy.ops.digiclay.preset_save(name="two")
+    try:
+        assert load(own_presets.path("two")).fingers[0].fingertip == parts[0][0][0]
+        assert bpy.ops.mesh.digital_clay_add(preset="two", rows=5, columns=5) == {"FINISHED"}
+        assert tuple(fingertips_of(bpy.context.object)) == (1,)
+    finally:
+        own_presets.remove("two")
 
 
 def read_linear(color: tuple[float, ...]) -> np.ndarray:

@@ -59,7 +59,9 @@ class SavePreset(Action, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         bed = bed_of(context)
-        file = own_presets.save(self.name, replace(properties.read_scene(bed), name=self.name.strip()))
+        scene = properties.read_scene(bed)
+        alone = replace(scene, name=self.name.strip(), fingers=scene.fingers[:1])
+        file = own_presets.save(self.name, alone)
         bed.digiclay.own_preset = file.stem
         self.report({"INFO"}, localize("Saved as {}", file))
 

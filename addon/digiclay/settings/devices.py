@@ -95,12 +95,12 @@ def change_layout(scene: Scene, layout: Layout) -> Scene:
 
 
 def change_finger(scene: Scene, before: Fingertip, finger: Fingertip) -> Scene:
-    """Return a scene with another fingertip, and with a blister in proportion to its width."""
+    """Return a scene with another first fingertip, and with a blister in proportion to its width."""
     blister = scene.blister
     if blister is not None:
         blister = fit_blister(scale_blister(blister, finger.width / before.width), scene.layout)
-    fingers = tuple(replace(one, fingertip=finger) for one in scene.fingers)
-    return replace(scene, fingers=fingers, blister=blister)
+    first, *others = scene.fingers
+    return replace(scene, fingers=(replace(first, fingertip=finger), *others), blister=blister)
 
 
 def _scale_finger(scene: Scene, share: float) -> Scene:
