@@ -10,7 +10,10 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
+from digiclay.cli import main
 from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.finished_run import read_run
 from digiclay.device.palettes import FINGERS as COLORS
 from digiclay.recorded import takes
 from digiclay.roles import BALL, PALM, ROLE, ellipsoid, fingertips_of, is_linked
@@ -217,7 +220,7 @@ def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by
     np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)  # Blender's 32 bits
     np.testing.assert_allclose([tuple(tip.location) for tip in palm.children], own, rtol=0, atol=1e-5)
     stood = tuple(palm.location)
-    wanted[3, 2] += 0.002
+    wanted[1, 2] += 0.002
     bridge.move_fingertips(bed, wanted, fingers)
     looked()
     np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)
@@ -279,6 +282,8 @@ def test_a_copy_of_a_fingertip_that_a_loaded_file_has_stays_one_to_look_at(tmp_p
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bed.blend"))
     done("Open")
+    bpy.ops.object.empty_add()
+    done("Add")
     assert tuple(fingertips_of(beds()[0])) == (1,)
 
 
@@ -314,6 +319,10 @@ def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_f
     np.testing.assert_allclose(bridge.poses(bed)[:, :3], start, rtol=0, atol=1e-7)
     assert [bridge.finger_of(tip) for tip in fingertips_of(bed).values()] == [one for one, *_ in parts[0]]
     assert takes.read(bed).poses.shape[1:] == (2, 7)
+    bed.digiclay.layout.arrangement = "hexagonal"  # each finger's law has the share that goes with it
+    shares = [one.contact.share for one in properties.read_scene(bed).fingers]
+    assert shares == [resolve({"layout": {"arrangement": "hexagonal"}}).fingers[0].contact.share] * 2
+    assert shares[0] != scene.fingers[0].contact.share
     bpy.ops.digiclay.preset_save(name="two")
     try:
         assert load(own_presets.path("two")).fingers[0].fingertip == parts[0][0][0]
@@ -321,6 +330,18 @@ def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_f
         assert tuple(fingertips_of(bpy.context.object)) == (1,)
     finally:
         own_presets.remove("two")
+
+
+def test_a_run_of_several_fingers_is_imported_with_them(tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(TWO, encoding="utf-8")
+    assert main(["run", str(tmp_path / "two.toml"), "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    run = read_run(tmp_path / "run", "fingertip")
+    path = str(tmp_path / "run" / "history.npz")
+    assert bpy.ops.import_scene.digital_clay_run(filepath=path, row=-1) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    bed = bpy.context.object
+    np.testing.assert_allclose(bridge.poses(bed), run.history["fingertip"][-1], rtol=0, atol=1e-6)
+    assert len(properties.read_scene(bed).fingers) == 2
 
 
 def read_linear(color: tuple[float, ...]) -> np.ndarray:

@@ -226,3 +226,9 @@ def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is
         session = sculpting.rewind(session)
     assert session.state.period > 0
     assert session.recording is None
+
+
+def test_fingertips_keep_their_poses_by_number_and_new_ones_have_others() -> None:
+    had, others = np.arange(14.0).reshape(2, 7), -np.ones((3, 7))
+    matched = sculpting.match_poses(had, (2, 5), others, (1, 5, 2))
+    np.testing.assert_array_equal(matched, [others[0], had[1], had[0]])

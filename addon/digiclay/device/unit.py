@@ -172,14 +172,9 @@ def _lacking(owner: Any, known: frozenset[int], mended: frozenset[int]) -> Itera
     if not own and owner.get(ROLE) == BED and _lacks_part(owner, FINGER, known, mended):
         yield FINGER
     for number, name in enumerate(FINGERS, 1):
-        if number not in own and _is_copied(owner, name) and _lacks_part(owner, name, known, mended):
+        part = owner.get(name) if number not in own else None
+        if part is not None and is_linked(part) and _lacks_part(owner, name, known, mended):
             yield name
-
-
-def _is_copied(owner: Any, name: str) -> bool:
-    """Return whether an object holds a part that stands, or one of its own that stands nowhere."""
-    part = owner.get(name)
-    return part is not None and (is_linked(part) or _holder(part, owner) == owner)
 
 
 def _holder(part: Any, owner: Any) -> Any | None:
