@@ -5,7 +5,6 @@ What the commands need is imported in `main`, where Ctrl-C is looked after alrea
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -80,5 +79,4 @@ def run_as_program(command: Callable[[], int]) -> NoReturn:
     except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
-    gc.freeze()  # the process ends: to look for cycles among what is left would take 10 ms
     sys.exit(code)
