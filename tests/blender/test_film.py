@@ -59,9 +59,11 @@ def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:
 
 def render(shown: Any, out: Path, looks: Any, set_point: float | None = None, **known: Any) -> Path | None:
     """Draw a film of a history, or a turntable of an instant."""
-    sizes = {"set_point": set_point} if isinstance(looks, Film) else {}
-    stage = film.stage_film if isinstance(looks, Film) else film.stage_turntable
-    return film.render_film(stage(shown, looks, **sizes), out, looks, **known)
+    if isinstance(looks, Film):
+        stage = film.stage_film(shown, looks, ("total force", shown["total_force"]), set_point=set_point)
+    else:
+        stage = film.stage_turntable(shown, looks)
+    return film.render_film(stage, out, looks, **known)
 
 
 def filmed(shown: Any, path: Path, looks: Any) -> list[np.ndarray]:
