@@ -127,9 +127,9 @@ def feel(session: Session) -> Felt:
     x, y = system.grid.positions.T
     near = (x - poses[:, :1]) ** 2 + (y - poses[:, 1:2]) ** 2 < AROUND**2
     force, law = state.finger_forces(), session.scene.fingers[0].contact or Contact()
-    # What grows is the tension: the force and what has relaxed of it meanwhile.
+    # What grows is the tension: the force and what has relaxed of it meanwhile. Twice that never swings.
     tension = force + session.relaxed @ _read_pulp(session.scene)[0]
-    stiffness = law.exponent * tension + law.stiffness * law.share * (near & pressed).sum(1)
+    stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * (near & pressed).sum(1))
     top = np.where(near, heights, 0.0).max(1)
     return Felt(poses, force, tension, stiffness, top, 1.0 / law.exponent, float(heights.max()))
 
