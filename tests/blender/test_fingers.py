@@ -77,6 +77,35 @@ def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself() -> None
     assert last.blister != after.blister
 
 
+def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_turned_and_scaled() -> None:
+    hands = {}
+    for side in ("RIGHT", "LEFT"):
+        bed = with_hand(side)
+        poses = bridge.poses(bed)[1:]
+        headings = 2.0 * np.arctan2(poses[:, 6], poses[:, 3])
+        middle = np.array(palms()[-1].location)[:2] / bridge.SCALE
+        hands[side] = np.column_stack([poses[:, :2] - middle, np.cos(headings), np.sin(headings)])
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+        done("Empty")
+    # 32 bits of a few tenths of a Blender unit.
+    np.testing.assert_allclose(hands["LEFT"], hands["RIGHT"] * [-1.0, 1.0, -1.0, 1.0], rtol=0, atol=1e-6)
+    assert (hands["RIGHT"][:, 3] > 0.0).all()  # all of them point away from the wrist
+    bed = added()
+    bed.location, bed.rotation_euler, bed.scale = (3.0, -2.0, 1.0), (0.2, -0.4, 0.9), (2.5, 2.5, 2.5)
+    looked()
+    bpy.ops.digiclay.add_hand()
+    done("Add Hand")
+    poses, palm = bridge.poses(bed)[1:], palms()[0]
+    np.testing.assert_allclose(
+        poses[:, :2] - np.array(palm.location)[:2] / bridge.SCALE, hands["RIGHT"][:, :2], rtol=0, atol=2e-6
+    )
+    wanted = bridge.poses(bed) + np.array([0.01, 0.02, 0.003, 0.0, 0.0, 0.0, 0.0])
+    bridge.move_fingertips(bed, wanted, [bridge.finger_of(tip) for tip in fingertips_of(bed).values()])
+    looked()
+    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=2e-6)
+
+
 def test_a_fingertip_whose_own_size_is_set_stays_where_its_lowest_point_is() -> None:
     bed = with_hand()
     palms()[0].rotation_euler = (0.2, 0.1, 0.7)

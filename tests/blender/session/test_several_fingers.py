@@ -156,6 +156,20 @@ def test_the_session_goes_on_with_the_fingertips_that_are_left(
     assert press(bed, clock, 1, 2) == []
 
 
+def test_the_size_and_the_pulp_of_one_fingertip_change_in_mid_session(pair: Any, clock: Clock) -> None:
+    started(pair)
+    press(pair, clock, 1, 2)
+    formed, own = exact(pair), fingertips_of(pair)[2].digiclay
+    own.fingertip.width = 5.0
+    own.contact.stiffness *= 2.0
+    assert clock.tick() == []
+    one, two = running.find(pair).scene.fingers
+    assert (one.fingertip.width, two.fingertip.width) == (8e-3, 5e-3)
+    assert two.contact.stiffness == pytest.approx(2.0 * one.contact.stiffness)
+    assert bridge.finger_of(fingertips_of(pair)[2]) == two.fingertip
+    assert np.abs(exact(pair) - formed).max() < 1e-5  # what moves still moves on for a tick
+
+
 def test_a_session_waits_without_any_fingertip(pair: Any, clock: Clock) -> None:
     started(pair)
     for tip in fingertips_of(pair).values():
