@@ -24,7 +24,7 @@ from .protocol import VARIABLE, choose_token
 
 EXAMPLES = """\
 examples:
-  digiclay serve --fingers 10 --clutch 10 --filter 1 --coupling 0.1
+  digiclay serve --fingers 10 --clutch 10 --filter 1 --coupling 0.05
   digiclay hands --from hts --to ws://127.0.0.1:8765 --record hands.txt
   digiclay hands --from tuio --to osc://127.0.0.1:8766
   digiclay hands --from hts --play hands.txt

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from digiclay.live import follow
 from digiclay.live.follow import pack_subscription, parse_address, read_pose
-from digiclay.roles import fingertip_of
+from digiclay.roles import fingertip_of, fingertips_of
 from digiclay.sessions import running
 
 from tests.blender.at_hand import select
@@ -112,6 +112,22 @@ def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
         poses = running.find(bed).poses
         for pose, where in zip(poses, places, strict=True):
             assert where is None or pose[[0, 2]] * 1e3 == pytest.approx(where, abs=1e3 * FLOAT32)
+
+
+def test_a_server_of_one_finger_leaves_the_others_to_the_hand(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    select(bed)
+    bpy.ops.digiclay.add_fingertip()
+    select(bed)
+    address = followed(bed, server, clock)
+    second = fingertips_of(bed)[2]
+    second.rotation_mode, second.location.x = "XYZ", 0.1
+    arrived(server, address, state(*PRESS))
+    clock.tick(2)
+    assert pose_of(bed) == list(PRESS)
+    assert running.find(bed).poses[1, 0] == pytest.approx(0.01, abs=FLOAT32)
+    assert second.rotation_mode == "XYZ"  # nothing has moved it
 
 
 def test_garbage_and_poses_that_are_none_do_nothing(bed: Any, clock: Clock, server: socket.socket) -> None:
