@@ -54,7 +54,7 @@ def add(commands: Any) -> None:
         "--port N": (whole_number(1, 65535), "to listen at; default: 9000, of tuio 3333"),
         "--height MM": (millimeters, "height of the clay at rest, mm; default: 40", 40e-3),
         "--size MM": (millimeters, "side of the bed that a touch pad covers, mm; default: 70", 70e-3),
-        "--depth MM": (millimeters, "depth of a finger on a pad at full pressure, mm; default: 10", 10e-3),
+        "--depth MM": (millimeters, "depth of a finger on a pad at full pressure, mm; default: 20", 20e-3),
         "--record FILE": (Path, "write what is received, with its times"),
         "--play FILE": (Path, "take a recording in place of a device"),
     }  # fmt: skip

@@ -14,7 +14,7 @@ from digiclay.core.base.errors import ParameterError
 #: Identity of a hand's thumb; rows of fingertips; numbers of a line: place and x, y, z, w of a turn; joints.
 HANDS, TIPS, LINES = {"left": 0, "right": 5}, [4, 8, 12, 16, 20], {"wrist": 7, "landmarks": 63}
 #: Time after which a hand is gone; after which both are put over the bed anew, s; height there, m.
-GONE, ANEW, OVER = 0.1, 1.0, 20e-3
+GONE, ANEW, OVER = 0.05, 1.0, 20e-3
 
 
 @dataclass(frozen=True)

@@ -313,10 +313,10 @@ def test_the_left_hand_is_the_mirrored_right_one() -> None:
     assert list(Hands(0.04).take(mirrored, 1.0).take(lines(), 1.0).fingers(1.0)) == list(range(10))
 
 
-def test_a_hand_is_gone_after_100_ms_and_after_a_second_begins_over_the_middle_again() -> None:
+def test_a_hand_is_gone_after_50_ms_and_after_a_second_begins_over_the_middle_again() -> None:
     hands = Hands(0.04).take(lines(), 1.0)
-    assert len(hands.fingers(1.09)) == 5
-    assert hands.fingers(1.11) == {}
+    assert len(hands.fingers(1.04)) == 5
+    assert hands.fingers(1.06) == {}
     aside = "0.3502" + WRIST[6:]
     soon, late = (
         hands.take(lines(wrist=aside), 1.9).fingers(1.9),
