@@ -138,6 +138,24 @@ def test_a_copy_of_a_fingertip_is_a_further_one_with_the_size_of_the_one_copied(
     assert sound(beds()[0], *range(1, last + 2))
 
 
+def test_the_size_of_the_press_tool_is_that_of_the_first_fingertip_left_and_the_blister_follows_it() -> None:
+    bpy.ops.mesh.digital_clay_add(rows=21, columns=21)
+    bed = bpy.context.object
+    done("Add")
+    bpy.ops.digiclay.add_fingertip()
+    fingertips_of(bed)[2].digiclay.fingertip.whole_width = 10.0
+    radius = bed.digiclay.blister.radius
+    assert bed.digiclay.size == pytest.approx(16.0)
+    bpy.data.objects.remove(fingertips_of(bed)[1])
+    done("Delete")
+    assert bed.digiclay.size == pytest.approx(10.0)
+    bed.digiclay.size = 12.0
+    (finger,) = properties.read_scene(bed).fingers
+    assert finger.fingertip.width == pytest.approx(6e-3) == bridge.finger_of(fingertips_of(bed)[2]).width
+    assert bed.digiclay.blister.radius == pytest.approx(1.2 * radius)
+    assert bed.digiclay.fingertip.width == pytest.approx(8.0)
+
+
 def test_a_deleted_fingertip_leaves_its_number_to_the_next_one_and_comes_back_with_undo() -> None:
     bed = with_finger()
     bpy.ops.digiclay.add_fingertip()

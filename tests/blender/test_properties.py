@@ -17,9 +17,9 @@ from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.scene.scene_source import find, list_samples, load
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
-from digiclay.device import view
+from digiclay.device import parts, view
 from digiclay.live import beds
-from digiclay.roles import fingertip_of
+from digiclay.roles import BED, fingertip_of
 from digiclay.settings import properties
 from digiclay.settings.declared import read
 from digiclay.settings.shown_units import unit_of
@@ -32,12 +32,15 @@ EVERY = [(section, "virtual_master") for section in SECTIONS if section != "cont
 EVERY += [("control", method) for method in METHODS]
 
 
-def thing(layout: Layout | None = None) -> Any:
-    """Return an object with the pins of a layout, by default the default's."""
+def thing(layout: Layout | None = None, fingers: int = 0) -> Any:
+    """Return a bed with the pins of a layout, by default the default's, and so many fingertips."""
     places = make_grid(layout or Layout())
     mesh = bridge.points("Bed", places.count)
     bridge.write_cells(mesh, places.positions, np.zeros(places.count))
-    return bpy.data.objects.new("Bed", mesh)
+    bed = parts.marked(mesh, "Bed", BED, bpy.context.collection)
+    for number in range(1, fingers + 1):
+        parts.make_fingertip(bpy.context.collection, bed, number)
+    return bed
 
 
 def told(bed: Any, scene: Scene) -> Scene:
@@ -70,7 +73,7 @@ def test_every_parameter_has_a_property_with_its_unit_meaning_and_bounds(section
 @pytest.mark.parametrize("sample", list_samples())
 def test_a_sample_scene_comes_back_bit_for_bit(sample: str) -> None:
     scene = load(find(sample))
-    bed = thing(scene.layout)
+    bed = thing(scene.layout, len(scene.fingers))
     properties.write_scene(bed, scene)
     assert properties.scene_of(bed) == told(bed, scene)
 

@@ -166,10 +166,10 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
     low, high, snap = devices.SMALLEST, devices.LARGEST, 1e-3
 
     def read(self, bed: Any, settings: Any) -> float:
-        return devices.read_size(bed.digiclay)
+        return devices.read_size(devices.find_first(bed))
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        devices.set_size(bed.digiclay, value)
+        devices.set_size(devices.find_first(bed), value)
 
     def rate(self, context: Any, bed: Any) -> float:
         """Return m a pixel at which the outline's side keeps up with the mouse."""
@@ -239,7 +239,7 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
 def scale_size(operator: Any, context: Any) -> None:
     """Scale the fingertip; its blister follows"""
     bed: Any = brush.bed_in_use(context)
-    devices.set_size(bed.digiclay, devices.read_size(bed.digiclay) * operator.scalar)
+    devices.set_size(devices.find_first(bed), devices.read_size(devices.find_first(bed)) * operator.scalar)
 
 
 class TakeFinger(Action, bpy.types.Operator):
@@ -265,7 +265,7 @@ class TakeFinger(Action, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         bed: Any = brush.bed_in_use(context)
-        devices.resize(bed.digiclay, FINGERS[self.kind].finger)
+        devices.resize(devices.find_first(bed), FINGERS[self.kind].finger)
 
 
 @menu("DIGICLAY_MT_fingers", "Finger")

@@ -243,7 +243,7 @@ def unregister() -> None:
 def _read_finger() -> tuple[float, float, float]:
     """Return the fingertip's length, width and height, mm; that of a new bed without one."""
     bed = bed_in_use(bpy.context)
-    finger = Fingertip() if bed is None else devices.read_finger(bed.digiclay)
+    finger = Fingertip() if bed is None else devices.read_finger(devices.find_first(bed))
     return 2e3 * finger.length, 2e3 * finger.width, 2e3 * finger.height
 
 
@@ -252,4 +252,4 @@ def _take_finger(axes: Any) -> None:
     bed = bed_in_use(bpy.context)
     if bed is not None and bed.library is None:
         length, width, height = (round(5e-4 * float(axis), 9) for axis in axes)
-        devices.resize(bed.digiclay, Fingertip(length, width, height))
+        devices.resize(devices.find_first(bed), Fingertip(length, width, height))

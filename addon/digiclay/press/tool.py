@@ -113,7 +113,7 @@ def draw_header(context: Any, layout: Any, settings: Any) -> None:
         if settings.stamp == FILE:
             layout.prop(settings, "stamp_file", text="")
     if bed is not None:
-        kind = find_kind(devices.read_finger(bed.digiclay))
+        kind = find_kind(devices.read_finger(devices.find_first(bed)))
         words = (kind.label if kind else "Finger") if wide else ""
         layout.menu("DIGICLAY_MT_fingers", text=words, icon="NONE" if wide else "VIEW_PAN")
     layout.popover("DIGICLAY_PT_press_stroke", text="Stroke" if wide else "", icon="CURVE_BEZCURVE")

@@ -179,6 +179,11 @@ def set_size(settings: Any, size: float) -> None:
     resize(settings, Fingertip(finger.length * share, finger.width * share, finger.height * share))
 
 
+def find_first(owner: Any) -> Any:
+    """Return the settings of the fingertip that press strokes move: the first one left of a bed."""
+    return owner.digiclay if owner.get(ROLE) == FINGERTIP else list_settings(owner)[0]
+
+
 def list_settings(bed: Any) -> tuple[Any, ...]:
     """Return the settings that hold the parts of each finger: the bed's of the first, the others' own."""
     tips = fingertips_of(bed).items()
@@ -222,8 +227,9 @@ def resize(settings: Any, finger: Fingertip) -> None:
     if tip is not None and lowest is not None:
         bridge.resize_fingertip(tip, read_finger(settings))
         bridge.move_fingertips(bed, lowest, [bridge.finger_of(one) for one in fingertips_of(bed).values()])
-    if settings == bed.digiclay and settings.blister_follows and finger.width != before.width:
-        _scale_blister(settings, before, finger)
+    follows = bed.digiclay.blister_follows and finger.width != before.width
+    if follows and settings == find_first(bed):
+        _scale_blister(bed.digiclay, before, finger)
 
 
 def _poses(bed: Any) -> Any | None:

@@ -184,8 +184,8 @@ SETTINGS = make_group("settings", "Every parameter of a bed's scene.", {
     "own_preset": text("Own Preset", "The custom preset that was applied last", options={"HIDDEN"}),
     "size": number(
         "Size (mm)", "Width of the fingertip, in mm; its length and height change in proportion",
-        get=lambda settings: 1e3 * devices.read_size(settings),
-        set=lambda settings, value: devices.set_size(settings, 1e-3 * value),
+        get=lambda settings: 1e3 * devices.read_size(devices.find_first(settings.id_data)),
+        set=lambda settings, value: devices.set_size(devices.find_first(settings.id_data), 1e-3 * value),
         min=1e3 * devices.SMALLEST, max=1e3 * devices.LARGEST, soft_max=60.0, step=50, precision=1,
     ),
     "blister_follows": flag(
