@@ -103,7 +103,15 @@ def join_touches(touches: Sequence[Touch]) -> HandTouch:
 
 def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
     """Return the paths of f fingertips in each of t periods, of poses (t, p, f, 7)."""
-    paths = tuple(trace_finger(own.fingertip, poses[:, :, i]) for i, own in enumerate(touch.each))
+    count, traced = len(poses), {}
+    tips = [own.fingertip for own in touch.each]
+    for tip in dict.fromkeys(tips):  # those of one shape at once: as periods after each other
+        alike = [i for i, other in enumerate(tips) if other == tip]
+        whole = trace_finger(tip, np.concatenate([poses[:, :, i] for i in alike]))
+        for place, i in enumerate(alike):
+            own = slice(place * count, place * count + count)
+            traced[i] = FingerPath(0, whole.forms[own], whole.join[own], whole.windows[own])
+    paths = tuple(traced[i] for i in range(len(tips)))
     windows = np.stack([np.array(path.windows) for path in paths], axis=-1)
     path = HandPath(paths, windows)
     return [HandPeriod(path, number, window) for number, window in enumerate(windows)]
