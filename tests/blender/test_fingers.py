@@ -106,6 +106,16 @@ def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_
     np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=2e-6)
 
 
+def test_two_hands_have_no_fingertip_between_those_of_the_other_one() -> None:
+    bed = with_hand()
+    select(bed)
+    bpy.ops.digiclay.add_hand(side="LEFT")
+    done("Add Hand")
+    one, two = bridge.poses(bed)[1:6, :2], bridge.poses(bed)[6:, :2]
+    apart = np.maximum(one.min(axis=0) - two.max(axis=0), two.min(axis=0) - one.max(axis=0))
+    assert apart.max() > 18e-3 - 1e-6  # Blender's 32 bits
+
+
 def test_a_fingertip_whose_own_size_is_set_stays_where_its_lowest_point_is() -> None:
     bed = with_hand()
     palms()[0].rotation_euler = (0.2, 0.1, 0.7)
@@ -285,6 +295,9 @@ def test_a_bed_has_at_most_32_fingertips() -> None:
     bpy.ops.digiclay.add_fingertip()
     done("Add")
     assert sound(bed, *range(1, 33))
+    places = bridge.poses(bed)[:, :2]
+    away = np.linalg.norm(places[:, None] - places, axis=-1)[~np.eye(32, dtype=bool)]
+    assert away.min() >= 18e-3 - 1e-6  # Blender's 32 bits
     objects = len(bpy.data.objects)
     for add in (bpy.ops.digiclay.add_fingertip, bpy.ops.digiclay.add_hand):
         with pytest.raises(

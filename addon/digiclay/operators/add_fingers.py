@@ -10,7 +10,7 @@ from ..core.base.errors import DigiclayError
 from ..device import parts, view
 from ..device.instant import CLEARANCE
 from ..device.node_tree import ARROWS
-from ..roles import FINGERS, bed_of, fingertips_of
+from ..roles import FINGERS, PALM, bed_of, fingertips_of, owner_of
 from ..settings import devices
 from ..settings.declared import choice
 from ..ui_text import localize
@@ -24,7 +24,7 @@ APART = 18e-3
 HAND = ((-30e-3, -6e-3), (-18e-3, 18e-3), (0.0, 24e-3), (18e-3, 19e-3), (30e-3, 4e-3))
 WRIST = (2e-3, -70e-3)
 #: How far beside the bed a place is looked for, m, and the steps.
-BESIDE, STEP = 80e-3, 3e-3
+BESIDE, STEP = 200e-3, 3e-3
 
 
 @action("digiclay.add_fingertip", "Add Fingertip", no_bed, linked)
@@ -61,7 +61,10 @@ def add_hand(operator: Any, context: Any) -> None:
 
 def _find_place(bed: Any, places: Floats) -> Floats:
     """Return how far to move places (k, 2), m, to be apart from other fingertips: over the bed, or beside."""
-    taken = bridge.poses(bed)[:, :2] if fingertips_of(bed) else np.empty((0, 2))
+    tips = fingertips_of(bed).values()
+    taken = bridge.poses(bed)[:, :2] if tips else np.empty((0, 2))
+    palms = {palm for tip in tips if (palm := owner_of(tip, PALM)) is not None}
+    middles = np.array([palm.location[:2] for palm in palms]).reshape(-1, 2) / bridge.SCALE
     reach = np.abs(bridge.read_cells(bed.data)["position"]).max(axis=0) + BESIDE
     axes = (np.arange(-int(most / STEP), int(most / STEP) + 1) * STEP for most in reach)
     moves = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
@@ -69,7 +72,10 @@ def _find_place(bed: Any, places: Floats) -> Floats:
     away = np.linalg.norm((moves[:, None] + places)[:, :, None] - taken, axis=-1).min(
         axis=(1, 2), initial=1.0
     )
-    return np.asarray(moves[(away >= APART).argmax()])
+    # A hand has no fingertip between those of another one.
+    size = np.ptp(places, axis=0) + APART
+    beside = (np.abs(moves[:, None] - middles) >= size).any(axis=2).all(axis=1) | (len(places) == 1)
+    return np.asarray(moves[((away >= APART) & beside).argmax()])
 
 
 def _find_top(bed: Any) -> float:
