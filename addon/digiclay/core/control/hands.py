@@ -22,8 +22,8 @@ from .servo import BatchControl
 
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
 CAPTURE = 1.2
-#: How far from a finger pins are under it, as a share of that.
-UNDER = 0.5
+#: Shares of that within which pressed pins begin a new finger, and within which pins are under one.
+NEW, UNDER = 0.875, 0.5
 #: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
 BEYOND = 1e3
 #: No finger.
@@ -154,7 +154,7 @@ class HandControl:
             finger = free.pop(free.index(named) if named in free else 0)
             x, y = basis[1:3, strongest]
             apart = (basis[1] - x) ** 2 + (basis[2] - y) ** 2
-            owner = np.where((owner == NOBODY) & (apart <= self.capture[finger] ** 2), finger, owner)
+            owner = np.where((owner == NOBODY) & (apart <= (NEW * self.capture[finger]) ** 2), finger, owner)
         return owner
 
     def _choose(
