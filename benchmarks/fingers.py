@@ -1,0 +1,196 @@
+"""Benchmark ``fingers``: what several fingertips cost, and how near two of them may come to each other."""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from digiclay.core.base.arrays import Floats
+from digiclay.core.control.blister import Blister
+from digiclay.core.control.methods import find_method
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.system import System
+from digiclay.core.metrics.summary import compute_rfd
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.live_session import simulate_path
+
+from .report import Report, Row, Steps, tabulate
+
+#: Numbers of fingers, and where ten of them press, mm: two hands.
+COUNTS = (1, 2, 5, 10)
+PLACES = [(x, y) for y in (-18.0, 18.0) for x in (0.0, 15.0, -15.0, 30.0, -30.0)]
+METHODS = ("", "virtual_master", "cell_states", "hybrid")
+#: Speed of all drags and rises, mm/s; height of a lifted, a sunk and a pressing fingertip, mm.
+DRAG, RISE, UP, DOWN, PRESSED = 10.0, 6.0, 48.0, 34.0, 38.5
+#: All cases are turned and shifted, rad and m: along the rows of pins symmetry would hide faults.
+TURN, SHIFT = 0.3, (0.7e-3, -0.4e-3)
+#: From when on the force is judged, s: then all fingertips have touched down.
+JUDGED = 1.0
+
+Way = list[tuple[float, float, float, float]]
+
+
+def press_and_drag(
+    x: float, y: float, to_x: float, to_y: float, height: float = UP, wait: float = 0.0
+) -> Way:
+    """Return a way (time, x, y, z), s and mm: press, go to a height, wait, drag."""
+    there = 1.2 + abs(height - PRESSED) / RISE
+    start = max(there, 1.2 + (UP - PRESSED) / RISE) + wait
+    end = start + float(np.hypot(to_x - x, to_y - y)) / DRAG
+    first = [(0.0, x, y, 43.0), (0.5, x, y, PRESSED), (1.2, x, y, PRESSED), (there, x, y, height)]
+    return [*first, (start, x, y, height), (end, to_x, to_y, height)]
+
+
+def meet(apart: float, far: float, lifted: float) -> Iterator[Way]:
+    """Give the ways of two fingertips that come within `apart`, mm, lifted to a height before or after."""
+    for side in (-1.0, 1.0):
+        way = [(0.0, side * far, 0.0, 43.0), (0.5, side * far, 0.0, PRESSED), (1.2, side * far, 0.0, PRESSED)]
+        height = lifted if far > 15.0 else PRESSED
+        gone, near = 1.2 + (height - PRESSED) / RISE, side * apart / 2
+        there = gone + (far - apart / 2) / DRAG
+        way += [(gone, side * far, 0.0, height), (there, near, 0.0, height)]
+        end = (side * far, lifted) if far > 15.0 else (near, lifted)
+        yield [*way, (there + 0.5 + (far if far > 15.0 else 8.0) / DRAG * 1.6, end[0], 0.0, end[1])]
+
+
+#: Two fingertips near each other: their ways by name, with the least distance, mm.
+CASES: dict[str, list[Way]] = {
+    **{
+        f"parallel, {d}": [press_and_drag(-20, -d / 2, 20, -d / 2), press_and_drag(-20, d / 2, 20, d / 2)]
+        for d in (25, 18, 15, 12)
+    },
+    **{
+        f"up beside down, {d}": [
+            press_and_drag(-20, -d / 2, 20, -d / 2), press_and_drag(-20, d / 2, 20, d / 2, DOWN)
+        ]
+        for d in (25, 18, 15, 12)
+    },
+    **{f"approach and part, {d}": list(meet(d, 20.0, 47.0)) for d in (12, 9, 6)},
+    **{f"pinch, pull up, {d}": list(meet(d, 14.0, UP)) for d in (20, 16, 12)},
+    **{
+        f"crossing, {d}": [
+            press_and_drag(-25, 0, 25, 0), press_and_drag(0, -25, 0, 25, wait=2**0.5 * d / DRAG)
+        ]
+        for d in (16, 11)
+    },
+}  # fmt: skip
+
+
+def make_scene(method: str, fingers: int, size: int = 40) -> Scene:
+    """Return the paper's bed, of size x size pins, with a method and so many of its fingertips."""
+    paper = load(find("ridge_mound_valley"))
+    control = find_method(method).import_parameters()() if method else None
+    blister = Blister(**dict(find_method(method).blister or {})) if method else None
+    plan = replace(paper.layout, rows=size, columns=size)
+    bed = replace(paper, layout=plan, control=control, blister=blister, recorder=None)
+    return replace(bed, method=method or paper.method, fingers=paper.fingers * fingers)
+
+
+def trace(ways: list[Way], period: float) -> Floats:
+    """Return the path (t + 1, f, 7) of fingertips that go straight between the points of their ways."""
+    times = np.arange(0.0, max(way[-1][0] for way in ways), period)
+    path = np.zeros((times.size, len(ways), 7))
+    cosine, sine = np.cos(TURN), np.sin(TURN)
+    for finger, way in enumerate(ways):
+        moment, *place = np.array(way, np.float64).T
+        x, y, z = (1e-3 * np.interp(times, moment, along) for along in place)
+        x, y = x + SHIFT[0], y + SHIFT[1]
+        path[:, finger, :3] = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z])
+        path[:, finger, 3], path[:, finger, 6] = np.cos(TURN / 2), np.sin(TURN / 2)
+    return path
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """Forces of fingertips, (t, f), N, and what they are judged by."""
+
+    force: Floats
+    period: float
+    set_point: float = 0.4
+
+    @property
+    def rfd(self) -> list[float]:
+        """RFD of each finger while it touches, N."""
+        judged = self.force[round(JUDGED / self.period) :]
+        times = np.arange(len(judged)) * self.period
+        return [compute_rfd(times, own, self.set_point) or 0.0 for own in judged.T]
+
+    @property
+    def largest(self) -> float:
+        """Largest force of a finger once all have touched down, N."""
+        return float(self.force[round(JUDGED / self.period) :].max())
+
+
+def feel(system: System, path: Floats) -> Felt:
+    """Simulate a path (t + 1, f, 7); return the forces of the fingertips."""
+    states = simulate_path(system, begin(system), path)
+    return Felt(np.array([state.finger_forces() for state in states]), system.period)
+
+
+def measure_near(method: str, name: str) -> tuple[Felt, list[Felt]]:
+    """Return what the two fingertips of a case feel together, and each alone."""
+    one, two = (assemble(make_scene(method, count)) for count in (1, 2))
+    path = trace(CASES[name], two.period)
+    return feel(two, path), [feel(one, path[:, [finger]]) for finger in range(2)]
+
+
+def measure_cost(method: str, periods: int, repeats: int) -> list[float]:
+    """Return processor time a period of `COUNTS` fingers, s: medians of runs in turns."""
+    made = []
+    for count in COUNTS:
+        depth = 39.0 if not method else PRESSED
+        ways = [[(0, x, y, 41.0), (0.3, x, y, depth), (1.0, x, y, depth), (3.0, x + 10, y + 3, depth)]
+                for x, y in PLACES[:count]]  # fmt: skip
+        system = assemble(make_scene(method, count, 25))
+        made.append((system, trace(ways, system.period)[: periods + 1]))
+    times: list[list[float]] = [[] for _ in COUNTS]
+    for _ in range(repeats):
+        for (system, path), spent in zip(made, times, strict=True):
+            started = time.process_time()
+            feel(system, path)
+            spent.append((time.process_time() - started) / periods)
+    return [statistics.median(spent) for spent in times]
+
+
+#: Columns of the tables.
+COST = {
+    "method": "method", "one, µs": "one_s .0f 1e6",
+    **{f"{count} fingers, times": f"times_{count} .1f" for count in COUNTS[1:]},
+}  # fmt: skip
+NEAR = {
+    "two fingertips, mm apart": "case", "method": "method",
+    "RFD alone, mN": "alone_N .0f 1e3", "other": "alone_other_N .0f 1e3",
+    "together, mN": "together_N .0f 1e3", "other's": "together_other_N .0f 1e3",
+    "largest force, N": "force_N .2f",
+}  # fmt: skip
+
+
+def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
+    """Measure what a period costs, and how two fingertips disturb each other."""
+    periods, repeats = (200, 3) if arguments.quick else (400, 7)
+    cases = list(CASES)[:: 4 if arguments.quick else 1]
+    steps.total = len(METHODS) + len(cases)
+    costs: list[Row] = []
+    near: list[Row] = []
+    for method in METHODS:
+        one, *others = measure_cost(method, periods, repeats)
+        ratios = {f"times_{count}": own / one for count, own in zip(COUNTS[1:], others, strict=True)}
+        costs.append({"method": method or "no control", "one_s": one, **ratios})
+        steps(method or "no control")
+    for name in cases:
+        for method in METHODS[1:]:
+            together, alone = measure_near(method, name)
+            (first, second), (own, other) = together.rfd, (one.rfd[0] for one in alone)
+            rfd = {"together_N": first, "together_other_N": second, "alone_N": own, "alone_other_N": other}
+            near.append({"case": name, "method": method, **rfd, "force_N": together.largest})
+        steps(name)
+    return [
+        Report(tabulate(costs, COST), costs, name="fingers_cost"),
+        Report(tabulate(near, NEAR), near, name="fingers"),
+    ]
