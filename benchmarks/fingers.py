@@ -7,6 +7,7 @@ import statistics
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -86,7 +87,8 @@ def make_scene(method: str, fingers: int, size: int = 40) -> Scene:
     """Return the paper's bed, of size x size pins, with a method and so many of its fingertips."""
     paper = load(find("ridge_mound_valley"))
     control = find_method(method).import_parameters()() if method else None
-    blister = Blister(**dict(find_method(method).blister or {})) if method else None
+    other: dict[str, Any] = dict(find_method(method).blister or {}) if method else {}
+    blister = Blister(**other) if method else None
     plan = replace(paper.layout, rows=size, columns=size)
     bed = replace(paper, layout=plan, control=control, blister=blister, recorder=None)
     return replace(bed, method=method or paper.method, fingers=paper.fingers * fingers)

@@ -23,7 +23,7 @@ from .servo import BatchControl
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
 CAPTURE = 1.2
 #: Shares of that within which pressed pins begin a new finger, and within which pins are under one.
-NEW, UNDER = 0.875, 0.5
+NEW, UNDER = 0.65, 0.5
 #: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
 BEYOND = 1e3
 #: No finger.
@@ -145,17 +145,22 @@ class HandControl:
         `who` presses a pin is but the name of the new one, so that figures of finger and controller agree.
         """
         free = [i for i in range(len(self.runs)) if not (owner == i).any()]
-        while free:
-            left = np.where(owner == NOBODY, force, 0.0)
+        left, seeds = np.where(owner == NOBODY, force, 0.0), []
+        while free and left.max() >= self.felt:
             strongest = int(left.argmax())
-            if left[strongest] < self.felt:
-                break
             named = int(who[strongest])
             finger = free.pop(free.index(named) if named in free else 0)
             x, y = basis[1:3, strongest]
-            apart = (basis[1] - x) ** 2 + (basis[2] - y) ** 2
-            owner = np.where((owner == NOBODY) & (apart <= (NEW * self.capture[finger]) ** 2), finger, owner)
-        return owner
+            apart = np.hypot(basis[1] - x, basis[2] - y)
+            apart[apart > NEW * self.capture[finger]] = np.inf
+            np.putmask(left, apart < np.inf, 0.0)
+            seeds.append((finger, apart))
+        if not seeds:
+            return owner
+        # Of those that land in one period each has what is nearest to it.
+        fingers, apart = np.array([finger for finger, _ in seeds]), np.array([apart for _, apart in seeds])
+        taken = (owner == NOBODY) & (apart < np.inf).any(axis=0)
+        return np.where(taken, fingers[apart.argmin(axis=0)], owner)
 
     def _choose(
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
