@@ -127,7 +127,7 @@ BENCHMARKS = {
         "pace.measure", "how fast a fingertip can lead each method, beside what the method states"
     ),
     "fingers": Benchmark(
-        "fingers.measure", "what several fingertips cost, and two near each other feel"
+        "several_fingers.measure", "what several fingertips cost, and two near each other feel"
     ),
     "ablation": Benchmark(
         "method_figures.measure_ablation", "Method III with one part left out at a time",

@@ -24,7 +24,7 @@ from digiclay.core.session.accuracy import Replay
 from digiclay.core.session.run_scene import run
 from scipy.integrate import solve_ivp
 
-from benchmarks.fingers import measure_near
+from benchmarks.several_fingers import measure_near
 
 PAPER = load(find("ridge_mound_valley"))
 (FINGER,) = PAPER.fingers
