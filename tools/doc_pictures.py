@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from math import radians
 from pathlib import Path
 
@@ -32,6 +33,21 @@ scenes = ["ridge_mound_valley"]
 [film]
 """
 FRAME = 300
+#: Scenes of several fingers, and an instant of each at which all of them work, s.
+HANDS = {"two_hands_bowl": 9.0, "pinch_crease": 7.0, "five_fingers_mound": 7.0}
+#: Film of one of them: a series, and how long a frame is shown, ms.
+HAND_FILM, SHOWN_FOR = (
+    """\
+scenes = ["two_hands_bowl"]
+[film]
+width = 640
+height = 400
+rate = 10
+speed = 3.0
+arrows = false
+""",
+    100,
+)
 #: Size of each of the four views, pixels; how much of the world one shows, mm.
 SIZE, SHOWN = (576, 395), 116.0
 #: Colors of solids, bosses and creases: told apart with any color vision.
@@ -90,6 +106,39 @@ def draw_film(folder: Path) -> None:
     carry_out("job", job, "--only", "film", "--frames", f"{FRAME}-{FRAME}")
     (frame,) = (out / "runs" / job.name).rglob(f"*{FRAME}.png")
     save_jpeg(frame, "film.jpg")
+
+
+def draw_hands(folder: Path, name: str) -> None:
+    """Draw an instant of a scene of several fingers."""
+    carry_out("run", name, "--out", folder / "run", "--no-errors", "--quiet")
+    drawn, size = folder / "drawn.png", ("--size", "900x563")
+    carry_out("render", folder / "run", "--time", str(HANDS[name]), *size, "--out", drawn, "--quiet")
+    save_jpeg(drawn, f"{name}.jpg", 85)
+
+
+def draw_hand_film(folder: Path) -> None:
+    """Draw a film of two hands as an animated WebP, which pages show everywhere."""
+    jobs, out = folder / "film.toml", folder / "film"
+    jobs.write_text(HAND_FILM, encoding="utf-8")
+    carry_out("batch", jobs, "--prepare", "--out", out, "--quiet")
+    (job,) = (out / "jobs").iterdir()
+    carry_out("job", job, "--only", "run")
+    carry_out("job", job, "--only", "film", "--frames", "0+53")
+    frames = [Image.open(path).convert("RGB") for path in sorted((out / "runs").rglob("0*.png"))]
+    timing = {"duration": SHOWN_FOR, "loop": 0}
+    frames[0].save(
+        PICTURES / "two_hands.webp", save_all=True, append_images=frames[1:], quality=60, method=6, **timing
+    )
+
+
+def draw_hand_forces(folder: Path) -> None:
+    """Plot heights and force of each finger of a hand."""
+    carry_out("run", "five_fingers_mound", "--out", folder / "run", "--plots", "--no-errors", "--quiet")
+    with Image.open(folder / "run" / "session.png") as opened:
+        size = opened.width // 2, opened.height // 2
+        opened.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(
+            PICTURES / "hand_forces.png", optimize=True
+        )
 
 
 def draw_series(folder: Path) -> None:
@@ -163,6 +212,9 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "film.jpg": draw_film,
     "batch.jpg": draw_series,
     "export.jpg": draw_export,
+    **{f"{name}.jpg": partial(draw_hands, name=name) for name in HANDS},
+    "two_hands.webp": draw_hand_film,
+    "hand_forces.png": draw_hand_forces,
 }
 
 

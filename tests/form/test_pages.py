@@ -48,7 +48,7 @@ USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
 PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
 #: Row of the table of pictures, and a picture that a page shows.
-ROW = re.compile(r"^\| (`[\w.]+\.(?:jpg|png)`.*?) \| (.*) \|$", re.MULTILINE)
+ROW = re.compile(r"^\| (`[\w.]+\.(?:jpg|png|webp)`.*?) \| (.*) \|$", re.MULTILINE)
 SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 #: Pages of the navigation that `tools/site_pages.py` makes at the build.
 MADE = {"benchmarks.md", "changes.md", "contributing.md"}

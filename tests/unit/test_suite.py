@@ -236,3 +236,32 @@ def test_a_relief_that_is_nominal_has_no_error() -> None:
     off = measure_relief(scene, history, 1.0e-3)
     assert off.largest == pytest.approx(0.5e-3)
     assert measure_relief(scene, history, None).rms is None
+
+
+def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_found() -> None:
+    scene = resolve({"layout": {"rows": 25, "columns": 25}, "control": {"method": "virtual_master"}})
+    rest, place = scene.actuator.rest_height, assemble(scene).grid.positions
+    tips = np.zeros((61, 2, 7))
+    tips[:, :, 0] = np.linspace(-30e-3, 30e-3, 61)[:, None]
+    # A ridge, and a valley beside it.
+    tips[:, :, 1], tips[:, :, 2] = (-20e-3, 20e-3), (rest + 8e-3, rest - 8e-3)
+    nominal = sum(
+        find_nominal(scene, {"position": place, "fingertip": own[::4]}, np.full(16, 5), 1e-3)
+        for own in np.moveaxis(tips, 1, 0)
+    )
+    history: dict[str, Any] = {
+        "fingertip": tips, "position": place, "finger_force": np.full((61, 2), 0.4),
+        "force": np.zeros((61, len(place))), "mode": np.full((61, len(place)), Mode.FORCE_FOLLOW),
+    }  # fmt: skip
+    for cell in (6 * 25 + 12, 18 * 25 + 12):
+        off = np.where(np.arange(len(place)) == cell, 1e-3, 0.0)
+        found = measure_relief(scene, {**history, "height": (rest + nominal + off)[None]}, 1e-3)
+        assert found.largest == pytest.approx(1e-3)
+
+
+def test_the_losses_of_two_fingers_are_counted_of_each() -> None:
+    placed, _ = placed_lift("elastic")
+    (finger,) = placed.fingers
+    moved = tuple(replace(one, position=(10e-3, *one.position[1:])) for one in finger.trajectory.waypoints)
+    other = replace(finger, trajectory=replace(finger.trajectory, waypoints=moved))
+    assert measure_trial(replace(placed, fingers=(finger, other)))["figures"]["losses"] == 2.0

@@ -158,6 +158,7 @@ def _rows(system: System) -> Iterator[tuple[str, int]]:
     yield "commands on their way", system.rows.queue
     yield "commanded height", 1
     yield "force", 1
+    yield "forces of the fingers", system.rows.fingers
     yield "the controller's", system.rows.control
     yield "the sensors'", system.rows.sensors
 

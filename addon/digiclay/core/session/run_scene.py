@@ -63,7 +63,13 @@ class Result:
     def summary(self) -> str:
         """Return the session in one line."""
         rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
-        felt = f", RFD {rfd:.2g} N" if rfd is not None else ", no contact" if share == 0.0 else ""
+        felt = (
+            f", RFD {rfd:.2g} N{self._name_worst()}"
+            if rfd is not None
+            else ", no contact"
+            if share == 0.0
+            else ""
+        )
         if self.metrics.get("rfd_jnd_least") is not None:
             felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
         simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
@@ -82,6 +88,11 @@ class Result:
         warning = f"; {beyond}" if beyond else ""
         speed = f"{self.run_time:.2g} s ({factor:.3g} x real time)"
         return f"{simulated:.1f} s simulated in {speed}{felt}{errors}{end}{warning}"
+
+    def _name_worst(self) -> str:
+        """Return which finger has the largest RFD, where there are several."""
+        each = [one["rfd"] or 0.0 for one in self.metrics.get("fingers", ())]
+        return f" at finger {1 + each.index(max(each))} of {len(each)}" if each else ""
 
     def with_errors(self, errors: Errors) -> Result:
         """Return the result with its estimated errors among the metrics."""

@@ -95,6 +95,10 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
         if point.scene is None:
             alone.append(point)
             continue
+        if len(point.scene.fingers) != 1:
+            alone.append(point)
+            why["they do not have a single finger"] += 1
+            continue
         try:
             judge = describe_structure(make_reference(point.scene), findings) if errors else None
         except ParameterError:  # reported when the point runs

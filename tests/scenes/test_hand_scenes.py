@@ -1,0 +1,137 @@
+"""Scenes of several fingers: what the samples form, and every command that takes such a scene or its run."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.core.base.errors import OutputError
+from digiclay.core.scene.recorder import write
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.session.finished_run import HISTORY, read_run
+from digiclay.core.session.run_scene import Result, run, save
+
+from tests.scene_files import folder_with, rows
+
+WAY = """trajectory.waypoints = [
+  {{ time = 0, position = [{0}, 0, 0.041] }}, {{ time = 0.1, position = [{0}, 0, 0.038] }}]
+"""
+TWO = f"""\
+[layout]
+rows = 7
+columns = 11
+[blister]
+radius = 0.005
+edge_radius = 0.008
+flat_radius = 0.002
+[[finger]]
+{WAY.format(-0.009)}
+[[finger]]
+fingertip.length = "11 mm"
+{WAY.format(0.009)}
+"""
+SHAPED = ["form", "dome", "--scene", "my.toml", "--out", "out", "--quiet", "--finger"]
+GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=3,4,5,6", "--metric", "rfd,lag", "--quiet"]
+
+
+@cache
+def sample(name: str) -> Result:
+    """Return the run of a sample scene."""
+    return run(load(find(name)))
+
+
+@pytest.mark.parametrize(
+    ("name", "fingers"), [("two_hands_bowl", 4), ("pinch_crease", 2), ("five_fingers_mound", 5)]
+)
+def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name: str, fingers: int) -> None:
+    done = sample(name)
+    formed = done.history["height"][-1] - done.scene.actuator.rest_height
+    x, y = done.history["position"].T
+    out = np.hypot(x, y)
+    each = done.metrics["fingers"]
+    assert len(each) == fingers
+    # Measured 0.041 to 0.066 N, one of these fingers alone 0.04 to 0.06 N; and 0.49 to 0.72 N.
+    assert all(one["contact_loss_share"] == 0.0 and one["rfd"] < 0.08 for one in each)
+    assert all(one["max_total_force"] < 0.8 for one in each)
+    # Where it is high, and where low.
+    high, low = {
+        "two_hands_bowl": (abs(out - 29e-3) < 2e-3, out < 10e-3),
+        "pinch_crease": ((abs(abs(y) - 7e-3) < 2e-3) & (abs(x) < 15e-3), (abs(y) < 1e-3) & (abs(x) < 15e-3)),
+        "five_fingers_mound": ((out > 6e-3) & (out < 16e-3), out > 34e-3),
+    }[name]
+    assert np.median(formed[high]) > 6e-3
+    assert np.median(formed[low]) < np.median(formed[high]) - (0.5e-3 if name == "pinch_crease" else 8e-3)
+
+
+@pytest.mark.parametrize(
+    ("command", "made"),
+    [
+        (["describe", "my.toml"], ()),
+        (["describe", "my.toml", "--parameters"], ()),
+        (["run", "my.toml", "--plots", "--out", "out", "--quiet"], ("session.png", "history.npz")),
+        (["compare", "my.toml", "--methods", "hybrid,cell_states", "--out", "out"], ("compare.png",)),
+        ([*SHAPED, "scene"], ("history.npz",)),
+        ([*SHAPED, "press"], ("history.npz",)),
+        ([*GAINS, "--out", "out", "--workers", "2"], ("sweep.csv",)),
+    ],
+    ids=lambda part: " ".join(part[:1]),
+)  # fmt: skip
+def test_a_command_takes_a_scene_of_two_fingers(
+    command: list[str], made: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = folder_with(TWO, tmp_path, monkeypatch)
+    assert main(command) == 0
+    assert set(made) <= {path.name for path in (folder / "out").glob("*")}
+
+
+def test_describe_names_the_finger_of_a_part_and_counts_all_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder_with(TWO, tmp_path, monkeypatch)
+    assert main(["describe", "my.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "of 2: length 11 mm" in said
+    assert "  contact     stiffness" in said
+    assert (
+        "14 rows: height, relaxation (6), valve, commands on their way (2), commanded height, force, " in said
+    )
+    assert "forces of the fingers (2); 112 bytes" in said
+    assert main(["describe", "my.toml", "--parameters"]) == 0
+    assert "finger #2.fingertip.length = 0.011 m" in capsys.readouterr().out
+
+
+def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = folder_with(TWO, tmp_path, monkeypatch)
+    for count in "12":
+        assert main([*GAINS[:-1], "--out", count, "--workers", count]) == 0
+    assert "4 points one at a time: they do not have a single finger" in capsys.readouterr().out
+    assert (folder / "1" / "sweep.csv").read_bytes() == (folder / "2" / "sweep.csv").read_bytes()
+    assert main(["run", "my.toml", "--set", "control.force_gain=4", "--out", "run", "--quiet"]) == 0
+    metrics = json.loads((folder / "run" / "metrics.json").read_text(encoding="utf-8"))
+    assert float(rows(folder / "1" / "sweep.csv")[1]["rfd (N)"]) == metrics["rfd"]
+    assert metrics["rfd"] == max(one["rfd"] for one in metrics["fingers"])
+
+
+@pytest.mark.parametrize("broken", ["fingertip", "finger_force"])
+def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(
+    broken: str, tmp_path: Path
+) -> None:
+    scene = tmp_path / "my.toml"
+    scene.write_text(TWO, encoding="utf-8")
+    done = run(load(scene))
+    assert "at finger" in done.summary()
+    save(done, tmp_path)
+    kept: dict[str, Any] = read_run(tmp_path, "fingertip", "finger_force").history
+    np.testing.assert_array_equal(kept["finger_force"], done.history["finger_force"])
+    write({**done.history, broken: done.history[broken][:, :1]}, tmp_path / HISTORY)
+    with pytest.raises(
+        OutputError, match=rf"{broken} must have the shape \(21, 2.*of its scene \(got \(21, 1"
+    ):
+        read_run(tmp_path, "fingertip", "finger_force")
