@@ -35,6 +35,8 @@ Pose = tuple[float, float, float, float, float, float, float]
 
 #: Turn, pitch and roll, rad.
 Turn = tuple[float, float, float]
+#: Press from which on Method II shapes, mm.
+FELT = 4.5
 LEVEL: Turn = (0.0, 0.0, 0.0)
 #: Interpolation, and the poses of each fingertip.
 Drawn = tuple[Any, ...]
@@ -88,18 +90,19 @@ def _turn(turn: float, pitch: float, roll: float) -> tuple[float, float, float, 
     )
 
 
-def _lift(x: float, y: float, height: float, turn: Turn = LEVEL) -> list[Pose]:
-    """Return a press of 3 mm in 0.8 s, then 5 mm/s to a height, mm, and a rest there."""
-    up = 1.1 + max(abs(height + 3.0) / 5.0, 0.3) * 1.2
-    ways = ((0.0, 1.5), (0.8, -3.0), (1.1, -3.0), (up, height), (up + 0.4, height))
+def _lift(x: float, y: float, height: float, turn: Turn = LEVEL, press: float = 3.0) -> list[Pose]:
+    """Return a press in 0.8 s, mm, then 5 mm/s to a height, mm, and a rest there."""
+    up = 1.1 + max(abs(height + press) / 5.0, 0.3) * 1.2
+    ways = ((0.0, 1.5), (0.8, -press), (1.1, -press), (up, height), (up + 0.4, height))
     return [(t, x, y, z, *turn) for t, z in ways]
 
 
 def _drag(
-    x: float, y: float, height: float, speed: float, hold: float = 0.5, turn: Turn = LEVEL
-) -> list[Pose]:
+    x: float, y: float, height: float, speed: float, hold: float = 0.5, turn: Turn = LEVEL,
+    press: float = 3.0,
+) -> list[Pose]:  # fmt: skip
     """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
-    poses = _lift(x, y, height, turn)
+    poses = _lift(x, y, height, turn, press)
     end = poses[-1][0] + abs(2.0 * x) / speed
     return [*poses, *((t, -x, y, height, *turn) for t in (end, end + hold))]
 
@@ -135,18 +138,22 @@ def list_hands() -> dict[str, Drawn]:
     pinch, five = [], []
     for y in (-1.0, 1.0):
         points = ((4.0, -18.0, 6.0 * y), (4.4, -18.0, 6.0 * y), (7.4, 18.0, 6.0 * y), (7.9, 18.0, 6.0 * y))
-        pinch.append([*_lift(-18.0, 10.0 * y, 0.0), *((*at, 7.0, *LEVEL) for at in points)])
+        pinch.append([*_lift(-18.0, 10.0 * y, 0.0, press=FELT), *((*at, 7.0, *LEVEL) for at in points)])
     for start in np.linspace(0.0, 2.0 * math.pi, 6)[:-1].tolist():
         turned = [(0.0, 0.0), (5.5, 0.3), (7.0, 0.0), (8.5, -0.3), (10.0, 0.0)]
         arc = [(t, 16.0 * math.cos(start + angle), 16.0 * math.sin(start + angle)) for t, angle in turned]
-        five.append([*_lift(*arc[0][1:], 7.0), *((*at, 7.0, *LEVEL) for at in arc[1:])])
+        five.append([*_lift(*arc[0][1:], 7.0, press=FELT), *((*at, 7.0, *LEVEL) for at in arc[1:])])
     # The second one starts so much later that it passes 11 mm behind the first.
-    along, later = _drag(-20.0, 0.0, 6.0, 12.0), 11.0 * math.sqrt(2.0) / 12.0
+    along, later = _drag(-20.0, 0.0, 6.0, 12.0, press=FELT), 11.0 * math.sqrt(2.0) / 12.0
     wait = (0.0, *(0.0,) * 4, *(later,) * 3)
     repeated = zip([*along[:5], *along[4:]], wait, strict=True)
     across = [(pose[0] + more, 0.0, pose[1], pose[3], *LEVEL) for pose, more in repeated]
     return {
-        "two-hands": ("smooth", _drag(-20.0, -12.0, 8.0, 12.0), _drag(20.0, 12.0, -8.0, 12.0)),
+        "two-hands": (
+            "smooth",
+            _drag(-20.0, -12.0, 8.0, 12.0, press=FELT),
+            _drag(20.0, 12.0, -8.0, 12.0, press=FELT),
+        ),
         "pinch": ("smooth", *pinch),
         "crossing": ("linear", along, across),
         "five-fingers": ("smooth", *five),
