@@ -10,15 +10,19 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from digiclay.commands.render import stage_moving
 from digiclay.compat import scratch
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.files.formats import is_whole_picture
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.render_settings import Film, Still, Turntable
+from digiclay.core.session.run_scene import run
 from digiclay.device.instant import Instant
 from digiclay.pictures import film, still
+from digiclay.roles import BED, ROLE, fingertips_of
 
 from tests.blender.at_hand import film_strip, inventory, read_picture
 
@@ -188,3 +192,20 @@ def test_on_a_full_disk_nothing_half_written_stays(tmp_path: Path, history: Any)
         assert list(disk.iterdir()) == []
     finally:
         subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_film_of_two_fingers_shows_both_and_plots_the_force_of_the_worst() -> None:
+    def press(x: float, low: float) -> dict[str, Any]:
+        ways = [{"time": t, "position": [x, 0.0, z]} for t, z in ((0.0, 0.041), (0.2, low))]
+        return {"trajectory": {"waypoints": ways}}
+
+    fingers = [press(-0.01, 0.0405), press(0.01, 0.038)]
+    bed = {"layout": {"rows": 7, "columns": 13}, "control": {"method": "elastic"}}
+    scene = resolve({**bed, "finger": fingers})
+    history = run(scene).history
+    with stage_moving(scene, history, Film(**SMALL)) as shots:
+        shots.show(shots.count - 1)
+        (bed,) = (thing for thing in shots.scene.objects if thing.get(ROLE) == BED)
+        assert len(fingertips_of(bed)) == 2
+        words = {thing.data.body for thing in shots.scene.objects if thing.type == "FONT"}
+    assert f"force of finger 2 {history['finger_force'][-1, 1]:.2f} N" in words

@@ -358,9 +358,13 @@ def take_largest(each: Sequence[Mapping[str, float | None]]) -> dict[str, float 
 def find_worst_finger(
     history: Mapping[str, Any], set_point: SetPoint | None
 ) -> tuple[int, Mapping[str, Any]]:
-    """Return the number, from 1 on, and the history of the finger with the largest RFD."""
-    fingers = enumerate(split_fingers(history), 1)
-    return max(fingers, key=lambda one: compute_metrics(one[1], set_point)["rfd"] or 0.0)
+    """Return number, from 1 on, and history of the finger with the largest RFD, or, without any, force."""
+
+    def judge(one: tuple[int, Mapping[str, Any]]) -> tuple[float, float]:
+        found = compute_metrics(one[1], set_point)
+        return found["rfd"] or 0.0, found["max_total_force"] or 0.0
+
+    return max(enumerate(split_fingers(history), 1), key=judge)
 
 
 #: All cells.
