@@ -126,7 +126,7 @@ BENCHMARKS = {
     "pace": Benchmark(
         "pace.measure", "how fast a fingertip can lead each method, beside what the method states"
     ),
-    "fingers": Benchmark(
+    "several_fingers": Benchmark(
         "several_fingers.measure", "what several fingertips cost, and two near each other feel"
     ),
     "ablation": Benchmark(

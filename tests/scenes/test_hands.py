@@ -24,8 +24,6 @@ from digiclay.core.session.accuracy import Replay
 from digiclay.core.session.run_scene import run
 from scipy.integrate import solve_ivp
 
-from benchmarks.several_fingers import measure_near
-
 PAPER = load(find("ridge_mound_valley"))
 (FINGER,) = PAPER.fingers
 PERIOD, REST = 5e-3, 40e-3
@@ -228,23 +226,3 @@ def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors() -> None:
     assert (
         0.0 < estimated.metrics["height_error"] < 30e-6
     )  # what one finger of the paper's session has: 15 µm
-
-
-@pytest.mark.parametrize(
-    ("method", "case", "most"),
-    [
-        # From 15 mm on at most 1.1 of alone, but for a fingertip that sinks beside a hill: 2 mN more.
-        ("virtual_master", "crossing, 11", 1.1),
-        ("virtual_master", "approach and part, 6", 1.1),
-        ("virtual_master", "up beside down, 18", 1.1),
-        ("hybrid", "parallel, 12", 1.5),
-        ("hybrid", "crossing, 11", 1.5),
-        ("hybrid", "up beside down, 18", 1.5),
-        ("cell_states", "parallel, 18", 1.1),
-    ],
-)
-def test_no_finger_is_stolen_by_another_one_that_comes_near(method: str, case: str, most: float) -> None:
-    together, alone = measure_near(method, case)
-    assert together.largest < 2.0  # N: what fingers were measured up to
-    for own, single in zip(together.rfd, alone, strict=True):
-        assert own <= most * single.rfd[0]

@@ -70,8 +70,7 @@ _MEMBERS = {arrow.source: np.isin(np.arange(len(Mode)), arrow.source) for arrow 
 class Patch(NamedTuple):
     """Memory of the controller: centroid of the forces when last felt, m, direction of travel, losses.
 
-    `edge`: height of the surface around the blister, m; `felt`: whether some cell is under the fingertip;
-    `radius`: how far from the centroid cells are pressed, m.
+    `edge`: height of the surface around the blister, m; `felt`: whether some cell is under the fingertip.
     """
 
     x: float = 0.0
@@ -80,7 +79,6 @@ class Patch(NamedTuple):
     edge: float = 0.0
     felt: bool = False
     losses: int = 0
-    radius: float = 0.0
 
     @property
     def place(self) -> tuple[float, float] | None:
@@ -171,7 +169,7 @@ class CellStatesControl:
     def find_blister(self, memory: Patch) -> tuple[float, float, float, float]:
         """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
         x, y = memory.place or (0.0, 0.0)
-        return x, y, memory.radius + self.blister.radius if memory.place else -1.0, memory.edge
+        return x, y, self.parameters.jump + self.blister.radius if memory.place else -1.0, memory.edge
 
     def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, Disc | None]:
         """Find where the fingertip presses, and how far its blister can reach; see `Controller`."""
@@ -190,8 +188,7 @@ class CellStatesControl:
         elif math.hypot(x - memory.x, y - memory.y) > self.parameters.jump:
             memory = memory._replace(heading=Heading(x, y), losses=memory.losses + 1)
         heading = update_heading(memory.heading, x, y, self.parameters.travel)
-        memory = memory._replace(x=x, y=y, heading=heading, radius=radius)
-        return memory, (x, y, radius + self.blister.edge_radius)
+        return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Commands]:
         """Apply the transitions of every cell, then the control of its mode; see `Controller`."""
