@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,10 +29,7 @@ PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, 
 
 @dataclass(frozen=True, eq=False)
 class HandSelection(Selection):
-    """Selection of the active cells of a bed under f fingertips, one disc each."""
-
-    #: Discs are arrays (f,), the highest pin one number.
-    larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
+    """Selection of the active cells of a bed under f fingertips, one disc each: arrays (f,)."""
 
     def update(self, state: State, finger: Any, control: Any) -> State:
         """Return a state whose active cells are all that can change in a period; see `Selection`."""
