@@ -133,9 +133,8 @@ class HandControl:
         rank = apart
         if hasattr(self.runs[0], "predict_under"):
             for finger, (run, own) in enumerate(zip(self.runs, memory.fingers, strict=True)):
-                under = run.predict_under(own, basis)
-                # One that is not predicted has no say where another one is.
-                rank[finger] = apart[finger] + 1.0 if under is None else under
+                if own.place:
+                    rank[finger] = run.predict_under(own, basis)
         np.putmask(rank, far, np.inf)
         return np.where(far.all(axis=0), NOBODY, rank.argmin(axis=0))
 

@@ -271,11 +271,11 @@ class HybridControl:
         error = abs(force - self.parameters.force_setpoint)
         return error <= NEAR * self.parameters.force_setpoint and math.hypot(vx, vy, vz) <= SLOW
 
-    def predict_under(self, memory: Follower, basis: Floats) -> Floats | None:
-        """Return the predicted underside over cells, (m,), m; None: no fingertip is predicted."""
-        if memory.phase is Phase.IDLE or memory.master.phase is not Phase.IDLE:
-            return None
+    def predict_under(self, memory: Follower, basis: Floats) -> Floats:
+        """Return the underside over cells, (m,), m, of a fingertip that is followed."""
         x, y, z, *_ = memory.estimate.mean.tolist()
+        if memory.master.phase is not Phase.IDLE:
+            x, y, z = memory.master.x, memory.master.y, memory.master.height
         return self.finger.find_underside((x, y, z), memory.estimate, basis)
 
     def _has_jumped(self, guess: Estimate, position: Floats) -> bool:
