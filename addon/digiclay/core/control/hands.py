@@ -1,9 +1,9 @@
 """Control of several fingers: a method's controller for each of them, on one bed.
 
 What is measured of a pin is its force, not which finger presses it. So each pressed pin belongs to one of
-the fingers that are followed: the nearest, or the one whose underside is predicted lowest; where none is near
-a new one begins. Each controller sees the pins around its finger, without the forces on those of the others;
-of two that command one pin, the one that moves it farthest off its ground is obeyed.
+the fingers that are followed, the one whose underside is lowest there; where none is near a new one begins.
+Each controller sees the pins around its finger, without the forces on those of the others. Of two that
+command a pin, that of the fingertip above it is obeyed, elsewhere the one that moves it farthest off its ground.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from ..base.arrays import Cells, Floats, find_copies
 from ..model.control_interface import Commands, Controller, Measurement
+from ..model.fingertip import JOIN
 from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .servo import BatchControl
 
@@ -24,6 +25,8 @@ from .servo import BatchControl
 CAPTURE = 1.2
 #: Shares of that within which pressed pins begin a new finger, and within which pins are under one.
 NEW, UNDER = 0.65, 0.5
+#: Slope of an underside beyond the join, see `model.fingertip`.
+STEEP = 0.5 / (1.0 - JOIN) ** 0.5
 #: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
 BEYOND = 1e3
 #: No finger.
@@ -130,13 +133,22 @@ class HandControl:
         with np.errstate(invalid="ignore"):
             apart = (basis[1] - places[:, 0]) ** 2 + (basis[2] - places[:, 1]) ** 2
         far = ~(apart <= self.capture[:, None] ** 2)
-        rank = apart
+        rank = self._estimate_under(memory, apart)
         if hasattr(self.runs[0], "predict_under"):
             for finger, (run, own) in enumerate(zip(self.runs, memory.fingers, strict=True)):
                 if own.place:
                     rank[finger] = run.predict_under(own, basis)
         np.putmask(rank, far, np.inf)
         return np.where(far.all(axis=0), NOBODY, rank.argmin(axis=0))
+
+    def _estimate_under(self, memory: Hands, square: Floats) -> Floats:
+        """Return undersides of fingers at squared distances, (f, q), m², from the tops of blisters, m."""
+        tops = np.nan_to_num([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
+        size = self.capture[:, None] / CAPTURE
+        reduced = square / size**2
+        under = STEEP * np.maximum(reduced - JOIN, 0.0) - np.sqrt(np.maximum(1.0 - reduced, 1.0 - JOIN))
+        heights: Floats = tops + size * under
+        return heights
 
     def _find_new(self, basis: Floats, force: Floats, owner: Cells, who: Cells) -> Cells:
         """Return the owners of pressed pins, those of new fingers among them: about the strongest forces.
