@@ -3,7 +3,8 @@
 What is measured of a pin is its force, not which finger presses it. So each pressed pin belongs to one of
 the fingers that are followed, the one whose underside is lowest there; where none is near a new one begins.
 Each controller sees the pins around its finger, without the forces on those of the others. Of two that
-command a pin, that of the fingertip above it is obeyed, elsewhere the one that moves it farthest off its ground.
+command a pin, that of the fingertip above it is obeyed, elsewhere the one that moves it farthest off its
+ground.
 """
 
 from __future__ import annotations
