@@ -108,7 +108,8 @@ class HandControl:
     def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
         """Let each controller command the pins around its finger; of two for one pin obey one."""
         columns, owner = self.arrange("all", seen), np.full(seen.force.size, NOBODY)
-        (pressed,) = seen.force.nonzero()
+        # What stands in one column alone is no other finger's.
+        pressed = columns.double[seen.force[columns.double] != 0.0]
         if pressed.size:
             owner[pressed] = self._assign(memory, seen.quadratic_basis[:, pressed])
         fingers, given = self.method.command(list(memory.fingers), self, seen, owner, columns)
