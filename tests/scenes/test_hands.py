@@ -165,6 +165,18 @@ def test_a_cell_that_two_fingers_press_moves_by_the_sum_of_their_forces(apart: f
     assert double > 10
 
 
+@pytest.mark.parametrize("method", [None, "virtual_master", "elastic"])
+def test_a_third_finger_that_hovers_over_two_that_meet_changes_nothing(method: str | None) -> None:
+    two, three = (assemble(scene(method, *[FINGER] * count)) for count in (2, 3))
+    poses = press(three, [(-3e-3, 1e-3), (3e-3, -1e-3), (9e-3, 1e-3)], (6e-3, 2e-3), 150)
+    poses[:, :, 2, 2] += 6e-3  # within reach, without a touch
+    (alone, forces), (state, all_forces) = follow(two, poses[:, :, :2]), follow(three, poses)
+    assert not all_forces[:, 2].any()
+    # Rounding alone: sums go over the cells in another order.
+    np.testing.assert_allclose(all_forces[:, :2], forces, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(state.row(0), alone.row(0), rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("method", [None, *METHODS])
 def test_a_session_of_three_fingers_goes_on_from_a_kept_state_to_the_same_bits(method: str | None) -> None:
     system = assemble(scene(method, FINGER, LONG, FINGER))

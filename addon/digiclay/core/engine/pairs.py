@@ -193,6 +193,9 @@ class HandMovement:
         self._groups += [Pairs(system, active, fingers, others[:0]) for fingers in groups[1:]]
         self._fingers = np.concatenate([group.fingers for group in self._groups])
         self._double, self._copies = find_copies(np.concatenate([group.cells for group in self._groups]))
+        # The first pair of a cell also makes up the number of those of others.
+        self._distinct = self._copies != self._copies[0]
+        self._distinct[0] = True
 
     def __call__(self, finger: HandPeriod | None) -> None:
         """Move the cells on by one control period, in place."""
@@ -205,7 +208,7 @@ class HandMovement:
         if self._double.size:
             one = moved[0] if len(moved) == 1 else join_moved(moved)
             block[0, self._double] = np.minimum.reduce(one.height[self._copies])
-            pressed = np.count_nonzero(one.presses[self._copies], axis=0) > 1
+            pressed = np.count_nonzero(one.presses[self._copies] & self._distinct, axis=0) > 1
             if any_true(pressed):
                 self._press_together(one, pressed)
         np.add.reduce(block[rows.pressing, :near], axis=0, out=block[rows.force, :near])

@@ -69,9 +69,9 @@ class TogetherPlan:
         """
         plan, numbers = self.plans[0], self._numbers[:, fingers]
         cell, count = plan.cell, len(plan.segments)
-        # A finger that is named twice presses once.
-        absent = np.zeros(fingers.shape, np.bool_)
-        absent[1:] = (fingers[1:] == fingers[0]) & (len(fingers) > 1)
+        # A finger that is named again, to make up the number, presses once.
+        again = np.zeros(fingers.shape, np.bool_)
+        again[1:] = fingers[1:] == fingers[0]
         openings = plan.response[: len(plan.weights)].dot(valves)
         pressure = cell.supply.pressure(openings)
         size = cell.flow.conductance(openings, pressure)
@@ -86,10 +86,10 @@ class TogetherPlan:
             first = _tension(level[0])
             work[-3] = first
             lost = np.einsum("cgj,jcg->cg", loss[:, :, 0], work[:-2])
-            pushes = (first > lost) & ~absent
+            pushes = (first > lost) & ~again
             idle = ~pushes.any(axis=0)
             # Where none pushes yet, it is the one nearest to it.
-            nearest = np.where(absent, NONE, level[0] - np.log1p(lost)).argmax(axis=0)
+            nearest = np.where(again, NONE, level[0] - np.log1p(lost)).argmax(axis=0)
             pushes |= idle & (np.arange(len(fingers))[:, None] == nearest)
             size_of = np.where(pushes, level + np.log(unit * exponent), NONE)
             strongest = size_of[0].argmax(axis=0)[None]
@@ -132,8 +132,8 @@ class TogetherPlan:
             work[-1] = last
             work[:-4] = np.maximum(np.einsum("cgij,jcg->icg", propagator, work), 0.0)
             height = after
-        force = np.where(absent, 0.0, work[-5])
-        return height, work[:-5], force
+        work = np.where(again, work[:, :1], work)
+        return height, work[:-5], work[-5]
 
 
 def _tension(exponent: Floats) -> Floats:
