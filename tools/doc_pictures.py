@@ -96,15 +96,20 @@ def draw_session(folder: Path) -> None:
     shutil.copyfile(folder / "run" / "session.png", PICTURES / "session.png")
 
 
-def draw_film(folder: Path) -> None:
-    """Draw a frame of a film of the paper's session."""
+def make_film(folder: Path, series: str, frames: str) -> Path:
+    """Draw some frames of the film of the only job of a series; return the folder of its runs."""
     jobs, out = folder / "film.toml", folder / "film"
-    jobs.write_text(FILMED, encoding="utf-8")
+    jobs.write_text(series, encoding="utf-8")
     carry_out("batch", jobs, "--prepare", "--out", out, "--quiet")
     (job,) = (out / "jobs").iterdir()
     carry_out("job", job, "--only", "run")
-    carry_out("job", job, "--only", "film", "--frames", f"{FRAME}-{FRAME}")
-    (frame,) = (out / "runs" / job.name).rglob(f"*{FRAME}.png")
+    carry_out("job", job, "--only", "film", "--frames", frames)
+    return out / "runs"
+
+
+def draw_film(folder: Path) -> None:
+    """Draw a frame of a film of the paper's session."""
+    (frame,) = make_film(folder, FILMED, f"{FRAME}-{FRAME}").rglob(f"*{FRAME}.png")
     save_jpeg(frame, "film.jpg")
 
 
@@ -118,13 +123,8 @@ def draw_hands(folder: Path, name: str) -> None:
 
 def draw_hand_film(folder: Path) -> None:
     """Draw a film of two hands as an animated WebP, which pages show everywhere."""
-    jobs, out = folder / "film.toml", folder / "film"
-    jobs.write_text(HAND_FILM, encoding="utf-8")
-    carry_out("batch", jobs, "--prepare", "--out", out, "--quiet")
-    (job,) = (out / "jobs").iterdir()
-    carry_out("job", job, "--only", "run")
-    carry_out("job", job, "--only", "film", "--frames", "0+53")
-    frames = [Image.open(path).convert("RGB") for path in sorted((out / "runs").rglob("0*.png"))]
+    runs = make_film(folder, HAND_FILM, "0+53")
+    frames = [Image.open(path).convert("RGB") for path in sorted(runs.rglob("0*.png"))]
     timing = {"duration": SHOWN_FOR, "loop": 0}
     frames[0].save(
         PICTURES / "two_hands.webp", save_all=True, append_images=frames[1:], quality=60, method=6, **timing

@@ -89,13 +89,18 @@ def named(*fingers: tuple[int, float]) -> list[bytes]:
     ]
 
 
-def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
-    bed: Any, clock: Clock, server: socket.socket
-) -> None:
+def followed_by_two(bed: Any, server: socket.socket, clock: Clock) -> Any:
+    """Return the address of a bed with two fingertips that follows a server."""
     select(bed)
     bpy.ops.digiclay.add_fingertip()
     select(bed)
-    address = followed(bed, server, clock)
+    return followed(bed, server, clock)
+
+
+def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    address = followed_by_two(bed, server, clock)
     frames = [
         (named((2, 0.045)), [(20.0, 45.0), None]),
         (named((2, 0.044), (1, 0.05)), [(20.0, 44.0), (10.0, 50.0)]),
@@ -117,10 +122,7 @@ def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
 def test_a_server_of_one_finger_leaves_the_others_to_the_hand(
     bed: Any, clock: Clock, server: socket.socket
 ) -> None:
-    select(bed)
-    bpy.ops.digiclay.add_fingertip()
-    select(bed)
-    address = followed(bed, server, clock)
+    address = followed_by_two(bed, server, clock)
     second = fingertips_of(bed)[2]
     second.rotation_mode, second.location.x = "XYZ", 0.1
     arrived(server, address, state(*PRESS))

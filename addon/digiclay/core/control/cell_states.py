@@ -166,11 +166,6 @@ class CellStatesControl:
         """Return the memory before a session."""
         return Patch()
 
-    def find_blister(self, memory: Patch) -> tuple[float, float, float, float]:
-        """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
-        x, y = memory.place or (0.0, 0.0)
-        return x, y, self.parameters.jump + self.blister.radius if memory.place else -1.0, memory.edge
-
     def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, Disc | None]:
         """Find where the fingertip presses, and how far its blister can reach; see `Controller`."""
         # A cell that follows counts with what it reads: of a fingertip that rises the few readings above the

@@ -9,18 +9,16 @@ ground.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Cells, Floats, find_copies
+from ..base.arrays import Cells, Flags, Floats, find_copies
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.fingertip import JOIN
 from ..model.layout import RELATIVE_TOLERANCE, Disc
-from .servo import BatchControl
 
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
 CAPTURE = 1.2
@@ -59,16 +57,21 @@ class Columns:
         self.cells = [
             np.concatenate([own.nonzero()[0], more]) for own, more in zip(inside, left, strict=True)
         ]
-        count, width = len(self.cells), max(own.size for own in self.cells)
         self.flat = np.concatenate(self.cells)
-        self.finger = np.repeat(np.arange(count), [own.size for own in self.cells])
+        self.finger = np.repeat(np.arange(len(self.cells)), [own.size for own in self.cells])
         self.double, self.copies = find_copies(self.flat)
-        # Padded, for methods whose formulas hold for all fingers at once.
-        self.present = np.arange(width)[:, None] < [own.size for own in self.cells]
-        self.padded = np.zeros((width, count), np.intp)
-        self.padded.T[self.present.T] = self.flat
-        self.basis = np.where(self.present, basis[:, self.padded], 0.0)
-        self.basis[:, ~self.present] = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
+        self._places = basis
+
+    @cached_property
+    def padded(self) -> tuple[Flags, Cells, Floats]:
+        """The columns side by side, (w, f): which entries are cells; the cells; their basis, (6, w, f)."""
+        sizes = [own.size for own in self.cells]
+        present = np.arange(max(sizes))[:, None] < sizes
+        cells = np.zeros(present.shape, np.intp)
+        cells.T[present.T] = self.flat
+        basis = self._places[:, cells]
+        basis[:, ~present] = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
+        return present, cells, basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +80,15 @@ class HandControl:
 
     runs: tuple[Any, ...]
     """The method's, one a finger."""
-    together: Any
-    """One for all at once, where the formulas of the method hold for many."""
-    capture: Floats
-    """(f,): How far from each finger a pressed pin may be its own, m."""
+    sizes: tuple[float, ...]
+    """Largest semi-axis of each fingertip, m."""
     felt: float
     """Force from which on a pin tells of a new finger, N."""
+
+    @cached_property
+    def capture(self) -> Floats:
+        """How far from each finger a pressed pin may be its own, (f,), m."""
+        return CAPTURE * np.array(self.sizes)
 
     @property
     def rows(self) -> int:
@@ -101,7 +107,7 @@ class HandControl:
             basis, force = touched.quadratic_basis[:, pressed], touched.force[pressed]
             who = touched.pressing[:, pressed].argmax(axis=0)
             owner[pressed] = self._find_new(basis, force, self._assign(memory, basis), who)
-        located = self.method.locate(list(memory.fingers), self, touched, owner, pressed)
+        located = self.locate_each(memory.fingers, touched, owner, pressed)
         discs = [disc for _, disc in located]
         return Hands(tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs)), discs
 
@@ -112,7 +118,7 @@ class HandControl:
         pressed = columns.double[seen.force[columns.double] != 0.0]
         if pressed.size:
             owner[pressed] = self._assign(memory, seen.quadratic_basis[:, pressed])
-        fingers, given = self.method.command(list(memory.fingers), self, seen, owner, columns)
+        fingers, given = self.command_each(memory.fingers, seen, owner, columns)
         memory = memory._replace(fingers=tuple(fingers))
         chosen = np.empty(seen.target.size, np.intp)
         chosen[columns.flat] = np.arange(columns.flat.size)
@@ -124,10 +130,17 @@ class HandControl:
             seen.own[row::count] = seen.own[columns.finger[chosen] * count + row, np.arange(chosen.size)]
         return memory, Commands(given.target[chosen], given.mode[chosen], given.command[chosen])
 
-    @cached_property
-    def method(self) -> Together | OneByOne:
-        """How the controllers are called."""
-        return Together() if isinstance(self.together, BatchControl) else OneByOne()
+    def locate_each(
+        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells
+    ) -> list[tuple[Any, Disc | None]]:
+        """Return memory and disc of each finger; `owner` (m,) of the cells, which are `pressed`, (q,)."""
+        raise NotImplementedError
+
+    def command_each(
+        self, memory: tuple[Any, ...], seen: Measurement, owner: Cells, columns: Columns
+    ) -> tuple[list[Any], Commands]:
+        """Return the memories, and commands for the cells of all columns, one after the other."""
+        raise NotImplementedError
 
     def _assign(self, memory: Hands, basis: Floats) -> Cells:
         """Return the finger that each pressed pin belongs to, (q,); `NOBODY`: none is near."""
@@ -146,7 +159,7 @@ class HandControl:
     def _estimate_under(self, memory: Hands, square: Floats) -> Floats:
         """Return undersides of fingers at squared distances, (f, q), m², from the tops of blisters, m."""
         tops = np.nan_to_num([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
-        size = self.capture[:, None] / CAPTURE
+        size = np.array(self.sizes)[:, None]
         reduced = square / size**2
         under = STEEP * np.maximum(reduced - JOIN, 0.0) - np.sqrt(np.maximum(1.0 - reduced, 1.0 - JOIN))
         heights: Floats = tops + size * under
@@ -181,9 +194,8 @@ class HandControl:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
         copies = columns.copies
         fingers, (x, y) = columns.finger[copies], seen.quadratic_basis[1:3, columns.double]
-        blisters = np.array(
-            [run.find_blister(own) for run, own in zip(self.runs, memory.fingers, strict=True)]
-        )
+        followed = zip(self.runs, memory.fingers, strict=True)
+        blisters = np.array([find_blister(run, own) for run, own in followed])
         at_x, at_y, radius, ground = blisters[fingers].transpose(2, 0, 1)
         apart = np.hypot(x - at_x, y - at_y)
         inside = apart <= radius
@@ -217,36 +229,38 @@ class HandControl:
         return slice(finger * count, (finger + 1) * count)
 
 
-class Together:
-    """Calls of one controller of all fingers, in columns (w, f)."""
+@dataclass(frozen=True, eq=False)
+class HandTogether(HandControl):
+    """Controller of several fingers, for a method whose formulas hold for many at once."""
 
-    def locate(
-        self, memory: list[Any], hand: HandControl, touched: Measurement, owner: Cells, pressed: Cells
+    together: Any
+    """The method's of all of them."""
+
+    def locate_each(
+        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells
     ) -> list[tuple[Any, Disc | None]]:
-        """Return memory and disc of each finger."""
-        fingers, shape = np.arange(len(hand.runs)), (pressed.size, len(hand.runs))
-        own = owner[pressed, None] == fingers
-        wide = [np.broadcast_to(row[pressed, None], shape) for row in (touched.height, touched.force)]
-        basis = touched.quadratic_basis[:, pressed]
+        """Let each see the pressed cells, without the forces on those of the others."""
+        count = len(self.runs)
+        own = owner[pressed, None] == np.arange(count)
+        basis, height = touched.quadratic_basis[:, pressed], touched.height[pressed, None]
         columns = touched._replace(
-            quadratic_basis=np.broadcast_to(basis[..., None], (6, *shape)),
-            height=wide[0],
-            force=np.where(own, wide[1], 0.0),
+            quadratic_basis=np.broadcast_to(basis[..., None], (6, pressed.size, count)),
+            height=np.broadcast_to(height, own.shape),
+            force=np.where(own, touched.force[pressed, None], 0.0),
         )
-        return list(zip(*hand.together.locate(memory, columns), strict=True))
+        return list(zip(*self.together.locate(list(memory), columns), strict=True))
 
-    def command(
-        self, memory: list[Any], hand: HandControl, seen: Measurement, owner: Cells, columns: Columns
+    def command_each(
+        self, memory: tuple[Any, ...], seen: Measurement, owner: Cells, columns: Columns
     ) -> tuple[list[Any], Commands]:
-        """Return the memories, and commands for the cells of all columns, one after the other."""
-        at, present = columns.padded, columns.present
-        others = owner[at]
-        theirs = (others != NOBODY) & (others != np.arange(len(hand.runs)))
-        count = int(hand.runs[0].rows)
-        rows = np.arange(count)[:, None, None] + count * np.arange(len(hand.runs))
+        """Let each command its column, without the forces on cells of the others."""
+        (present, at, basis), count = columns.padded, int(self.runs[0].rows)
+        others, fingers = owner[at], np.arange(len(self.runs))
+        theirs = (others != NOBODY) & (others != fingers)
+        rows = np.arange(count)[:, None, None] + count * fingers
         own = seen.own[rows, at]
         shown = Measurement(
-            columns.basis,
+            basis,
             seen.height[at],
             np.where(theirs | ~present, 0.0, seen.force[at]),
             seen.target[at],
@@ -254,47 +268,56 @@ class Together:
             own,
             seen.cells[at],
         )
-        memory, orders = hand.together.command(memory, shown)
+        after, orders = self.together.command(list(memory), shown)
         if count:
             finger, place = present.T.nonzero()
             for row in range(count):
                 seen.own[row + count * finger, columns.flat] = own[row, place, finger]
-        return memory, Commands(*(np.ascontiguousarray(one.T)[present.T] for one in orders))
+        return after, Commands(*(np.ascontiguousarray(one.T)[present.T] for one in orders))
 
 
-class OneByOne:
-    """Calls of the controller of each finger, which sees no pin that belongs to another one."""
+@dataclass(frozen=True, eq=False)
+class HandOneByOne(HandControl):
+    """Controller of several fingers, for any other method."""
 
-    def locate(
-        self, memory: list[Any], hand: HandControl, touched: Measurement, owner: Cells, pressed: Cells
+    def locate_each(
+        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells
     ) -> list[tuple[Any, Disc | None]]:
-        """Return memory and disc of each finger."""
-        columns, located = hand.arrange("touched", touched) if touched.discs is not None else None, []
-        for finger, (run, own) in enumerate(zip(hand.runs, memory, strict=True)):
-            ours = columns.cells[finger] if columns and own.place else pressed[owner[pressed] == finger]
-            shown = owner[ours]
-            ours = ours[(shown == finger) | (shown == NOBODY)]
-            if own.place and pressed.size:
-                ours = np.union1d(ours, pressed[owner[pressed] == finger])
-            part = take_part(touched, ours, hand.own_rows(finger))
+        """Let each see its column without the cells of the others, and what it presses elsewhere."""
+        columns, located = self.arrange("touched", touched) if touched.discs is not None else None, []
+        for finger, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
+            cells = pressed[owner[pressed] == finger]
+            if columns and own.place:
+                around = columns.cells[finger]
+                around = around[(owner[around] == finger) | (owner[around] == NOBODY)]
+                cells = np.union1d(around, cells) if pressed.size else around
+            part = take_part(touched, cells, self.own_rows(finger))
             located.append(run.locate(own, part))
-            touched.own[hand.own_rows(finger), ours] = part.own
+            touched.own[self.own_rows(finger), cells] = part.own
         return located
 
-    def command(
-        self, memory: list[Any], hand: HandControl, seen: Measurement, owner: Cells, columns: Columns
+    def command_each(
+        self, memory: tuple[Any, ...], seen: Measurement, owner: Cells, columns: Columns
     ) -> tuple[list[Any], Commands]:
-        """Return the memories, and commands for the cells of all columns, one after the other."""
+        """Let each command its column, without the forces on cells of the others."""
         given, fingers = [], []
-        for finger, (run, own, cells) in enumerate(zip(hand.runs, memory, columns.cells, strict=True)):
-            part = take_part(seen, cells, hand.own_rows(finger))
+        for finger, (run, own, cells) in enumerate(zip(self.runs, memory, columns.cells, strict=True)):
+            part = take_part(seen, cells, self.own_rows(finger))
             theirs = (owner[cells] != finger) & (owner[cells] != NOBODY)
             part = part._replace(force=np.where(theirs, 0.0, part.force))
             after, orders = run.command(own, part)
-            seen.own[hand.own_rows(finger), cells] = part.own
+            seen.own[self.own_rows(finger), cells] = part.own
             fingers.append(after)
             given.append(orders)
         return fingers, Commands(*map(np.concatenate, zip(*given, strict=True)))
+
+
+def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float]:
+    """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
+    x, y = memory.place or (0.0, 0.0)
+    # That of a method without a master reaches from the pressed cells on.
+    radius = run.blister.radius + getattr(run.parameters, "jump", 0.0)
+    return x, y, radius if memory.place else -1.0, memory.edge
 
 
 def take_part(seen: Measurement, cells: Cells, own: slice) -> Measurement:
@@ -308,13 +331,6 @@ def take_part(seen: Measurement, cells: Cells, own: slice) -> Measurement:
         seen.own[own][:, cells],
         seen.cells[cells],
     )
-
-
-def join_fingers(
-    controllers: Sequence[Controller], together: Any, sizes: Sequence[float], felt: float
-) -> HandControl:
-    """Return the controller of several fingers, of largest semi-axes, m; see `HandControl`."""
-    return HandControl(tuple(controllers), together, CAPTURE * np.array(sizes), felt)
 
 
 def follows_finger(controller: Controller) -> bool:

@@ -212,11 +212,6 @@ class HybridControl:
         """Return the memory before a session."""
         return Follower(due=self._unknown)
 
-    def find_blister(self, memory: Follower) -> tuple[float, float, float, float]:
-        """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
-        x, y = memory.place or (0.0, 0.0)
-        return x, y, self.blister.radius if memory.place else -1.0, memory.edge
-
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the fingertip; see `Controller`."""
         if memory.master.phase is not Phase.IDLE:

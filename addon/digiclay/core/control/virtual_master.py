@@ -334,11 +334,6 @@ class VirtualMasterControl(BatchControl):
 
     # Sums over cells, and their commands: of one run, or of a batch.
 
-    def find_blister(self, memory: Master) -> tuple[float, float, float, float]:
-        """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
-        x, y = memory.place or (0.0, 0.0)
-        return x, y, self.blister.radius if memory.place else -1.0, memory.edge
-
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Locate the fingertip and move the master; see `Controller`."""
         basis, force = touched.quadratic_basis, touched.force

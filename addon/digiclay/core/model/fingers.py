@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Floats
-from .fingertip import Window, compute_underside
+from .fingertip import Window
 from .interfaces import Pulp
-from .touch import AHEAD, FingerPath, Touch, trace_finger
+from .touch import Ahead, FingerPath, Touch, trace_finger
 
 #: Fingers, and for each the basis of places, (6, k), see `FingerPath.under`.
 Places = list[tuple[int, Floats]]
@@ -62,22 +62,17 @@ class HandPath:
     """(t, 6, f)."""
 
     def __post_init__(self) -> None:
-        # The undersides computed last: over which places, from which period on.
-        self._last: tuple[Any, int, Floats] = (None, 0, np.empty((0, 0, 0)))
+        self._ahead = Ahead()
 
     def under(self, number: int, bases: Places) -> Floats:
         """Return the undersides in a period over each finger's places, one after the other, (p, k), m."""
-        known, first, unders = self._last
-        if known is not bases or not first <= number < first + len(unders):
-            several = slice(number, number + AHEAD)
-            parts = [(self.paths[finger], basis) for finger, basis in bases]
-            made = [
-                compute_underside(path.forms[several], path.join[several], basis) for path, basis in parts
-            ]
-            first, unders = number, np.concatenate(made, axis=2)
-            self._last = (bases, first, unders)
-        under: Floats = unders[number - first]
-        return under
+        cells = sum(basis.shape[1] for _, basis in bases)
+        return self._ahead.find(number, bases, self.paths[0].join.shape[2] * cells, self._compute)
+
+    def _compute(self, several: slice, bases: Places) -> Floats:
+        """Return the undersides in several periods, (t, p, k), m."""
+        parts = [self.paths[finger].compute(several, basis) for finger, basis in bases]
+        return np.concatenate(parts, axis=2)
 
 
 class HandPeriod(NamedTuple):

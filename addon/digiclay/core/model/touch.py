@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -39,6 +39,23 @@ class Touch:
         return Constants((0.0, self.contact.share))
 
 
+class Ahead:
+    """Undersides in coming periods, over the places asked for last: mostly those of the period before."""
+
+    def __init__(self) -> None:
+        self._places: Any = None
+        self._first, self._unders = 0, np.empty((0, 0, 0))
+
+    def find(self, index: int, places: Any, numbers: int, compute: Callable[[slice, Any], Floats]) -> Floats:
+        """Return those of a period, (p, k), m, of so many `numbers`; several are computed at a time."""
+        if places is not self._places or not self._first <= index < self._first + len(self._unders):
+            count = max(1, min(AHEAD, MOST // max(1, numbers)))
+            self._unders = compute(slice(index, index + count), places)
+            self._places, self._first = places, index
+        under: Floats = self._unders[index - self._first]
+        return under
+
+
 @dataclass(eq=False)
 class FingerPath:
     """Fingertip path over t control periods, at p instants of each, of a run or of b runs."""
@@ -54,8 +71,7 @@ class FingerPath:
     """(t, 6, b): One a period."""
 
     def __post_init__(self) -> None:
-        # The undersides computed last: over which places, from which period on.
-        self._last: tuple[Floats | None, int, Floats] = (None, 0, np.empty((0, 0, 0)))
+        self._ahead = Ahead()
 
     def at(self, period: int) -> FingerPeriod:
         """Return the path in one of the periods."""
@@ -67,15 +83,11 @@ class FingerPath:
             forms, (least, root) = self.forms[index], self.join[index]
             rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, basis)
             return join_surfaces(rows[: len(least)], rows[len(least) :], least, root)
-        places, first, unders = self._last
-        if places is not basis or not first <= index < first + len(unders):
-            # Mostly the places of the period before: several periods at a time, as many as fit in memory.
-            count = max(1, min(AHEAD, MOST // max(1, self.join.shape[2] * basis.shape[1])))
-            several = slice(index, index + count)
-            first, unders = index, compute_underside(self.forms[several], self.join[several], basis)
-            self._last = (basis, first, unders)
-        under: Floats = unders[index - first]
-        return under
+        return self._ahead.find(index, basis, self.join.shape[2] * basis.shape[1], self.compute)
+
+    def compute(self, several: slice, basis: Floats) -> Floats:
+        """Return the undersides in several periods over places (6, k), shape (t, p, k), m."""
+        return compute_underside(self.forms[several], self.join[several], basis)
 
 
 class FingerPeriod(NamedTuple):

@@ -131,8 +131,7 @@ def _assemble_hands(scene: Scene) -> System:
     rows = Rows(cell.rows, first.line.length, controller.rows, system.sensors.rows, len(cells))
     common = {field.name: getattr(system, field.name) for field in fields(system)}
     selection = HandSelection(system.grid, rows, cell, system.period, system.fastest)
-    by_set = system.by_set or bool(scene.control and find_method(scene.method).by_set)
-    own = {"cell": cell, "controller": controller, "selection": selection, "rows": rows, "by_set": by_set}
+    own = {"cell": cell, "controller": controller, "selection": selection, "rows": rows}
     together = import_part(*TOGETHER)(cells, first.line, first.steps) if kept else None
     plans = tuple(motion.plan for motion in motions)
     return HandSystem(**common | own, cells=cells, plans=plans, press_together=together)
@@ -230,11 +229,15 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     touches = [device.cell.touch for device in devices]
     if len(controllers) == 1 or not all(touches):
         return controllers[0]
-    from ..control.hands import follows_finger, join_fingers
+    from ..control.hands import HandOneByOne, HandTogether, follows_finger
+    from ..control.servo import BatchControl
     from .columns import join_controllers
 
     if not follows_finger(controllers[0]):
         return controllers[0]
     sizes = [max(touch.fingertip.length, touch.fingertip.width) for touch in touches if touch]
     felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
-    return join_fingers(controllers, join_controllers(controllers), sizes, felt)
+    common = tuple(controllers), tuple(sizes), felt
+    if isinstance(controllers[0], BatchControl):
+        return HandTogether(*common, join_controllers(controllers))
+    return HandOneByOne(*common)

@@ -1,4 +1,4 @@
-"""Systems side by side, each a column of one set of arrays: the runs of a batch, the fingers of a bed.
+"""Systems side by side, each a column of one set of arrays: the runs of a batch.
 
 Parts are merged, so that a number that differs is an array with an entry a column; a control period takes as
 many numpy calls as that of one system.
