@@ -14,11 +14,13 @@ from digiclay.core.control.methods import find_method
 from digiclay.core.engine.simulation import advance, begin, trace_fingers
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
+from digiclay.core.files.tables import parse_tables
 from digiclay.core.model.fingertip import compute_forms, compute_underside
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.schema import Finger, Scene
+from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.accuracy import Replay
 from digiclay.core.session.run_scene import run
@@ -203,6 +205,32 @@ def test_fingers_that_come_and_go_leave_the_others_what_they_have(method: str) -
     more = snapshot.change_fingers(one, three, after, [None, 0, None])
     _, again = follow(three, np.repeat(still, 3, axis=0), more)
     assert np.isfinite(again).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("first", [replace(FINGER, relaxation=None), LONG], ids=["elastic", "two filters"])
+def test_a_finger_with_more_filters_than_the_others_comes_and_goes(first: Finger, method: str) -> None:
+    one, two = assemble(scene(method, first)), assemble(scene(method, first, FINGER))
+    poses = press(two, [(-20e-3, 1e-3), (20e-3, 0.0)], (6e-3, 0.0), 120)
+    state, alone = follow(one, poses[:, :, :1])
+    state, both = follow(two, poses[-5:], snapshot.change_fingers(one, two, state, [0, None]))
+    assert (alone[-1] > 0.0).all()
+    assert (both[-1] > 0.0).all()
+    _, left = follow(one, poses[-5:, :, :1], snapshot.change_fingers(two, one, state, [0]))
+    assert (left[-1] > 0.0).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_finger_comes_and_goes_on_a_bed_that_displays_a_shape(method: str) -> None:
+    shown = resolve(parse_tables(f"[shape]\nfile = 'face'\n[control]\nmethod = '{method}'\n"))
+    one, two = (assemble(replace(shown, fingers=(FINGER,) * count)) for count in (1, 2))
+    poses = press(two, [(-20e-3, 1e-3), (20e-3, 0.0)], (0.0, 0.0), 40)
+    poses[..., 2] += 20e-3
+    state, _ = follow(one, poses[:30, :, :1])
+    state, _ = follow(two, poses[30:], snapshot.change_fingers(one, two, state, [0, None]))
+    kept = snapshot.change_fingers(two, one, state.copy(), [0])
+    assert np.array_equal(kept.row(0), state.row(0))
+    assert np.isfinite(follow(one, poses[-5:, :, :1], kept)[0].row(0)).all()
 
 
 @pytest.mark.parametrize("method", [None, "virtual_master", "hybrid"])

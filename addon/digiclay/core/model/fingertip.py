@@ -44,11 +44,6 @@ def require_one(fingers: Sequence[Item]) -> Item:
     return only
 
 
-def wrap_one(poses: Floats) -> Floats:
-    """Return the poses of the only finger, (t, 7), as those of all fingers, (t, 1, 7)."""
-    return poses[:, None]
-
-
 @dataclass(frozen=True)
 class Fingertip(Parameters):
     """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""

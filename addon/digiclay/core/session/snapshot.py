@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import StateError
 from ..base.modes import Mode
 from ..control.hands import Hands
@@ -288,29 +289,33 @@ def change_fingers(former: System, system: System, state: State, kept: Sequence[
     pressing = state.rows[old.pressing] if old.fingers else state.rows[old.force][None]
     rows[new.force] = sum(pressing[was] for was in kept if was is not None)
     rows[new.sensed] = state.rows[old.sensed]
-    memories = list(state.memory.fingers) if isinstance(state.memory, Hands) else [state.memory]
-    followed = isinstance(fresh.memory, Hands) or isinstance(state.memory, Hands)
-    parts = [((system.cell.pulp_rows, system.fingers), (former.cell.pulp_rows, former.fingers))]
-    if followed:
-        parts.append(((new.controlled, system.fingers), (old.controlled, former.fingers)))
+    _take_fingers(rows[system.cell.pulp_rows], state.rows[former.cell.pulp_rows], former.fingers, kept)
+    # Behind the display of a shape stands the memory of the method.
+    after, before = (getattr(memory, "method", memory) for memory in (fresh.memory, state.memory))
+    if isinstance(after, Hands) or isinstance(before, Hands):
+        begun, had = (list(own.fingers) if isinstance(own, Hands) else [own] for own in (after, before))
+        # A controller that remembers other rows of a cell begins anew.
+        if new.control * former.fingers == old.control * system.fingers:
+            _take_fingers(rows[new.controlled], state.rows[old.controlled], former.fingers, kept)
+            begun = [one if was is None else had[was] for one, was in zip(begun, kept, strict=True)]
+        before = after._replace(fingers=tuple(begun)) if isinstance(after, Hands) else begun[0]
     else:
         rows[new.controlled] = state.rows[old.controlled]
-    for (to, count), (source, before) in parts:
-        width = (to.stop - to.start) // count
-        into = rows[to].reshape(count, width, system.grid.count)
-        of = state.rows[source].reshape(before, width, system.grid.count)
-        for finger, was in enumerate(kept):
-            if was is not None:
-                into[finger] = of[was]
-    memory = memories[0]
-    if followed:
-        begun = fresh.memory.fingers if isinstance(fresh.memory, Hands) else (fresh.memory,)
-        own = tuple(one if was is None else memories[was] for one, was in zip(begun, kept, strict=True))
-        memory = fresh.memory._replace(fingers=own) if isinstance(fresh.memory, Hands) else own[0]
+    shown = hasattr(state.memory, "method")
+    memory = state.memory._replace(method=before) if shown else before
     # What is pressed and what still moves goes on.
     chosen = replace(fresh.active, cells=state.active.cells, near=state.active.near)
     bed = State(state.period, rows, state.modes, state.aged, float(rows[0].max()), chosen, memory)
     return bed._replace(active=system.selection.take(bed, chosen))
+
+
+def _take_fingers(into: Floats, of: Floats, former: int, kept: Sequence[int | None]) -> None:
+    """Put rows (r, n) of former fingers into those of fingers, in place; some may come or go at the end."""
+    parts, own = np.split(into, len(kept)), np.split(of, former)
+    for part, was in zip(parts, kept, strict=True):
+        if was is not None:
+            least = min(len(part), len(own[was]))
+            part[:least] = own[was][:least]
 
 
 def _read_disc(values: Any) -> Disc | None:
