@@ -1,7 +1,5 @@
 """Command ``python -m benchmarks``."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 

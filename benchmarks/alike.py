@@ -1,7 +1,5 @@
 """Even and equal strokes: one path turned, crossing itself, mirrored, drawn at other rates, and to depths."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

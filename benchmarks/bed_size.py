@@ -1,7 +1,5 @@
 """Benchmarks ``scale`` and ``export``: a control period and mesh files, from 625 pins to a million."""
 
-from __future__ import annotations
-
 import argparse
 import statistics
 import tempfile

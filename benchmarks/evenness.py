@@ -1,7 +1,5 @@
 """Measures of a relief along the strokes that formed it: how even it is, and its spikes; no Blender."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

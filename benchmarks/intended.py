@@ -4,8 +4,6 @@ Lines, arcs and areas have the section that a designer expects of a brush: even 
 blister, then straight down to the ground.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The benchmarks in one table, their parser, and what runs them."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import sys

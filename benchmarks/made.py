@@ -1,7 +1,5 @@
 """Benchmark ``made``: things formed by recorded strokes, beside what was intended."""
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """Benchmarks ``methods`` and ``ablation``: Method III on fast drags, on other devices, and without parts."""
 
-from __future__ import annotations
-
 import argparse
 import copy
 from collections.abc import Callable, Mapping, Sequence

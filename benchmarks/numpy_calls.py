@@ -1,7 +1,5 @@
 """Counter of numpy calls, the cost of a control period that is the same on every machine."""
 
-from __future__ import annotations
-
 import dataclasses
 import statistics
 import sys

@@ -1,7 +1,5 @@
 """Benchmarks ``commits``, ``cluster`` and ``serve``: work of other processes than this one."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import json

@@ -1,7 +1,5 @@
 """Runs of a scene, with its controller or under recorded commands, without a recording."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Common parts of the benchmarks: progress, report with files, tables, style of the plots."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

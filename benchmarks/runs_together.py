@@ -1,7 +1,5 @@
 """Benchmark ``stack``: sessions a second, alone and in a batch."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from dataclasses import replace

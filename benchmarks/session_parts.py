@@ -1,7 +1,5 @@
 """Benchmarks ``session`` and ``terms``: time of a session by part, and without parts of the model."""
 
-from __future__ import annotations
-
 import argparse
 import cProfile
 import statistics

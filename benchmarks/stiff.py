@@ -1,7 +1,5 @@
 """Benchmark ``stiff``: case x stepper x step -> error, or the reason it stopped."""
 
-from __future__ import annotations
-
 import argparse
 import copy
 import statistics

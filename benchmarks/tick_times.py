@@ -1,7 +1,5 @@
 """Benchmarks ``ticks`` and ``viewport``: a live session's tick in Blender, part by part, and its skin."""
 
-from __future__ import annotations
-
 import argparse
 import gc
 import os

@@ -1,7 +1,5 @@
 """Claims of the paper beside measurements, with numbers from the results alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Measurements for the claims of the paper, with numbers from the results alone."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Session of the paper: heights and force (Fig. 8), a detail (Fig. 9), the final surfaces (Fig. 10)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Folder of `digiclay paper`: figures with data, the page, and measured numbers."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping

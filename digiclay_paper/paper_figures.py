@@ -1,7 +1,5 @@
 """Figures of blisters, limits and variants; lettered panels, and curves as a table."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable, Iterator, Mapping

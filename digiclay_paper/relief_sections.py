@@ -3,8 +3,6 @@
 `core/studies/nominal_relief.py` states what is asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """``digiclay paper``: counterparts of the paper's figures, and its claims beside measurements."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

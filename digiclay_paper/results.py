@@ -1,7 +1,5 @@
 """Measurements of `digiclay paper` as one value, for figures and claims."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Short sessions of the paper's results."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """All simulations of `digiclay paper`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Sobol samples and indices by SALib: shares of an output's variance by parameter, with intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

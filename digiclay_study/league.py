@@ -4,8 +4,6 @@ An interval is Student's t for the mean over the seeds, of which each has the sa
 what other noise would do, and nothing about other trajectories.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from statistics import fmean, median, stdev

@@ -1,7 +1,5 @@
 """Trials of control methods: trajectories by name, each run with sensor noise, and what is measured of it."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence

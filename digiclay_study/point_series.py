@@ -1,7 +1,5 @@
 """Series of points over ranges of a scene: options, ranges, folder, and the table of all points."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """``digiclay study``: Sobol indices of a scene's metrics over ranges of its parameters, and their page."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence

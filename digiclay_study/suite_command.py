@@ -1,7 +1,5 @@
 """``digiclay compare --suite``: control methods over many trajectories with noise, and their league."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime

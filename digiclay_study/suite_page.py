@@ -1,7 +1,5 @@
 """Page and tables of a benchmark of methods, with all that a citation needs."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import os
 import platform

@@ -1,7 +1,5 @@
 """``digiclay tune``: Pareto front of two metrics over ranges of parameters, searched by optuna's NSGA-II."""
 
-from __future__ import annotations
-
 import argparse
 import warnings
 from collections.abc import Generator, Mapping, Sequence

@@ -6,8 +6,6 @@ tests in a folder.
 CONTRIBUTING.md has the command of every picture.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -8,8 +8,6 @@ in the copy's manifest. The zip stands in the folder only when it is valid. Its 
 alone, and on the time in SOURCE_DATE_EPOCH or else of the last commit.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import os

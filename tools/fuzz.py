@@ -6,8 +6,6 @@ Case number n of a seed is always the same one, whatever the count. What was nei
 listed with its number, and makes the exit code 1.
 """
 
-from __future__ import annotations
-
 import argparse
 import collections
 import copy

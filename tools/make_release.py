@@ -6,8 +6,6 @@ Leaves dist/digiclay-VERSION with the extension's zip, the wheel, the source arc
 release-notes.md, and the tag vVERSION of the current commit. A failure at any point leaves neither.
 """
 
-from __future__ import annotations
-
 import argparse
 import gzip
 import hashlib

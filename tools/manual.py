@@ -4,8 +4,6 @@ The page is one file without scripts and without pictures. Links to other pages 
 not shipped.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from string import Template

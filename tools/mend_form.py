@@ -3,8 +3,6 @@
 usage: python tools/mend_form.py [--check]     --check: what had to be mended is a failure.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

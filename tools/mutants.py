@@ -9,8 +9,6 @@ Without modules named, a sample is taken: the mutants whose text has the smalles
 every run, and an edit changes only what it touches.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import functools

@@ -1,7 +1,5 @@
 """Mutants of a module of the core: one change each, by cosmic-ray's operators."""
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import re

@@ -3,8 +3,6 @@
 Each function returns what stands in the way, one line each, and changes nothing.
 """
 
-from __future__ import annotations
-
 import datetime
 import re
 import subprocess

@@ -5,8 +5,6 @@ collected, everything skipped, a crash or a hang after the summary are all failu
 summary line goes to the report file, which the caller prints with the verdicts.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os

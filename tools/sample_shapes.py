@@ -4,8 +4,6 @@ Each is made from a formula here; no data of others are in them. Maps are formul
 0 to 1, x and y from -1 to 1, y upwards. Solids are closed meshes in mm, z up.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 The pages are the command line, the parameters, Python, and files from elsewhere.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import html

@@ -4,8 +4,6 @@ Blender's tool icons are triangles on a square of 256 x 256: a head of 8 bytes, 
 bytes for each triangle, then a color of four bytes for each corner.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``python -m digiclay``: the command line."""
 
-from __future__ import annotations
-
 from .cli import console
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """Conversion between numpy and Blender: arrays, lengths, attributes and poses."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any

@@ -3,8 +3,6 @@
 What the commands need is imported in `main`, where Ctrl-C is looked after already.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Sequence

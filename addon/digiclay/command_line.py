@@ -1,7 +1,5 @@
 """Command line in Blender: ``blender --command digiclay`` with the installed extension."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from .compat import bpy

@@ -1,7 +1,5 @@
 """Differences between Blender 4.2 to 5.2."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping

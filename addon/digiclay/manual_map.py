@@ -1,7 +1,5 @@
 """Manual map: sections of the shipped guide that *Online Manual* and F1 open, by operator and property."""
 
-from __future__ import annotations
-
 from pathlib import Path, PurePath
 
 from .compat import bpy

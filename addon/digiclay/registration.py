@@ -1,7 +1,5 @@
 """Registration of the extension in Blender, in order, and its reverse."""
 
-from __future__ import annotations
-
 import sys
 from types import ModuleType
 

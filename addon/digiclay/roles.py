@@ -1,7 +1,5 @@
 """Roles of Blender's objects: which is a bed, a fingertip of it, the ellipsoid in that, or another part."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from .core.model.fingers import MOST_FINGERS

@@ -1,7 +1,5 @@
 """Texts of the user interface with values in them, in the language of Blender. No Blender in here."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 

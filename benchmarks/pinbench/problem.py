@@ -1,7 +1,5 @@
 """A problem of PinBench, read from its JSON file, and its law in numpy for adapters that need one."""
 
-from __future__ import annotations
-
 import json
 import math
 from bisect import bisect_right

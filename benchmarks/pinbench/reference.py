@@ -1,7 +1,5 @@
 """References of PinBench: each judged pin by itself, by DOP853 between located events, at 2.3e-14."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Benchmark ``peers``: engines on the problems of PinBench, by their adapters."""
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import statistics

@@ -7,8 +7,6 @@ little-endian; docs/serve.md has the table. The display acknowledges each frame;
 way, and none is repeated.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

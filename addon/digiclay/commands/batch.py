@@ -3,8 +3,6 @@
 No network is contacted: what --submit prints in the end is how the files are handed to the farm.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess

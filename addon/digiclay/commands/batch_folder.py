@@ -1,7 +1,5 @@
 """Folder of a job series: files of the jobs, finished runs, logs, and the page."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress

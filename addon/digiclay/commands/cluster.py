@@ -3,8 +3,6 @@
 Dask is imported only here and in tasks, and only when a scheduler is named.
 """
 
-from __future__ import annotations
-
 import asyncio
 import importlib
 import logging

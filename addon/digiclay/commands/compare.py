@@ -1,7 +1,5 @@
 """``digiclay compare``: metrics of several control methods on the same input."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

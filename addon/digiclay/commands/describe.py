@@ -1,7 +1,5 @@
 """``digiclay describe``: parts and null parts of a scene, and their cost."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import textwrap

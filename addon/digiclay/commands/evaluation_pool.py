@@ -1,7 +1,5 @@
 """Series of points: options, evaluation in processes or on a Dask cluster, stop, and report."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence

@@ -3,8 +3,6 @@
 Bundles come in by standard input, records go out by standard output, as pickles.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import subprocess

@@ -1,7 +1,5 @@
 """``digiclay export`` and ``features``: the formed surface of a run as mesh files, its bosses and creases."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterable, Mapping, Sequence

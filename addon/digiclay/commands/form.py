@@ -1,7 +1,5 @@
 """``digiclay form``: display of a shape, forming, and export."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import textwrap

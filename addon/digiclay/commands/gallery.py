@@ -1,7 +1,5 @@
 """Index page of a job series, one self-contained HTML file, and its thumbnails."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """``digiclay job`` and ``page``: one job of a series, or a part of it, from its files alone; its page."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import select

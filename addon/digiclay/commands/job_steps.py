@@ -1,7 +1,5 @@
 """Steps of a job: the session, its errors, meshes, pictures and films; its log."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import shutil

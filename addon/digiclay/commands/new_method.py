@@ -1,7 +1,5 @@
 """``digiclay new-method``: the file of a control method of one's own, which runs as it is."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

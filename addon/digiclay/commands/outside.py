@@ -4,8 +4,6 @@ They are in packages beside this one, where those are installed. ``digiclay benc
 benchmarks are.
 """
 
-from __future__ import annotations
-
 import argparse
 from importlib import import_module
 from importlib.util import find_spec

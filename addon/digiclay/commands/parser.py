@@ -1,7 +1,5 @@
 """Parser of all commands."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

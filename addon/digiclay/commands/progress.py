@@ -1,7 +1,5 @@
 """Output on a terminal: tables, commands, and a progress line, redrawn in place and removed at the end."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import time

@@ -1,7 +1,5 @@
 """``digiclay sweep``: a scene over a grid of parameter values, on all cores of this machine."""
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import sys

@@ -4,8 +4,6 @@ Each runs this program once more, and stops when its standard input ends: so it 
 and when the process that started it has died.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import os

@@ -4,8 +4,6 @@ Below some pixels a pitch pins hide the form, and their rows make moire. A bed s
 drawn as a skin, until its pins are clearly larger again in any view.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

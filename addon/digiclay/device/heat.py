@@ -4,8 +4,6 @@ Levels rather than a gradient, because a pin wears one of a few materials: that 
 view, in Workbench and in Cycles alike. No Blender.
 """
 
-from __future__ import annotations
-
 #: Force from which on a pin has the last color, N; a gently pressing finger gives a cell a third of it.
 TOP = 0.2
 #: sRGB of a pin that nothing presses.

@@ -4,8 +4,6 @@ The skin is weighted sums of the heights of the pins, in Blender's own code. It 
 pins: a session, a bake, undo. It needs no data of its own in a tick.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Palettes of the modes: three sets, distinct for any color vision."""
 
-from __future__ import annotations
-
 from ..bridge import linear, srgb
 from ..compat import bpy, shader_nodes
 from ..core.base.modes import COLORS, Mode

@@ -1,7 +1,5 @@
 """Objects of the device: shapes, materials and roles; meshes of the live skin."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Primitive shapes of the device's parts as vertices and faces; numpy only, no Blender."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

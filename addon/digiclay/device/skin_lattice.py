@@ -9,8 +9,6 @@ nowhere above or below the two pins it stands between. *membrane* is level over 
 and straight between them.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ Blender copies, deletes and hides the objects that are selected, not those that 
 here finds what is missing or left over then and puts it right; the second, a timer, decides when.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple

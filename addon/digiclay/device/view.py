@@ -8,8 +8,6 @@ What is asked to be shown stands in the settings of the bed's modifier, an objec
 copies of a bed keep theirs, undo and files carry them.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

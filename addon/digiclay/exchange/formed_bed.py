@@ -1,7 +1,5 @@
 """Bed in Blender as a formed surface, and bodies of the core as meshes of Blender."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

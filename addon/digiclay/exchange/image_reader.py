@@ -1,7 +1,5 @@
 """Reading of pictures by Blender, EXR and HDR included."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Display of a shape on a bed in Blender, from an object or a file."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import replace
 from typing import Any

@@ -4,8 +4,6 @@ Of each job: the run, the frames of its films in ranges, and a task a film that 
 Each task is a command of digiclay that does nothing, with exit code 0, where it is done already.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -3,8 +3,6 @@
 No module here postpones its annotations: Blender reads an operator's properties from them.
 """
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 

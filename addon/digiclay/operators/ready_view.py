@@ -1,7 +1,5 @@
 """3D view in use: found, turned so that all of a bed is seen in it, and lit so that its relief is."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Drawing of the overlay, and of the patch under the Press tool's cursor, by Blender's gpu module."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

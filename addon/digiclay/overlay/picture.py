@@ -1,7 +1,5 @@
 """Overlay as plain marks in pixels, boxes, lines, dots and text, and its colors; no Blender."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

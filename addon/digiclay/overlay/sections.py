@@ -1,7 +1,5 @@
 """Sections of the overlay, and their placement in a view; no Blender."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field

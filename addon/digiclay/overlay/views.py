@@ -4,8 +4,6 @@ The draw handler is there only while a session runs whose bed has the overlay en
 nothing. `follow` is called after each start and end of a session.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

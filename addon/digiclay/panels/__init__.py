@@ -1,7 +1,5 @@
 """Panels of the tab "Digital Clay" in the 3D view's sidebar."""
 
-from __future__ import annotations
-
 from ..compat import bpy
 from . import display, parameters, press_options, session, shape_exchange
 

@@ -1,7 +1,5 @@
 """Common parts of the panels: location and bed."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Panels Device and Control: presets, method, and a sub-panel of parameters for each part."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..compat import bpy

@@ -1,7 +1,5 @@
 """Popovers in the header of the Press tool: stroke and pen."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from typing import Any

@@ -1,7 +1,5 @@
 """Panels Session, Takes and Laboratory: start and stop, recordings, speed and error."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..live import beds, follow

@@ -1,7 +1,5 @@
 """Panels Shapes, Export and Features: initial shape of the bed, export of the formed surface."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..exchange import formed_bed

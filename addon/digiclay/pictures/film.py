@@ -5,8 +5,6 @@ sequencer makes the film of them: so a stop between two frames loses nothing but
 depends on its number alone, not on those drawn before it.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import struct

@@ -1,7 +1,5 @@
 """Stage of a picture: camera, lights, floor, legend."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

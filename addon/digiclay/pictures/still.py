@@ -1,7 +1,5 @@
 """Still of one instant, drawn in the background beside the user's Blender scene."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 Blender offers all methods of a folder of files (`load_folder`); one mistake hides no other method.
 """
 
-from __future__ import annotations
-
 import builtins
 import copy
 import copyreg

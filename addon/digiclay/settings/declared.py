@@ -4,8 +4,6 @@ A property shows its parameter in the unit a person reads, with the unit in its 
 as its range, and meaning, symbol, bounds and default in its tooltip.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal, InvalidOperation

@@ -1,7 +1,5 @@
 """Device of a new bed as one valid scene; size of a bed's fingertip, and of the blister that follows it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Property groups of a bed's settings, and the effects of presets, methods and layouts on them."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 from typing import Any

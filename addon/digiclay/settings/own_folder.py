@@ -1,7 +1,5 @@
 """Methods of the folder in the preferences: loaded, with their properties, and taken back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ..compat import bpy

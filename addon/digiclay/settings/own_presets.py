@@ -1,7 +1,5 @@
 """User presets: scene files in the extension's folder, data only."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ..compat import PACKAGE, bpy

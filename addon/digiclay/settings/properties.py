@@ -3,8 +3,6 @@
 A scene is made of them and of nothing else, so what the panels show is what is simulated.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Conversion between SI and display units: mm, ms, bar."""
 
-from __future__ import annotations
-
 import math
 import re
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Translations of labels and tooltips: a catalog a language, registered with Blender."""
 
-from __future__ import annotations
-
 import inspect
 import tomllib
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Adapter: MuJoCo, damped pins below soft constraints: moving joint limits, or contacts of spheres."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

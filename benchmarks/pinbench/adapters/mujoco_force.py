@@ -1,7 +1,5 @@
 """Adapter: MuJoCo, pins on slide joints, the contact law of the problem applied as a force."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Adapter: the classical Runge-Kutta method over all pins at once, in numpy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

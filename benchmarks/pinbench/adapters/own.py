@@ -1,7 +1,5 @@
 """Adapter: digiclay."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Adapter: the classical Runge-Kutta method in plain Python, one pin after another."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Adapter: solvers of SciPy over all pins at once, restarted where a command changes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

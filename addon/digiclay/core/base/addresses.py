@@ -1,7 +1,5 @@
 """Hosts of network addresses: this machine, or one that others reach."""
 
-from __future__ import annotations
-
 import ipaddress
 
 

@@ -4,8 +4,6 @@ At that size it is numpy's calls that cost. A number that differs from run to ru
 which numpy puts against the last axis; a linear map (o, i) that does is an array (o, i, b).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Errors with a message of one line: owner, field, rule and value."""
 
-from __future__ import annotations
-
 #: Characters of a line that are shown: its beginning, which says what is wrong, and its end, which helps.
 BEGINNING, END = 300, 160
 

@@ -4,8 +4,6 @@ The codes are what ``history.npz`` stores and what the view maps to materials. T
 colors are Okabe and Ito's palette, told apart by people with any color vision.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -5,8 +5,6 @@ sign: F. N. Fritsch and J. Butland, A method for constructing local monotone pie
 SIAM J. Sci. Stat. Comput. 5 (1984) 300. At the ends it is that of a parabola, limited likewise.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .arrays import Floats

@@ -1,7 +1,5 @@
 """File lock of one process, which ends with the process; whether a process has ended."""
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import importlib

@@ -1,7 +1,5 @@
 """Numpy's files, whose heads are checked before unpacking, and small PNG pictures."""
 
-from __future__ import annotations
-
 import math
 import struct
 import tokenize

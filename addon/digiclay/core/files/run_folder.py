@@ -1,7 +1,5 @@
 """Folders and files: safe names, locked at the start of a run, complete under their name or absent."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """TOML text, checked before parsing, and parts of its tables, with errors of one line."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

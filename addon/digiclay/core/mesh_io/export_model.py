@@ -1,7 +1,5 @@
 """Bodies of a formed surface for export: skin, solid, pins, or features."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Materials and pictures are not opened; a file of vertices must lie in the glTF's
 trimesh drops fans, takes normalized integers as they are, and allocates memory before it checks sizes.
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import json

@@ -1,7 +1,5 @@
 """Size limits of input meshes, checks of file heads, and meshes placed several times."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

@@ -3,8 +3,6 @@
 OBJ, glTF and 3MF are read here; STL, PLY and OFF, which refer to nothing else, by trimesh.
 """
 
-from __future__ import annotations
-
 import importlib
 import io
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Mesh files of bodies: STL, OBJ, PLY, GLB and 3MF, each complete or not at all."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zipfile

@@ -1,7 +1,5 @@
 """Table of all metrics of sessions and of methods: units, labels and meanings."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 #: Factor from the SI unit to the unit that people read.

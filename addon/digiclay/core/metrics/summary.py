@@ -6,8 +6,6 @@ rows with a total force above zero; the fingertip cannot pull, and a force it no
 exerts is exactly zero.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

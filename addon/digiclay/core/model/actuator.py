@@ -1,7 +1,5 @@
 """Fluidic cylinder under each pin (equations 1 and 2), and the reservoirs that feed it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

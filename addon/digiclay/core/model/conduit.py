@@ -1,7 +1,5 @@
 """Conduit between valve and cylinder: Hagen-Poiseuille, in series with the valve (equation 8)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

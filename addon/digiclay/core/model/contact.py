@@ -1,7 +1,5 @@
 """Pulp over one cell: an exponential spring (equation 11)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Interface of the control methods: what is measured of cells, commanded to them and asked of the method."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 

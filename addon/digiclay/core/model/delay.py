@@ -1,7 +1,5 @@
 """Dead time between controller and valve, at its exact value (the t - t_d of equation 9)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..base.quantity import Parameters, quantity

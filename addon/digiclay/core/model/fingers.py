@@ -4,8 +4,6 @@ The pulp's memory belongs to a pair of fingertip and cell, so a cell has the fil
 the other. Where two fingertips meet over a cell, their forces add.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ finger does not end there, and a tall pin that the fingertip runs into sideways 
 by a force that grows, not by one that jumps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Valve lag: first-order response to the command (equation 9)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ selects one, and the parameters of all: scene files, ``--set``, Blender and the 
 from this one class. A parameter that an earlier law of the section declares is not declared again.
 """
 
-from __future__ import annotations
-
 import importlib
 from dataclasses import field as declare
 from dataclasses import fields, make_dataclass

@@ -1,7 +1,5 @@
 """Layout of the bed: number and spacing of the cells, and the cells near a point."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Null parts, which replace omitted parts: no state, no computation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Force observer: force on a pin from its height and its commands alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

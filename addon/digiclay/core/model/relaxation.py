@@ -1,7 +1,5 @@
 """Relaxation of the pulp: quasi-linear viscoelasticity by Prony filters (equations 10, 12 to 14)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

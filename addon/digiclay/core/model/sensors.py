@@ -5,8 +5,6 @@ Each is a small part around another, so a scene puts together what it wants:
 part without an effect is not put in.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

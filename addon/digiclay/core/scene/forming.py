@@ -1,7 +1,5 @@
 """Forming of a shape: duration of its display, and a fingertip path to its highest part."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Scene files: search by path or name, reading, overrides, errors of one line."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Conversion between scene files' tables and `schema.Scene`."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Finished run, read from its folder."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass

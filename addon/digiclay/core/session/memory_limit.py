@@ -1,7 +1,5 @@
 """Memory that a session takes, and refusal of one that this machine cannot hold."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

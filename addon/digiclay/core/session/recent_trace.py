@@ -1,7 +1,5 @@
 """Ring buffer of a live session: total force, set point, and heights of picked pins."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Render settings of a picture or film: appearance, rows shown, files of frames; no Blender."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

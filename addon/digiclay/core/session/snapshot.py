@@ -5,8 +5,6 @@ controller's memory is written by its structure and rebuilt after the memory a s
 same controller begins with: nothing that is read can name a class or run code.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

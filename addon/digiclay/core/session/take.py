@@ -5,8 +5,6 @@ finger goes straight; that, the orders in each period, and the state at the star
 that follows. The state at the end is kept as well, so that a replay can prove that it came to the same.
 """
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 A shape is a sample by its name, a mesh, a picture, or a numpy array.
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import importlib

@@ -1,7 +1,5 @@
 """Height map: a picture or grid of values as a shape, bilinear over its pixels."""
 
-from __future__ import annotations
-
 import importlib
 import re
 import struct

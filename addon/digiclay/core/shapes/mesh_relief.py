@@ -1,7 +1,5 @@
 """Mesh as a shape: its top surface by rays along the axes of the pins, holes filled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Section [shape] of a scene: source and placement of a shape; the top surface of a shape at the pins."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

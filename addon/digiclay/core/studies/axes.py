@@ -1,7 +1,5 @@
 """Axes of a sweep: their text form, the points over them, and columns of numbers."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Evaluation of a sweep's points: batches, single runs, and their results."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ A job's folder holds ``scene.toml``, every parameter of its session, and ``job.t
 made of the run. With that folder and this package the job can be done on any machine.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import re

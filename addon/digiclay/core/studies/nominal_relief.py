@@ -8,8 +8,6 @@ cell under the fingertip: there d_j is less by how far the middles of the cells 
 many cells as follow, the disc's radius less half a pitch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

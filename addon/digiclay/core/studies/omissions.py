@@ -7,8 +7,6 @@ closed loop. What is kept in the end was measured as it is, with the error of it
 on top.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

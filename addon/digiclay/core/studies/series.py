@@ -4,8 +4,6 @@ Its folder is made once, continued after a stop, and worked in by one process at
 pieces is kept as soon as it is done.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager

@@ -1,7 +1,5 @@
 """Largest tracking speed of a control method: a straight drag or a lift, with a bisection on its speed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

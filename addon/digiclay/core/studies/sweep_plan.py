@@ -1,7 +1,5 @@
 """Folder of a series of points: its definition, one small file a finished point, and the table of all."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

@@ -5,8 +5,6 @@ other where they do so straightest: a cross is two lines, and the third branch o
 Where two lines run together for a short way, as in an eight of two circles, both take that way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import combinations, permutations

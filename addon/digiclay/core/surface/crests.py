@@ -5,8 +5,6 @@ through the middle of the feature's sections, and ends where its spine does: hal
 before the height has fallen to a half. A line shorter than the feature is wide is the top of a mound.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 

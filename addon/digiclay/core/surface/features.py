@@ -1,7 +1,5 @@
 """Features of a formed surface: bosses and creases, found, measured and named."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations

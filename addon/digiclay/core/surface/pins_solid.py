@@ -6,8 +6,6 @@ both higher than the other two there, would touch along a line without thickness
 make: they are joined by a bridge as narrow as `BRIDGE`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

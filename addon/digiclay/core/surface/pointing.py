@@ -1,7 +1,5 @@
 """Intersection of a ray with the pins, and the contact of a fingertip pressed there."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

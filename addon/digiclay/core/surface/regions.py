@@ -1,7 +1,5 @@
 """Regions of a skin, cut along contours: off the former surface, and nearest to one top."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

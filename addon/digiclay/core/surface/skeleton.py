@@ -8,8 +8,6 @@ Everywhere `beside` int (k, 8 or 6) is the neighbors of a feature's pins, number
 none; `on_bed` bool (k, 8 or 6) is where the bed continues; `off` (k,) are heights over the ground, m.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 

@@ -11,8 +11,6 @@ above or below the pins it stands between;
 and harmonic, as a soap film is at small slopes, between them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
