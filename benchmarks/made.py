@@ -21,8 +21,7 @@ from digiclay.recorded.pointer_strokes import read_strokes
 from digiclay.roles import fingertip_of
 from digiclay.settings.devices import BEDS
 
-from .alike import Played, compare, make_bed, play
-from .evenness import find_spikes, move
+from .alike import Played, compare, find_spikes, make_bed, move, play
 from .intended import THINGS, find_relief
 from .kinds import STROKES
 from .report import Report, Steps, tabulate

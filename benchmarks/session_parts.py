@@ -3,27 +3,184 @@
 import argparse
 import cProfile
 import statistics
-from collections.abc import Iterator
-from contextlib import nullcontext
-from dataclasses import replace
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from time import perf_counter, process_time
-from types import CodeType
-from typing import Any
+from types import CodeType, FrameType
+from typing import Any, ClassVar
 
 import numpy as np
 from digiclay import core
 from digiclay.commands.arguments import scene_of
+from digiclay.commands.progress import table
 from digiclay.core.base.arrays import Floats
-from digiclay.core.engine import simulation
+from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.trajectory import Trajectory, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording
 from digiclay.core.scene.schema import Scene
+from digiclay.core.session.accuracy import Replay
 from digiclay.core.session.memory_limit import check_memory
 
-from .numpy_calls import list_calls, period_calls
-from .replays import solve, time_run
 from .report import Report, Steps, tabulate
+
+
+def replaying(scene: Scene, commands: Floats) -> System:
+    """Return a scene's system that plays commands, (t, n), one row a control period."""
+    system = assemble(scene)
+    return replace(system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0))
+
+
+def run(scene: Scene, commands: Floats | None = None) -> tuple[System, Iterator[State]]:
+    """Return a scene's system, with its controller or under commands, (t, n), and its states to come."""
+    system = assemble(scene) if commands is None else replaying(scene, commands)
+    return system, periods(system, scene.trajectories(), begin(system), scene.periods)
+
+
+def solve(scene: Scene, commands: Floats | None = None) -> list[Floats]:
+    """Return heights, (t, n), m, total force, (t,), N, and commands, (t, n), at the ends of the periods."""
+    system, states = run(scene, commands)
+    rows = [
+        (state.row(0), state.row(system.rows.force).sum(), state.row(system.rows.command)) for state in states
+    ]
+    return [np.array(column) for column in zip(*rows, strict=True)]
+
+
+def time_run(scene: Scene, commands: Floats | None = None) -> float:
+    """Return the CPU time of a run of which nothing is kept, s."""
+    _, states = run(scene, commands)
+    started = process_time()
+    for _ in states:
+        pass
+    return process_time() - started
+
+
+#: Methods that make an array or bytes: Python's profiler does not see those that a `functools.partial` calls.
+ARRAY_METHODS = ("take", "copy", "astype", "dot", "reshape", "tobytes", "__getitem__", "__setitem__")
+#: Methods that reach `__array_ufunc__` by themselves, or make no array.
+REDUCTIONS = ("any", "all", "sum", "min", "max", "item", "tolist", "view")
+#: Files whose calls are numpy's own, or this counter's.
+INSIDE = (str(Path(np.__file__).parent), __file__)
+
+#: Number of calls by name.
+Ledger = Counter[str]
+
+
+class Counted(np.ndarray[Any, Any]):
+    """An array that notes every operation with it in `ledger`; the results are counted arrays too."""
+
+    # So that the product of a plain array with one of these is one too.
+    __array_priority__ = 1.0
+    ledger: ClassVar[Ledger] = Counter()
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **named: Any) -> Any:
+        name, named = ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}", _plain(named)
+        if out is not None:
+            named["out"] = _plain(out)
+        result = _call(name, getattr(ufunc, method), inputs, named)
+        return out[0] if out is not None else result
+
+    def __array_function__(self, function: Any, types: Any, arguments: Any, named: Any) -> Any:
+        return _call(function.__name__, function, arguments, _plain(named))
+
+
+def _note_method(name: str) -> Callable[..., Any]:
+    """Return a method of `Counted` that notes the call."""
+    original = getattr(np.ndarray, name)
+    return lambda *arguments, **named: _call(name, original, arguments, _plain(named))
+
+
+for _name in ARRAY_METHODS:
+    setattr(Counted, _name, _note_method(_name))
+
+
+def _call(name: str, function: Callable[..., Any], arguments: Any, named: dict[str, Any]) -> Any:
+    """Note a call, and make it with plain arrays; its result is counted."""
+    Counted.ledger[name] += 1
+    return _counted(function(*_plain(arguments), **named))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with every `Counted` in it as a plain array on the same memory."""
+    if isinstance(value, Counted):
+        return value.view(np.ndarray)
+    if isinstance(value, (tuple, list)):
+        return type(value)(_plain(one) for one in value)
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    return value
+
+
+def _counted(value: Any) -> Any:
+    """Return a value with its arrays as `Counted`, also those in sequences and dataclasses."""
+    if isinstance(value, np.ndarray):
+        return value.view(Counted)
+    if isinstance(value, (tuple, list)) and not hasattr(value, "_fields"):
+        return type(value)(_counted(one) for one in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        names = [field.name for field in fields(value) if field.name not in ("cell", "segments")]
+        return replace(value, **{name: _counted(getattr(value, name)) for name in names})
+    return value
+
+
+@contextmanager
+def note_methods() -> Iterator[None]:
+    """Note methods of plain arrays and numpy's built-in functions too, but not what numpy's modules call."""
+
+    def note(frame: FrameType, event: str, called: Any) -> None:
+        if event != "c_call" or frame.f_code.co_filename.startswith(INSIDE):
+            return
+        owner = getattr(called, "__self__", None)
+        if type(owner) is np.ndarray:
+            if called.__name__ not in REDUCTIONS:
+                Counted.ledger[called.__name__] += 1
+        elif not isinstance(owner, (np.ndarray, np.ufunc)) and str(called.__module__).startswith("numpy"):
+            Counted.ledger[called.__name__] += 1
+
+    former = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        yield
+    finally:
+        sys.setprofile(former)
+
+
+def period_calls(system: System, trajectories: Sequence[Trajectory], count: int) -> tuple[list[int], Ledger]:
+    """Return how many numpy calls each of the first `count` control periods makes, and which.
+
+    The fingertips' poses are not counted: they are computed for many periods at once.
+    """
+    parts = {name: _counted(getattr(system, name)) for name in ("grid", "selection", "plan")}
+    system = replace(system, **parts)
+    state = begin(system)
+    arrays = {name: getattr(state, name).view(Counted) for name in ("rows", "modes", "aged")}
+    starts = np.arange(count)[:, None] * system.period
+    poses = sample_poses(trajectories, (starts + system.instants).ravel())
+    paths = trace_fingers(system, poses.reshape(count, -1, len(trajectories), 7))
+    ledger: Ledger = Counter()
+    Counted.ledger = ledger
+    totals, state = [0], state._replace(**arrays)
+    with note_methods():
+        for path in paths:
+            state = advance(system, state, path)
+            totals.append(ledger.total())
+    return np.diff(totals).tolist(), ledger
+
+
+def list_calls(scene: Scene) -> Iterator[str]:
+    """Give the lines of a table of the calls a period by name."""
+    count = min(scene.periods, 2000)
+    calls, ledger = period_calls(assemble(scene), scene.trajectories(), count)
+    yield f"numpy calls of the first {count} control periods: median {statistics.median(calls):g} a period"
+    rows = [[name, f"{n / count:.1f}"] for name, n in ledger.most_common() if n >= 0.05 * count]
+    yield from table(("call", "a period"), [*rows, ["all", f"{ledger.total() / count:.1f}"]])
+
 
 #: Parts of a control period and what is in them.
 PARTS = {
@@ -93,11 +250,11 @@ def _list_lines(
 def time_session(scene: Scene, profile: cProfile.Profile | None = None) -> tuple[float, float]:
     """Run a session as `core.session.run_scene.run` does; return its elapsed and its processor time, s."""
     system, trajectories = assemble(scene), scene.trajectories()
-    state = simulation.begin(system)
+    state = begin(system)
     observe = RunRecording(scene.recorder or Recorder(), system.rows, state, scene.periods).observe
     with profile or nullcontext():
         started = perf_counter(), process_time()
-        for reached in simulation.periods(system, trajectories, state, scene.periods):
+        for reached in periods(system, trajectories, state, scene.periods):
             observe(reached)
         return perf_counter() - started[0], process_time() - started[1]
 

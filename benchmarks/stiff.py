@@ -26,9 +26,8 @@ from digiclay.core.scene.schema import STEPPERS, Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.accuracy import SHARE, reference_settings
 
-from .numpy_calls import period_calls
-from .replays import replaying
 from .report import Report, Row, Steps, tabulate
+from .session_parts import period_calls, replaying
 
 Table = Mapping[str, Any]
 

@@ -6,7 +6,7 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 
 from benchmarks.bed_size import measure_bytes, scene
-from benchmarks.numpy_calls import period_calls
+from benchmarks.session_parts import period_calls
 
 #: Sides of the beds: 625 and 40,401 pins; both have a pin in the middle.
 SMALL, LARGE = 25, 201

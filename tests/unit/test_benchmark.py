@@ -28,10 +28,20 @@ from digiclay.core.studies.evaluation import LEAST, make_bundles
 from benchmarks import method_figures, processes, runs_together
 from benchmarks.__main__ import main
 from benchmarks.kinds import BENCHMARKS
-from benchmarks.numpy_calls import Counted, Ledger, note_methods, period_calls
 from benchmarks.report import Report
 from benchmarks.runs_together import STUDIES, study
-from benchmarks.session_parts import CORE, FILES, LONGER, PARTS, TERMS, without
+from benchmarks.session_parts import (
+    CORE,
+    FILES,
+    LONGER,
+    PARTS,
+    TERMS,
+    Counted,
+    Ledger,
+    note_methods,
+    period_calls,
+    without,
+)
 from tests.assemble import sample
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.scene.toml_table import resolve
 
-from ...replays import run
+from ...session_parts import run
 
 STEPS = (5e-3, 2.5e-3, 1e-3, 5e-4)
 METHODS = {
