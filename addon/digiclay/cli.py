@@ -3,9 +3,11 @@
 What the commands need is imported in `main`, where Ctrl-C is looked after already.
 """
 
+import gc
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NoReturn
 
 from .commands.stop import STOPPED, WRONG, defer_interrupt
@@ -17,7 +19,7 @@ CORES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_M
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; return its exit code: 0, 2 for what a user can mend, 130 when stopped."""
-    return carry_out(lambda: _parsed(argv))
+    return carry_out(partial(_parsed, argv))
 
 
 def carry_out(parse: Callable[[], Any]) -> int:
@@ -41,7 +43,7 @@ def carry_out(parse: Callable[[], Any]) -> int:
     return code
 
 
-def _parsed(argv: Sequence[str] | None) -> Any:
+def _parsed(argv: Sequence[str] | None = None) -> Any:
     """Read the arguments."""
     with defer_interrupt():
         from .commands.parser import parser
@@ -58,21 +60,31 @@ def _wrong(error: object) -> int:
 
 def console() -> NoReturn:
     """Run `main` as a program."""
-    run_as_program(main)
+    run_as_program(_parsed)
 
 
-def run_as_program(command: Callable[[], int]) -> NoReturn:
-    """Run a command and leave with its exit code.
+def run_as_program(parse: Callable[[], Any]) -> NoReturn:
+    """Read arguments, carry out the command they name, and leave with its exit code.
 
     On one core, unless the environment says otherwise: a session's products are small, and a second
-    thread would spend its time waiting for the next, which counts as well.
+    thread would spend its time waiting for the next, which counts as well. What is imported by then is never
+    searched for garbage, which would take a seventh of a short command; Blender's module is imported later.
     """
+
+    def parse_and_freeze() -> Any:
+        gc.disable()
+        try:
+            return parse()
+        finally:
+            gc.freeze()
+            gc.enable()
+
     for name in CORES:  # read when numpy is imported, which it has not been yet
         os.environ.setdefault(name, "1")
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal may not know µ
     try:
-        code = command()
+        code = carry_out(parse_and_freeze)
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -286,8 +286,8 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said: str, cores: s
         f"os.environ['OPENBLAS_NUM_THREADS'] = {said!r}\n"
         "os.environ['OPENBLAS_NUM_THREADS'] or os.environ.pop('OPENBLAS_NUM_THREADS')\n"
         "from digiclay import cli\n"
-        "cli.main = lambda: print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules) or 0\n"
-        "cli.console()\n"
+        "def parse(): sys.exit(print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules))\n"
+        "cli.run_as_program(parse)\n"
     )
     # Numpy reads it when it is imported, so that must not have happened before.
     assert finish(start(script))[1].split() == [cores, "False"]
