@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from digiclay.commands.arguments import Options, add_command
+from digiclay.commands.arguments import Options, add_command, add_options
 from digiclay.commands.progress import Line
 from digiclay.commands.stop import Stop, refuse_without
 from digiclay.core.files.run_folder import check_folder, write_folder
@@ -31,7 +31,7 @@ def add(commands: Any) -> None:
         "--quiet": "print nothing but errors, and no progress",
     }
     purpose = "reproduce the paper's results"
-    add_command(commands, "paper", purpose, EXAMPLES, description, carry_out=carry_out, options=options)
+    add_options(add_command(commands, "paper", purpose, EXAMPLES, description, carry_out=carry_out), options)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

@@ -4,8 +4,8 @@ import argparse
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from ..core.base.errors import MethodError, OutputError, ParameterError
@@ -126,7 +126,6 @@ def add_command(
     description: str = "",
     *,
     carry_out: Callable[[argparse.Namespace], int] | None = None,
-    options: Options = MappingProxyType({}),
     listed: bool = True,
 ) -> argparse.ArgumentParser:
     """Add a command; its own help begins with `description`, by default `help` as a sentence."""
@@ -134,9 +133,40 @@ def add_command(
         name, description=description or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
         formatter_class=Help, allow_abbrev=False, **({"help": help} if listed else {}),
     )  # fmt: skip
-    add_options(parser, options)
     parser.set_defaults(carry_out=carry_out)
     return parser
+
+
+#: What a command takes: options by table, or a function that adds them to a parser.
+Taken = Options | Callable[[argparse.ArgumentParser], object]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command that a function carries out; `texts` are help, epilog and description of `add_command`."""
+
+    carry_out: Callable[[argparse.Namespace], int]
+    texts: tuple[str, str, str]
+    taken: tuple[Taken, ...]
+    listed: bool
+
+    def add(self, commands: Any, name: str) -> None:
+        """Add the command to others."""
+        parser = add_command(commands, name, *self.texts, carry_out=self.carry_out, listed=self.listed)
+        for each in self.taken:
+            each(parser) if callable(each) else add_options(parser, each)
+
+
+def command(
+    help: str, epilog: str, *taken: Taken, description: str = "", listed: bool = True
+) -> Callable[[Callable[[argparse.Namespace], int]], Command]:
+    """Return a decorator that makes a command of what carries it out."""
+    return lambda carry_out: Command(carry_out, (help, epilog, description), taken, listed)
+
+
+def one_of(options: Options) -> Callable[[argparse.ArgumentParser], None]:
+    """Return what adds a table of options of which one may be given."""
+    return lambda parser: add_options(parser.add_mutually_exclusive_group(), options)
 
 
 def say(arguments: argparse.Namespace, *lines: object) -> None:

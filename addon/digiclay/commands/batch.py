@@ -11,14 +11,13 @@ import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path, PureWindowsPath
-from typing import Any
 
 from ..core.base.errors import OutputError, one_line
 from ..core.files.run_folder import make_safe_name, resolve_inside, write_whole
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
 from ..farms.series_plan import FORMATS, Submission, plan_series, split_frames
 from ..plugins.method_loader import find_word
-from .arguments import QUIET, Options, add_command, add_options, load_by_option, say
+from .arguments import QUIET, Options, command, load_by_option, one_of, say
 from .batch_folder import Folder, open_batch
 from .evaluation_pool import read_count
 from .job_steps import PROGRESS, check_outputs, find_error, read_fraction, read_tail
@@ -44,6 +43,7 @@ FARM_OPTIONS = {
     "--program PATH":
         "with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
     "--chunk N": (read_count, f"with --submit: frames of a film that a task draws; default {CHUNK}"),
+    "--quiet": QUIET,
 }  # fmt: skip
 OPTIONS: Options = {
     "file JOBS": "a .toml file, or a sample's name",
@@ -87,14 +87,10 @@ class JobProcess(Process):
         return one_line(f"The process ended with {self.wait()}{last}")
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "run a job series in the background: scenes, exports, pictures and films"
-    parser = add_command(commands, "batch", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
-    add_options(parser.add_mutually_exclusive_group(), INSTEAD)
-    add_options(parser, {**FARM_OPTIONS, "--quiet": QUIET})
-
-
+@command(
+    "run a job series in the background: scenes, exports, pictures and films", EXAMPLES,
+    OPTIONS, one_of(INSTEAD), FARM_OPTIONS,
+)  # fmt: skip
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
     refuse_alone(arguments)

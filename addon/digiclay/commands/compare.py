@@ -5,6 +5,7 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -21,7 +22,7 @@ from ..core.scene.schema import Scene
 from ..core.session.run_scene import RUN_METRICS, run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
 from ..plugins.method_loader import find_installed, is_file_word
-from .arguments import METHOD, QUIET, add_command, add_options, add_scene, load_by_option, say, settings_of
+from .arguments import METHOD, QUIET, add_scene, command, load_by_option, say, settings_of
 from .outside import SUITE, find_beside, refuse_absent
 from .progress import Bar
 from .progress import table as aligned
@@ -51,13 +52,8 @@ SUITE_ONLY = (
 )  # fmt: skip
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "Run control methods on the same input, and compare their metrics."
-    listed = "compare control methods on the same input"
-    parser = add_command(commands, "compare", listed, EXAMPLES, purpose, carry_out=carry_out)
-    add_scene(parser, optional=True)
-    add_options(parser, OPTIONS)
+def _add_suite(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a suite, where its package is installed."""
     if suite := find_beside(*SUITE):
         suite.add_suite(parser)
     else:
@@ -97,6 +93,10 @@ OPTIONS = {
 }  # fmt: skip
 
 
+@command(
+    "compare control methods on the same input", EXAMPLES, partial(add_scene, optional=True), OPTIONS,
+    _add_suite, description="Run control methods on the same input, and compare their metrics.",
+)  # fmt: skip
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run every method, print the table, write the folder."""
     if arguments.suite and (suite := find_beside(*SUITE)):

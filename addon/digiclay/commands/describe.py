@@ -13,7 +13,7 @@ from ..core.scene.assembly import assemble
 from ..core.scene.schema import FINGER_SECTIONS, SECTIONS, Scene
 from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
 from ..core.shapes.fitting import fit_shape
-from .arguments import add_command, add_options, add_scene, scene_of
+from .arguments import add_scene, command, scene_of
 
 EXAMPLES = """\
 examples:
@@ -32,14 +32,10 @@ PLACES = (
 READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm2/s"), "m/s": (1e3, "mm/s")}
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "list the parts of a scene and their parameters"
-    parser = add_command(commands, "describe", purpose, EXAMPLES, carry_out=carry_out)
-    add_scene(parser)
-    add_options(parser, {"--parameters": "each key with its value, range, meaning and source instead"})
-
-
+@command(
+    "list the parts of a scene and their parameters", EXAMPLES, add_scene,
+    {"--parameters": "each key with its value, range, meaning and source instead"},
+)  # fmt: skip
 def carry_out(arguments: argparse.Namespace) -> int:
     """Describe."""
     scene, _ = scene_of(arguments)

@@ -13,7 +13,7 @@ from ..core.studies.axes import Point, Record
 from ..core.studies.evaluation import Pool, evaluate_bundle
 from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder
-from .arguments import QUIET, add_options, add_scene, say, whole_number
+from .arguments import QUIET, add_options, add_scene, one_of, say, whole_number
 from .progress import Counted
 from .stop import STOPPED, Stop, refuse_without
 from .worker import count_cores, in_blender
@@ -22,11 +22,6 @@ from .worker import count_cores, in_blender
 MOST = 61
 #: Reads a number of processes.
 read_count = whole_number(1, MOST)
-
-
-def add_pool(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say where bundles are evaluated."""
-    add_options(parser.add_mutually_exclusive_group(), PLACES)
 
 
 def _read_address(text: str) -> str:
@@ -42,6 +37,7 @@ PLACES = {
     "--workers N": (read_count, "number of processes; default: one a core"),
     "--scheduler ADDRESS": (_read_address, "a Dask cluster instead, such as tcp://127.0.0.1:8786"),
 }
+add_pool = one_of(PLACES)
 
 
 def add_series(parser: argparse.ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:

@@ -4,7 +4,6 @@ import argparse
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_files
@@ -17,7 +16,7 @@ from ..core.session.run_scene import History
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, Formed, make_formed
 from ..core.surface.skins import SKINS
-from .arguments import RUN, add_command, formats, millimeters, say, seconds, told_as_options, whole_number
+from .arguments import RUN, command, formats, millimeters, say, seconds, told_as_options, whole_number
 from .progress import table as aligned
 from .stop import require_surface
 
@@ -83,12 +82,6 @@ examples:
 STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "features"}
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "write the formed surface of a run as mesh files"
-    add_command(commands, "export", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
-
-
 OPTIONS = {
     **RUN,
     "--format F,...": (formats, f"{list_choices(FORMATS, '{} ({})', ', ')}; default stl", ["stl"]),
@@ -121,6 +114,7 @@ def exported(
     return [write(parts, folder / name, "mm", kind) for name, kind in zip(names, kinds, strict=True)]
 
 
+@command("write the formed surface of a run as mesh files", EXAMPLES, OPTIONS)
 def carry_out(arguments: argparse.Namespace) -> int:
     """Export."""
     if arguments.separate and arguments.kind != "features":
@@ -145,7 +139,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-FEATURE_EXAMPLES = """\
+LISTING = """\
 examples:
   digiclay features ridge_mound_valley
   digiclay features ridge_mound_valley --time 13.3 --former 10.3 --threshold "1 mm"
@@ -156,13 +150,7 @@ points of its crests.
 """
 
 
-def add_features(commands: Any) -> None:
-    """Add the command."""
-    purpose = "list the bosses and creases of a run"
-    options = {**RUN, **SURFACE, **TIME, "--json": "write JSON"}
-    add_command(commands, "features", purpose, FEATURE_EXAMPLES, carry_out=list_features, options=options)
-
-
+@command("list the bosses and creases of a run", LISTING, RUN, SURFACE, TIME, {"--json": "write JSON"})
 def list_features(arguments: argparse.Namespace) -> int:
     """List the features."""
     scene, formed = read_formed(arguments, "features")

@@ -4,8 +4,8 @@ import argparse
 import json
 import textwrap
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import History, Result
 from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
-from .arguments import QUIET, add_command, add_options, add_scene, formats, say, scene_of
+from .arguments import QUIET, add_scene, command, formats, say, scene_of
 from .run import plan_meshes, simulate, write_run
 from .stop import Stop, allow_interrupt, defer_interrupt, require_surface
 
@@ -49,17 +49,11 @@ OPTIONS = {
 }  # fmt: skip
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "Display a mesh, a picture or an array of heights, form it with the fingertip, export it."
-    parser = add_command(
-        commands, "form", "display a shape, form it with the fingertip, export it", EXAMPLES, purpose,
-        carry_out=carry_out, options={"shape SHAPE": "a sample shape's name, or a file"},
-    )  # fmt: skip
-    add_scene(parser, SCENE)
-    add_options(parser, OPTIONS)
-
-
+@command(
+    "display a shape, form it with the fingertip, export it", EXAMPLES,
+    {"shape SHAPE": "a sample shape's name, or a file"}, partial(add_scene, default=SCENE), OPTIONS,
+    description="Display a mesh, a picture or an array of heights, form it with the fingertip, export it.",
+)  # fmt: skip
 def carry_out(arguments: argparse.Namespace) -> int:
     """Fit, display, form, export, and print a summary."""
     file = find_shape(arguments.shape)

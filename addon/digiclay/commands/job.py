@@ -19,7 +19,7 @@ from ..core.scene.scene_source import load
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
 from ..core.studies.series import describe_error
 from ..plugins.method_loader import CODE, resolve_word
-from .arguments import add_command, load_by_option, say
+from .arguments import command, load_by_option, say
 from .batch_folder import note_failure, read_batch, refresh_page
 from .job_steps import ERROR, FILES, PROGRESS, RUNS, TIMING, RunState, Tell, Work, check_outputs, judge_run
 from .progress import Counted
@@ -55,12 +55,7 @@ OPTIONS = {
 GRACE = 20.0
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "run one job of a series from its files alone; for render farms"
-    add_command(commands, "job", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS, listed=False)
-
-
+@command("run one job of a series from its files alone; for render farms", EXAMPLES, OPTIONS, listed=False)
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the job, by itself or as a process of a batch."""
     return _follow(arguments) if arguments.follow else _do_alone(arguments)
@@ -184,13 +179,10 @@ It needs neither the JOBS file nor Blender. Exit code 0 also while jobs are miss
 """
 
 
-def add_page(commands: Any) -> None:
-    """Add the command."""
-    purpose = "write the page of a job series from the runs that are done"
-    options = {"series DIR": (Path, "the folder of the series"), "--quiet": "print errors only"}
-    add_command(commands, "page", purpose, PAGE_EXAMPLES, carry_out=write_page, options=options, listed=False)
-
-
+@command(
+    "write the page of a job series from the runs that are done", PAGE_EXAMPLES,
+    {"series DIR": (Path, "the folder of the series"), "--quiet": "print errors only"}, listed=False,
+)  # fmt: skip
 def write_page(arguments: argparse.Namespace) -> int:
     """Write the page."""
     series = read_batch(arguments.series)

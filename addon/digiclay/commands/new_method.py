@@ -5,13 +5,12 @@ import os
 import re
 from pathlib import Path
 from string import Template
-from typing import Any
 
 from ..core.base.errors import OutputError
 from ..core.control.methods import METHODS
 from ..core.files.run_folder import make_folder, write_whole
 from ..plugins.method_loader import name_method
-from .arguments import add_command, say
+from .arguments import command, say
 from .stop import refuse_unwritable
 
 EXAMPLES = """\
@@ -23,12 +22,6 @@ docs/own-methods.md explains the file.
 """
 #: The file that is copied.
 TEMPLATE = Path(__file__).parents[1] / "sample_shapes" / "methods" / "template.txt"
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "write the file of a control method of your own, which runs as it is"
-    add_command(commands, "new-method", purpose, EXAMPLES, carry_out=carry_out, options=OPTIONS)
 
 
 def _name(text: str) -> str:
@@ -56,6 +49,7 @@ def name_class(name: str) -> str:
     return "".join(part.capitalize() for part in name.split("_"))
 
 
+@command("write the file of a control method of your own, which runs as it is", EXAMPLES, OPTIONS)
 def carry_out(arguments: argparse.Namespace) -> int:
     """Write the file."""
     refuse_unwritable(arguments.out)

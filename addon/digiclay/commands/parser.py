@@ -13,12 +13,12 @@ from ..core.base.quantity import find_nearest_name
 from .arguments import Help
 from .stop import WRONG
 
-#: Functions that add the commands, without those of other packages: only the command asked for is imported.
+#: The commands by name, without those of other packages: only the one asked for is imported.
 COMMANDS = {
-    "run": "run.add", "batch": "batch.add", "job": "job.add", "page": "job.add_page", "form": "form.add",
-    "describe": "describe.add", "export": "export.add", "features": "export.add_features",
-    "plot": "render.add_plot", "render": "render.add", "sweep": "sweep.add", "compare": "compare.add",
-    "new-method": "new_method.add",
+    "run": "run.carry_out", "batch": "batch.carry_out", "job": "job.carry_out", "page": "job.write_page",
+    "form": "form.carry_out", "describe": "describe.carry_out", "export": "export.carry_out",
+    "features": "export.list_features", "plot": "render.plot", "render": "render.carry_out",
+    "sweep": "sweep.carry_out", "compare": "compare.carry_out", "new-method": "new_method.carry_out",
 }  # fmt: skip
 
 EXAMPLES = """\
@@ -93,8 +93,11 @@ def parser(first: str = "") -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    every = [] if first == "--version" else [*COMMANDS.values(), "outside.add"]
-    for place in [COMMANDS[first]] if first in COMMANDS else every:
-        module, _, add = place.partition(".")
-        getattr(import_module(f".{module}", __package__), add)(commands)
+    if first == "--version":
+        return top
+    for name in [first] if first in COMMANDS else COMMANDS:
+        module, _, command = COMMANDS[name].partition(".")
+        getattr(import_module(f".{module}", __package__), command).add(commands, name)
+    if first not in COMMANDS:
+        import_module(".outside", __package__).add(commands)
     return top

@@ -17,7 +17,7 @@ from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
 from ..core.session.run_scene import History
-from .arguments import RUN, Options, add_command, add_options, say, seconds, size, told_as_options
+from .arguments import RUN, Options, command, one_of, say, seconds, size, told_as_options
 from .progress import Counted
 from .stop import (
     STOPPED,
@@ -75,14 +75,10 @@ ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force", "fi
 OF_FILMS, OF_TURNTABLES = ("rate", "speed", "start", "stop", "strip"), ("rate", "frames")
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy"
-    parser = add_command(commands, "render", purpose, EXAMPLES, carry_out=carry_out, options=RUN)
-    add_options(parser.add_mutually_exclusive_group(), KINDS)
-    add_options(parser, OPTIONS)
-
-
+@command(
+    "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy", EXAMPLES,
+    RUN, one_of(KINDS), OPTIONS,
+)  # fmt: skip
 def carry_out(arguments: argparse.Namespace) -> int:
     """Render."""
     with told_as_options("Still", "Film", "Turntable", width="size", height="size"):
@@ -193,13 +189,6 @@ examples:
 PLOTS = ("session.png", "surface.png")
 
 
-def add_plot(commands: Any) -> None:
-    """Add the command."""
-    purpose = "draw heights and force of a run over time, and its final surface"
-    options = {**RUN, "--out DIR": (Path, "output folder; default: the run folder")}
-    add_command(commands, "plot", purpose, PLOT_EXAMPLES, carry_out=plot, options=options)
-
-
 def plotted(scene: Scene, history: History, folder: Path) -> list[Path]:
     """Draw a history into a folder; return the files."""
     from ..plots.figure import save
@@ -209,6 +198,10 @@ def plotted(scene: Scene, history: History, folder: Path) -> list[Path]:
     return [save(figure, folder / name) for figure, name in zip(figures, PLOTS, strict=True)]
 
 
+@command(
+    "draw heights and force of a run over time, and its final surface", PLOT_EXAMPLES,
+    RUN, {"--out DIR": (Path, "output folder; default: the run folder")},
+)  # fmt: skip
 def plot(arguments: argparse.Namespace) -> int:
     """Plot."""
     folder: Path = arguments.out or arguments.run

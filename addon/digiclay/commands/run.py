@@ -22,9 +22,8 @@ from ..core.scene.schema import Scene
 from ..core.session.run_scene import History, Result, run, save
 from .arguments import (
     QUIET,
-    add_command,
-    add_options,
     add_scene,
+    command,
     formats,
     length,
     say,
@@ -108,14 +107,9 @@ OPTIONS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    purpose = "Simulate a scene and write its folder."
-    parser = add_command(commands, "run", "simulate a scene", EXAMPLES, purpose, carry_out=carry_out)
-    add_scene(parser)
-    add_options(parser, OPTIONS)
-
-
+@command(
+    "simulate a scene", EXAMPLES, add_scene, OPTIONS, description="Simulate a scene and write its folder."
+)
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run, write, and print a summary line."""
     scene, path = scene_of(arguments)

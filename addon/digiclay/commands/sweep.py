@@ -3,8 +3,8 @@
 import argparse
 import itertools
 import sys
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
@@ -14,7 +14,7 @@ from ..core.scene.scene_source import find
 from ..core.studies.axes import Axis, Column, Record, make_columns, make_points, read_axis
 from ..core.studies.evaluation import explain_failed_batches, make_bundles, read_metrics
 from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
-from .arguments import add_command, name_methods, settings_of
+from .arguments import command, name_methods, settings_of
 from .evaluation_pool import add_series, run_series
 from .progress import Counted
 
@@ -32,16 +32,14 @@ force_error and total_force_error every point is integrated once more.
 """
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    listed, purpose = (
-        "run a scene over a grid of parameter values",
-        "Run a scene at many points of its parameters.",
-    )
-    parser = add_command(commands, "sweep", listed, EXAMPLES, purpose, carry_out=carry_out)
-    add_series(parser, "START:STOP:COUNT, START:STOP:COUNT:log or A,B,C", "rfd,lag", "VALUES")
+SYNTAX = "START:STOP:COUNT, START:STOP:COUNT:log or A,B,C"
 
 
+@command(
+    "run a scene over a grid of parameter values", EXAMPLES,
+    partial(add_series, syntax=SYNTAX, metrics="rfd,lag", varied="VALUES"),
+    description="Run a scene at many points of its parameters.",
+)  # fmt: skip
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run what is not done yet, and write the table and the pictures."""
     names = read_metrics(arguments.metric)
