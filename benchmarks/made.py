@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from digiclay.commands.stop import refuse_unwritable
 from digiclay.core.base.arrays import Floats
-from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.base.errors import OutputError, ParameterError, explain_os_error
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.render_settings import Still
 from digiclay.device import view
@@ -107,11 +107,9 @@ def draw_made(made: Made, out: Path) -> None:
             whole.paste(Image.open(file).convert("RGB"), (number * WIDTH, 0))
             place = number * WIDTH + INSET[0], INSET[1]
             pen.text(place, f"{made.title}: {words}", INK, ImageFont.load_default(LETTERS))
-    try:
+    with explain_os_error(f"{out} cannot be written"):
         out.parent.mkdir(parents=True, exist_ok=True)
         whole.save(out, quality=90)
-    except OSError as error:
-        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
 
 
 def draw_relief(scene: Scene, relief: Floats, lowest: float, out: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any, TextIO, TypeVar
 
 import numpy as np
 from digiclay.commands.progress import Line, draw_share, table
-from digiclay.core.base.errors import OutputError
+from digiclay.core.base.errors import explain_os_error
 from digiclay.plots.figure import LINES, empty, save
 
 from digiclay_study.suite_page import describe_machine
@@ -121,14 +121,12 @@ class Report:
         writer = csv.DictWriter(figures, list(self.rows[0]) if self.rows else [], lineterminator="\n")
         writer.writeheader()
         writer.writerows(self.rows)
-        try:
+        with explain_os_error(f"Cannot write into {out}"):
             out.mkdir(parents=True, exist_ok=True)
             (out / f"{name}.md").write_text(
                 f"# python -m benchmarks {name}\n\n```\n{text}\n```\n", encoding="utf-8"
             )
             (out / f"{name}.csv").write_text(figures.getvalue(), encoding="utf-8")
-        except OSError as error:
-            raise OutputError(f"Cannot write into {out}: {error.strerror or error}.") from None
         if self.draw:
             size = self.draw.size if isinstance(self.draw, Curves) else self.size
             with empty(*size, STYLE, layout="constrained") as figure:

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
-from ..core.base.errors import DigiclayError
+from ..core.base.errors import DigiclayError, explain_os_error
 from ..core.studies.series import describe_error
 
 #: Seconds that processes get to stop by themselves.
@@ -74,13 +74,11 @@ class Process:
         command, environment = find_program(module)
         # A group of its own: Ctrl-C on a terminal is for the process that started it.
         apart: dict[str, Any] = {"creationflags": 0x200} if os.name == "nt" else {"start_new_session": True}
-        try:
+        with explain_os_error("A process cannot be started", DigiclayError):
             self.process = subprocess.Popen(
                 [*command, *arguments], stdin=subprocess.PIPE, env={**os.environ, **environment},
                 **streams, **apart,
             )  # fmt: skip
-        except OSError as error:
-            raise DigiclayError(f"A process cannot be started: {error.strerror or error}.") from None
         assert self.process.stdin is not None
         self.input = self.process.stdin
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..compat import PACKAGE, bpy
-from ..core.base.errors import OutputError
+from ..core.base.errors import OutputError, explain_os_error
 from ..core.files.run_folder import write_whole
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS, format_scene
@@ -44,10 +44,8 @@ def path(name: str) -> Path:
 def save(name: str, scene: Scene) -> Path:
     """Save a scene as a preset, in place of one of the same name."""
     file = path(name)
-    try:
+    with explain_os_error(f"Cannot write {file}"):
         file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"Cannot write {file}: {error.strerror or error}.") from None
     write_whole(file, format_scene(scene).encode())
     return file
 
@@ -55,7 +53,5 @@ def save(name: str, scene: Scene) -> Path:
 def remove(name: str) -> None:
     """Remove a preset. Raises OutputError when there is none, or its file cannot be removed."""
     file = path(name)
-    try:
+    with explain_os_error(f"Cannot remove {file}"):
         file.unlink()
-    except OSError as error:
-        raise OutputError(f"Cannot remove {file}: {error.strerror or error}.") from None

@@ -1,5 +1,8 @@
 """Errors with a message of one line: owner, field, rule and value."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 #: Characters of a line that are shown: its beginning, which says what is wrong, and its end, which helps.
 BEGINNING, END = 300, 160
 
@@ -39,6 +42,15 @@ class MethodError(DigiclayError):
 
 class OutputError(DigiclayError):
     """Result that cannot be written, or run folder that cannot be read."""
+
+
+@contextmanager
+def explain_os_error(rule: str, kind: type[DigiclayError] = OutputError) -> Iterator[None]:
+    """Raise an error of the system within the block as one of ours: the rule, and why."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{rule}: {error.strerror or error}.") from None
 
 
 class BusyError(OutputError):

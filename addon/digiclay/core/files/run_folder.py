@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..base.errors import OutputError, SceneError
+from ..base.errors import OutputError, SceneError, explain_os_error
 from ..base.quantity import find_nearest_name
 from .file_lock import find_host, hold_lock, may_have_made
 
@@ -156,10 +156,8 @@ RUN = Content("run", (MARK,))
 
 def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
     """Refuse an output folder that is neither empty nor, with `overwrite`, known by its content."""
-    try:
+    with explain_os_error(f"{out} cannot be read"):
         filled = out.exists() and (not out.is_dir() or any(out.iterdir()))
-    except OSError as error:
-        raise OutputError(f"{out} cannot be read: {error.strerror or error}.") from None
     if filled and not out.is_dir():
         raise OutputError(f"{out} is a file: choose another folder with --out.")
     if filled and not content.find(out):
@@ -187,10 +185,8 @@ def resolve_inside(folder: Path, *parts: str) -> Path:
 
 def make_folder(path: Path) -> Path:
     """Make a folder and those above it, where there are none; OutputError if it cannot be made."""
-    try:
+    with explain_os_error(f"{path} cannot be made"):
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be made: {error.strerror or error}.") from None
     return path
 
 
@@ -247,10 +243,8 @@ def claim_folder(
     target = out.resolve()
     with ExitStack() as until_the_end:
         until_the_end.enter_context(remove_if_empty(target))
-        try:
+        with explain_os_error(f"{out} cannot be made"):
             until_the_end.enter_context(lock_name(out, patience))
-        except OSError as error:
-            raise OutputError(f"{out} cannot be made: {error.strerror or error}.") from None
         remove_abandoned(target.parent, target.name)
         check_folder(out, overwrite=overwrite, content=content)  # another process may just have ended
         yield Claim(out, overwrite)

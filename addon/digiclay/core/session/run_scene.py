@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import OutputError
+from ..base.errors import explain_os_error
 from ..engine.simulation import begin, periods
 from ..engine.system import System
 from ..metrics.metric_table import ERRORS, METRICS, RUN
@@ -228,11 +228,9 @@ def run(
 
 def save(result: Result, folder: Path) -> None:
     """Write scene.toml, history.npz and metrics.json into a folder; OutputError when that fails."""
-    try:
+    with explain_os_error(f"Cannot write into {folder}"):
         (folder / "scene.toml").write_text(format_scene(result.scene), encoding="utf-8")
         if result.history:
             write(result.history, folder / "history.npz")
         metrics = json.dumps(result.metrics, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(metrics + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"Cannot write into {folder}: {error.strerror or error}.") from None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..base.errors import DigiclayError, OutputError, one_line
+from ..base.errors import DigiclayError, OutputError, explain_os_error, one_line
 from ..files.file_lock import hold_lock
 from ..files.run_folder import (
     describe_claim,
@@ -55,20 +55,17 @@ def open_series(
     A description that cannot be read counts as none where nothing has been done: the disk was full.
     """
     with ExitStack() as until_the_end:
-        with ExitStack() as while_it_is_made:
-            try:
-                _make_folder(path, kind, while_it_is_made, until_the_end)
-                there = read_json(path / kind.mark)
-                if refuse_another is not None and (there is not None or not _is_bare(path, kind)):
-                    refuse_another(there)
-                if there != description:
-                    write_whole(path / kind.mark, format_json(description))
-                for name in kind.folders:
-                    resolve_inside(path, name).mkdir(exist_ok=True)
-                    remove_abandoned(path / name)
-                remove_abandoned(path)
-            except OSError as error:
-                raise OutputError(f"{path} cannot be used: {error.strerror or error}.") from None
+        with ExitStack() as while_it_is_made, explain_os_error(f"{path} cannot be used"):
+            _make_folder(path, kind, while_it_is_made, until_the_end)
+            there = read_json(path / kind.mark)
+            if refuse_another is not None and (there is not None or not _is_bare(path, kind)):
+                refuse_another(there)
+            if there != description:
+                write_whole(path / kind.mark, format_json(description))
+            for name in kind.folders:
+                resolve_inside(path, name).mkdir(exist_ok=True)
+                remove_abandoned(path / name)
+            remove_abandoned(path)
         yield
 
 
