@@ -156,15 +156,15 @@ def _without_prediction(control: HybridControl) -> HybridControl:
 
 
 def _without_residuals(control: HybridControl) -> HybridControl:
-    def correct(*arguments: Any) -> tuple[Estimate, Floats]:
-        estimate, residuals = control.finger.correct(*arguments)
-        return estimate, np.zeros_like(residuals)
+    def correct(*arguments: Any) -> tuple[list[Estimate], Floats]:
+        estimates, residuals = control.finger.correct(*arguments)
+        return estimates, np.zeros_like(residuals)
 
     return replace(control, finger=_override(control.finger, correct=correct))
 
 
 def _without_lead(control: HybridControl) -> HybridControl:
-    def find_drop(distance: Floats, ahead: Floats, speed: float, *, raised: bool) -> Floats:
+    def find_drop(distance: Floats, *_: Any) -> Floats:
         return np.where(distance > control.profile.level, np.inf, 0.0)
 
     unled = _override(control.profile, find_reach=lambda height, speed: 0.0, find_drop=find_drop)

@@ -45,8 +45,8 @@ def follow(
         found = known.predict(found)
         under = underside(tip, speed * number * PERIOD - 10e-3, 1e-3, 40e-3, turn)
         here = under < 42e-3
-        at = known.measure(found.mean, make_basis(X, Y)[:, here])
-        found, _ = known.correct(found, at, under[here], np.full(np.count_nonzero(here), 1e-10))
+        at = known.measure([found.mean], make_basis(X, Y)[:, here])
+        (found,), _ = known.correct([found], at, under[here], np.full(np.count_nonzero(here), 1e-10))
     return found
 
 
@@ -74,8 +74,8 @@ def test_a_first_contact_is_uncertain_by_millimeters_and_a_first_underside_is_we
     spread = np.sqrt(np.diag(first.covariance))
     assert spread == pytest.approx([2e-3, 2e-3, 1e-3, 2e-2, 2e-2, 2e-2, 0.1, 0.2, 0.2])
     # Over the lowest point, and as uncertain as that: half of the error is believed.
-    at = known.measure(first.mean, make_basis(np.zeros(1), np.zeros(1)))
-    after, left = known.correct(first, at, np.array([40.4e-3]), np.array([1e-6]))
+    at = known.measure([first.mean], make_basis(np.zeros(1), np.zeros(1)))
+    (after,), left = known.correct([first], at, np.array([40.4e-3]), np.array([1e-6]))
     assert (after.mean[2], left[0]) == pytest.approx((40.2e-3, 0.2e-3))
 
 
@@ -94,10 +94,10 @@ def test_the_errors_left_are_those_of_the_corrected_fingertip() -> None:
     found.mean[7] = LONG
     under = underside(Fingertip(), 0.0, 0.0, 40e-3, 0.0)
     here = under < 42e-3
-    found, left = known.correct(
-        found, known.measure(found.mean, basis[:, here]), under[here], np.full(here.sum(), 1e-10)
+    (found,), left = known.correct(
+        [found], known.measure([found.mean], basis[:, here]), under[here], np.full(here.sum(), 1e-10)
     )
-    again = under[here] - known.measure(found.mean, basis[:, here]).under
+    again = under[here] - known.measure([found.mean], basis[:, here]).under
     # They are the slopes' prediction: right but for the curvature over 0.2 mm, 2.5 µm at a radius of 8 mm.
     assert left == pytest.approx(again, abs=5e-6)
 
@@ -105,7 +105,7 @@ def test_the_errors_left_are_those_of_the_corrected_fingertip() -> None:
 def test_the_underside_at_another_place_is_that_of_the_physics() -> None:
     known = filter_of(Fingertip())
     shape = Estimate(np.array([*(0.0,) * 7, LONG * math.cos(0.8), LONG * math.sin(0.8)]), np.eye(9))
-    found = known.find_underside((1e-3, 2e-3, 40e-3), shape, make_basis(X, Y))
+    found = known.find_underside([(1e-3, 2e-3, 40e-3)], [shape], make_basis(X, Y))
     true = underside(Fingertip(), 1e-3, 2e-3, 40e-3, 0.4)
     assert found == pytest.approx(true, abs=1e-15)
 
@@ -113,12 +113,13 @@ def test_the_underside_at_another_place_is_that_of_the_physics() -> None:
 def test_slopes_are_differences_of_the_underside() -> None:
     known, basis = filter_of(Fingertip()), make_basis(X, Y)
     mean = np.array([0.5e-3, -0.3e-3, 40e-3, 0.0, 0.0, 0.0, 0.02, 0.2, 0.1])
-    at = known.measure(mean, basis)
+    at = known.measure([mean], basis)
     near = at.under < 45e-3
     for row, place in enumerate((6, 0, 1, 7, 8, 2)):
         step = np.zeros(9)
         step[place] = 1e-5
-        slope = (known.measure(mean + step, basis).under - known.measure(mean - step, basis).under) / 2e-5
+        before, after = (known.measure([mean + own], basis).under for own in (-step, step))
+        slope = (after - before) / 2e-5
         assert at.slopes[row][near] == pytest.approx(slope[near], rel=1e-4, abs=1e-6)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from digiclay.core.control.blister import Blister, BlisterRule
 from digiclay.core.control.led_blister import Follower, LeadProfile, LedBlister
-from digiclay.core.control.pulp_estimate import PulpEstimate, Reach, find_top
+from digiclay.core.control.pulp_estimate import PulpEstimate, Reach, find_tops
 from digiclay.core.control.virtual_master import Phase
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.fingertip import Fingertip
@@ -114,7 +114,7 @@ def test_the_forces_at_the_top_add_up_to_what_is_wanted(wanted, guess, low, high
     reach = Reach(
         40e-3, True, np.ones(9), np.full(9, np.inf), ends
     )  # of cells of one part, on a bed at 40 mm
-    height, total = find_top(wanted, guess, reach, UNDER, np.zeros(9), PULP)
+    ((height, total),) = find_tops([wanted], [guess], reach, UNDER, np.zeros(9), PULP)
     assert top is None or height == top
     assert force is None or PULP.predict_force(height - UNDER, np.zeros(9)).sum() == force
     assert force is None or total == pytest.approx(wanted)
@@ -148,7 +148,8 @@ SKIRT = LeadProfile(level=7.5e-3, rise=20e-3, fall=20e-3, skirt=40e-3)
     ],
 )
 def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(profile, distance, ahead, speed, drop):
-    found = profile.find_drop(np.array([distance]), np.array([ahead]), speed, raised=True)
+    slopes = profile.find_slopes(speed, raised=True)
+    found = profile.find_drop(np.array([distance]), np.array([ahead]), *slopes)
     assert found == pytest.approx([drop])
 
 

@@ -18,9 +18,12 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..model.fingertip import LEVEL, Fingertip, compute_forms, join_surfaces
+from .finger_sections import WHOLE, Whole
 
 #: Coefficients of 1, x, y, x², x y, y².
 Form = tuple[float, float, float, float, float, float]
+#: Lowest point of a fingertip, m.
+Aim = tuple[float, float, float]
 
 
 class Place(NamedTuple):
@@ -166,11 +169,17 @@ class FingerFilter:
         noise[7, 7] = noise[8, 8] = (2.0 * spread.turn * max(elongation, LEAST)) ** 2 * time
         return step, noise
 
-    def correct(self, guess: Estimate, at: Slopes, seen: Floats, variance: Floats) -> tuple[Estimate, Floats]:
-        """Return the estimate after undersides (m,), m, with variances (m,), m², and the errors left, m."""
-        slopes = at.slopes
+    def correct(
+        self, guesses: list[Estimate], at: Slopes, seen: Floats, variance: Floats, sections: Whole = WHOLE
+    ) -> tuple[list[Estimate], Floats]:
+        """Return the estimates after undersides (m,), m, with variances (m,), m², and the errors left, m."""
         error = seen - at.under
-        weighted = slopes / variance
+        weighted = at.slopes / variance
+        parts = map(sections.cut, (at.slopes, weighted, error))
+        return [self._update(*own) for own in zip(guesses, *parts, strict=True)], error
+
+    def _update(self, guess: Estimate, slopes: Floats, weighted: Floats, error: Floats) -> Estimate:
+        """Return the estimate of one finger after errors (m,), m, of which in place those left remain."""
         weight = weighted.dot(slopes.T)
         wide = guess.covariance.take(SEEN, 0)
         spread = weight.dot(wide)
@@ -185,23 +194,28 @@ class FingerFilter:
         longest = math.hypot(along, askew)
         if longest > LONGEST:
             mean[7:] *= LONGEST / longest
-        return Estimate(mean, 0.5 * (covariance + covariance.T)), error
+        return Estimate(mean, 0.5 * (covariance + covariance.T))
 
-    def measure(self, mean: Floats, basis: Floats) -> Slopes:
-        """Return the undersides of a fingertip of an estimated state, (9,), over cells, with their slopes."""
-        x, y, z, _, _, _, *shape = mean.tolist()
-        place = Place(x, y, z, *shape)
-        profile = self._profile.resize(place.size)
-        radius = _find_radius(profile, place)
+    def measure(self, means: list[Floats], basis: Floats, sections: Whole = WHOLE) -> Slopes:
+        """Return the undersides of fingertips of estimated states, (9,), over cells, with their slopes."""
+        forms, numbers = [], []
+        for mean in means:
+            x, y, z, _, _, _, *shape = mean.tolist()
+            place = Place(x, y, z, *shape)
+            profile = self._profile.resize(place.size)
+            radius = _find_radius(profile, place)
+            forms.append((*_list_surfaces(profile, place, radius), *_list_slopes(profile, place, radius)))
+            _, slope, bend, _, least, root = profile
+            numbers.append((least, root, bend * root, slope - bend, z))
+        least, root, product, rest, z = sections.spread(numbers)
         rows = np.empty((8, basis.shape[1]))
-        forms = (*_list_surfaces(profile, place, radius), *_list_slopes(profile, place, radius))
-        np.array(forms).dot(basis, out=rows[:7])
+        sections.multiply(forms, basis, rows[:7])
         under, tangent, slopes = rows[0], rows[1], rows[2:]
-        bend = np.sqrt(np.maximum(under, profile.least))
-        join_surfaces(under, tangent, profile.least, profile.root)
+        bend = np.sqrt(np.maximum(under, least))
+        join_surfaces(under, tangent, least, root)
         # h'(q) of each cell: what the slopes of q are to be multiplied with.
-        np.divide(profile.bend * profile.root, bend, out=bend)
-        bend += profile.slope - profile.bend
+        np.divide(product, bend, out=bend)
+        bend += rest
         by_form, by_size = slopes[:5], slopes[0]
         by_form *= bend
         # With the size h grows, while q shrinks.
@@ -210,13 +224,18 @@ class FingerFilter:
         slopes[5] = 1.0
         return Slopes(under, slopes)
 
-    def find_underside(self, aim: tuple[float, float, float], like: Estimate, basis: Floats) -> Floats:
-        """Return the underside over cells, (m,), m, of a fingertip like the estimated one at a place, m."""
-        place = Place(*aim, *like.mean.tolist()[6:])
-        profile = self._profile.resize(place.size)
-        surfaces = _list_surfaces(profile, place, _find_radius(profile, place))
-        inner, tangent = np.array(surfaces).dot(basis)
-        return join_surfaces(inner, tangent, profile.least, profile.root)
+    def find_underside(
+        self, aims: list[Aim], like: list[Estimate], basis: Floats, sections: Whole = WHOLE
+    ) -> Floats:
+        """Return the undersides over cells, (m,), m, of fingertips like the estimated ones at places, m."""
+        surfaces, numbers = [], []
+        for aim, estimate in zip(aims, like, strict=True):
+            place = Place(*aim, *estimate.mean.tolist()[6:])
+            profile = self._profile.resize(place.size)
+            surfaces.append(_list_surfaces(profile, place, _find_radius(profile, place)))
+            numbers.append((profile.least, profile.root))
+        inner, tangent = sections.multiply(surfaces, basis)
+        return join_surfaces(inner, tangent, *sections.spread(numbers))
 
     @cached_property
     def _profile(self) -> _Profile:

@@ -9,6 +9,7 @@ ground.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -19,6 +20,7 @@ from ..base.arrays import Cells, Flags, Floats, find_copies
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.fingertip import JOIN
 from ..model.layout import RELATIVE_TOLERANCE, Disc
+from .finger_sections import Sections, Whole
 
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
 CAPTURE = 1.2
@@ -54,19 +56,18 @@ class Columns:
             1.0 + RELATIVE_TOLERANCE
         )
         left = np.array_split(np.flatnonzero(~inside.any(axis=0)), len(inside))
-        self.cells = [
-            np.concatenate([own.nonzero()[0], more]) for own, more in zip(inside, left, strict=True)
-        ]
-        self.flat = np.concatenate(self.cells)
-        self.finger = np.repeat(np.arange(len(self.cells)), [own.size for own in self.cells])
+        for own, more in zip(inside, left, strict=True):
+            own[more] = True
+        self.inside = inside
+        self.finger, self.flat = inside.nonzero()
         self.double, self.copies = find_copies(self.flat)
         self._places = basis
 
     @cached_property
     def padded(self) -> tuple[Flags, Cells, Floats]:
         """The columns side by side, (w, f): which entries are cells; the cells; their basis, (6, w, f)."""
-        sizes = [own.size for own in self.cells]
-        present = np.arange(max(sizes))[:, None] < sizes
+        sizes = np.count_nonzero(self.inside, axis=1)
+        present = np.arange(sizes.max())[:, None] < sizes
         cells = np.zeros(present.shape, np.intp)
         cells.T[present.T] = self.flat
         basis = self._places[:, cells]
@@ -223,11 +224,6 @@ class HandControl:
         """The last columns, and the basis they are of; keeping them changes no command."""
         return {}
 
-    def own_rows(self, finger: int) -> slice:
-        """Return the rows of a cell that a finger's controller owns."""
-        count = int(self.runs[0].rows)
-        return slice(finger * count, (finger + 1) * count)
-
 
 @dataclass(frozen=True, eq=False)
 class HandTogether(HandControl):
@@ -277,39 +273,78 @@ class HandTogether(HandControl):
 
 
 @dataclass(frozen=True, eq=False)
-class HandOneByOne(HandControl):
-    """Controller of several fingers, for any other method."""
+class HandInGroups(HandControl):
+    """Controller of several fingers, for other methods; those `sort`ed alike are served together, if any."""
 
     def locate_each(
         self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see its column without the cells of the others, and what it presses elsewhere."""
-        columns, located = self.arrange("touched", touched) if touched.discs is not None else None, []
-        for finger, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
-            cells = pressed[owner[pressed] == finger]
-            if columns and own.place:
-                around = columns.cells[finger]
-                around = around[(owner[around] == finger) | (owner[around] == NOBODY)]
-                cells = np.union1d(around, cells) if pressed.size else around
-            part = take_part(touched, cells, self.own_rows(finger))
-            located.append(run.locate(own, part))
-            touched.own[self.own_rows(finger), cells] = part.own
-        return located
+        fingers = np.arange(len(self.runs))[:, None]
+        seen = np.zeros((len(self.runs), owner.size), np.bool_)
+        if touched.discs is not None:
+            followed = np.array([own.place is not None for own in memory])[:, None]
+            free = (owner == NOBODY) | (owner == fingers)
+            seen = self.arrange("touched", touched).inside & free & followed
+        seen[:, pressed] |= owner[pressed] == fingers
+        located: dict[int, tuple[Any, Disc | None]] = {}
+        finger, cells = seen.nonzero()
+        for group, _, part, sections in self._divide(memory, touched, touched.force[cells], finger, cells):
+            run, own = self.runs[group[0]], [memory[i] for i in group]
+            if len(group) == 1:
+                located[group[0]] = run.locate(*own, part)
+            else:
+                located |= zip(group, zip(*run.locate_all(own, part, sections), strict=True), strict=True)
+        return [located[i] for i in range(len(memory))]
 
     def command_each(
         self, memory: tuple[Any, ...], seen: Measurement, owner: Cells, columns: Columns
     ) -> tuple[list[Any], Commands]:
         """Let each command its column, without the forces on cells of the others."""
-        given, fingers = [], []
-        for finger, (run, own, cells) in enumerate(zip(self.runs, memory, columns.cells, strict=True)):
-            part = take_part(seen, cells, self.own_rows(finger))
-            theirs = (owner[cells] != finger) & (owner[cells] != NOBODY)
-            part = part._replace(force=np.where(theirs, 0.0, part.force))
-            after, orders = run.command(own, part)
-            seen.own[self.own_rows(finger), cells] = part.own
-            fingers.append(after)
-            given.append(orders)
-        return fingers, Commands(*map(np.concatenate, zip(*given, strict=True)))
+        finger, cells = columns.finger, columns.flat
+        theirs = (owner[cells] != finger) & (owner[cells] != NOBODY)
+        force = np.where(theirs, 0.0, seen.force[cells])
+        fingers = list(memory)
+        given = Commands(np.empty(cells.size), np.empty(cells.size, np.int8), np.empty(cells.size))
+        for group, chosen, part, sections in self._divide(memory, seen, force, finger, cells):
+            run, own = self.runs[group[0]], [memory[i] for i in group]
+            if len(group) == 1:
+                fingers[group[0]], orders = run.command(*own, part)
+            else:
+                after, orders = run.command_all(own, part, sections)
+                for i, one in zip(group, after, strict=True):
+                    fingers[i] = one
+            given.target[chosen], given.mode[chosen], given.command[chosen] = orders
+        return fingers, given
+
+    def _divide(
+        self, memory: tuple[Any, ...], seen: Measurement, force: Floats, finger: Cells, cells: Cells
+    ) -> Iterator[tuple[list[int], Any, Measurement, Whole]]:
+        """Give fingers that are served together, which of the cells are theirs, and what is measured there.
+
+        `cells` (m,), those of each `finger` one after the other, with the `force` shown of each. What changes
+        of the controllers' rows is kept as soon as the next fingers are asked for.
+        """
+        counts, rows = np.bincount(finger, minlength=len(self.runs)), int(self.runs[0].rows)
+        groups: dict[Any, list[int]] = {}
+        for i, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
+            alike = run.sort(own) if counts[i] and hasattr(run, "sort") else None
+            groups.setdefault(i if alike is None else (run, alike), []).append(i)
+        places = np.arange(rows)[:, None] + rows * finger
+        for group in groups.values():
+            chosen: Any = slice(None) if len(group) == len(memory) else np.isin(finger, group)
+            at, own = cells[chosen], places[:, chosen]
+            part = Measurement(
+                seen.quadratic_basis.take(at, 1),
+                seen.height[at],
+                force[chosen],
+                seen.target[at],
+                seen.mode[at],
+                seen.own[own, at],
+                seen.cells[at],
+            )
+            yield group, chosen, part, Sections(counts[group].tolist())
+            seen.own[own, at] = part.own
 
 
 def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float]:
@@ -318,19 +353,6 @@ def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float]:
     # That of a method without a master reaches from the pressed cells on.
     radius = run.blister.radius + getattr(run.parameters, "jump", 0.0)
     return x, y, radius if memory.place else -1.0, memory.edge
-
-
-def take_part(seen: Measurement, cells: Cells, own: slice) -> Measurement:
-    """Return what is measured of some cells, with the rows of one finger's controller."""
-    return Measurement(
-        np.ascontiguousarray(seen.quadratic_basis[:, cells]),
-        seen.height[cells],
-        seen.force[cells],
-        seen.target[cells],
-        seen.mode[cells],
-        seen.own[own][:, cells],
-        seen.cells[cells],
-    )
 
 
 def follows_finger(controller: Controller) -> bool:

@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.arrays import Constants, Floats
 from ..base.quantity import quantity
@@ -28,13 +27,14 @@ from ..model.null_parts import Unrelaxed
 from ..model.touch import Touch
 from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor
-from .finger_estimate import Estimate, FingerFilter, Spread
+from .finger_estimate import Aim, FingerFilter, Spread
+from .finger_observer import AWAY, EVERY, OWN_ROWS, FingerObserver, OwnRows, list_rows
+from .finger_sections import WHOLE, Whole
 from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
 from .methods import ControlParameters, Pace
-from .pulp_estimate import PulpEstimate, Reach, find_top, lead_heights
+from .pulp_estimate import PulpEstimate, Reach, find_tops, lead_heights
 from .servo import declare_again, mark_formed
-from .travel import Heading, update_heading
 from .virtual_master import HEAVIEST, Master, Phase, VirtualMaster, VirtualMasterControl
 from .virtual_master import build as build_master
 
@@ -104,36 +104,8 @@ class Hybrid(ControlParameters):
 
 #: Fastest drag, in radii of the blister a second, and as a share of the skirt's speed.
 RADII, SKIRT = 14.0, 0.6
-#: Rows of a cell but for its filters and commanded speeds.
-OWN_ROWS = 6
-
-
-class OwnRows(NamedTuple):
-    """Numbers of a cell's state rows."""
-
-    pulp: slice
-    tension: int
-    """Relaxation of the pulp over it with its tension, N, and that tension."""
-    coming: int
-    later: int
-    residual: int
-    """Predicted undersides a period and two from now, m; what the last fit left of the measured one, or 0."""
-    lead: int
-    """How far its commanded height is from the one it will be left at, m."""
-    stamp: int
-    speeds: slice
-    """Period in which its pulp was last observed, 0: never; commanded speeds, the newest first, m/s."""
-
-
 #: Share of the set point within which the trim learns; it is at most as large.
 LEARNED = 0.5
-#: While the force is within this share of the set point, and the fingertip no faster than this, m/s, it is
-#: fitted and the top solved for in one of so many periods; in the others the top goes along with it.
-NEAR, SLOW, EVERY = 0.02, 20e-3, 2
-#: How far a touched cell may be from the predicted fingertip, in semi-axes: beyond is a new touch.
-JUMP = 1.5
-#: Underside where none is predicted, m.
-AWAY = 1.0
 #: Share of the set point by which the forces predicted may be off, rms over that many control periods: beyond
 #: it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has 0.28.
 DOUBTED, PERIODS = 0.4, 20.0
@@ -169,9 +141,16 @@ class HybridControl:
     """Method I, for a fingertip that the model does not predict."""
 
     @cached_property
-    def farthest(self) -> float:
-        """Distance from the predicted place beyond which a touch is a new one, m."""
-        return JUMP * max(self.finger.fingertip.length, self.finger.fingertip.width)
+    def _at(self) -> OwnRows:
+        """Numbers of a cell's rows."""
+        return list_rows(self.pulp.filters)
+
+    @cached_property
+    def _observer(self) -> FingerObserver:
+        """Observer of the fingertips."""
+        gains, loss = self.parameters, self.substitute.loss
+        known = self._at, self.pulp, self.finger, self.felt, self.noise, loss, self._unknown
+        return FingerObserver(*known, gains.force_setpoint, gains.travel)
 
     @cached_property
     def _unknown(self) -> tuple[float, ...]:
@@ -191,12 +170,6 @@ class HybridControl:
         actuator = self.device.cell.actuator
         return Constants((actuator.rest_height, self.parameters.dead_band, 0.0, actuator.stroke))
 
-    @cached_property
-    def _at(self) -> OwnRows:
-        """Numbers of a cell's rows."""
-        k = self.pulp.filters
-        return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
-
     @property
     def rows(self) -> int:
         """State rows a cell needs."""
@@ -214,13 +187,38 @@ class HybridControl:
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the fingertip; see `Controller`."""
-        if memory.master.phase is not Phase.IDLE:
-            return self._substitute(memory, touched)
-        idle, period = memory.phase is Phase.IDLE, memory.period + 1
-        estimate = memory.estimate if idle else self.finger.predict(memory.estimate)
-        memory = memory._replace(period=period, estimate=estimate)
-        memory = self._observe(memory, touched) if touched.force.size else self.substitute.loss.wait(memory)
-        return memory, self._surface.find_disc(memory)
+        (memory,), (disc,) = self.locate_all([memory], touched)
+        return memory, disc
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Form the blister, and drive all pins to their heights; see `Controller`."""
+        (memory,), commands = self.command_all([memory], seen)
+        return memory, commands
+
+    def sort(self, memory: Follower) -> Phase | None:
+        """Return what is the same for all fingers that are served together; None: one is served alone."""
+        return memory.phase if memory.master.phase is Phase.IDLE else None
+
+    def locate_all(
+        self, memories: list[Follower], touched: Measurement, sections: Whole = WHOLE
+    ) -> tuple[list[Follower], list[Any]]:
+        """Observe the pulp, and fit the fingertips, which are sorted alike; see `Controller.locate`."""
+        if memories[0].master.phase is not Phase.IDLE:
+            memory, disc = self._substitute(memories[0], touched)
+            return [memory], [disc]
+        predict = self.finger.predict
+        memories = [
+            own._replace(
+                period=own.period + 1,
+                estimate=own.estimate if own.phase is Phase.IDLE else predict(own.estimate),
+            )
+            for own in memories
+        ]
+        if touched.force.size:
+            memories = self._observer.observe(memories, touched, sections)
+        else:
+            memories = list(map(self.substitute.loss.wait, memories))
+        return memories, list(map(self._surface.find_disc, memories))
 
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
         """Let Method I follow the fingertip; the next one is predicted again."""
@@ -231,111 +229,36 @@ class HybridControl:
         period, phase, losses = memory.period + 1, master.phase, master.losses
         return memory._replace(period=period, phase=phase, losses=losses, master=master), disc
 
-    def _observe(self, memory: Follower, touched: Measurement) -> Follower:
-        """Observe the pulp of the cells the fingertip may touch, and follow or find it."""
-        at, own, force = self._at, touched.own, touched.force
-        late = (memory.period - 1.0) - own[at.stamp]
-        if np.count_nonzero(late):
-            self.pulp.age(own[at.pulp], late * (own[at.stamp] > 0.0))
-            np.putmask(own[at.later], late, AWAY)
-            np.putmask(own[at.coming], late, AWAY)
-        own[at.stamp] = memory.period
-        (felt,) = (force > self.felt).nonzero()
-        if memory.phase is Phase.IDLE:
-            self.pulp.observe(own[at.pulp], force, np.zeros(force.size))
-            own[at.coming] = own[at.later] = AWAY
-            return self._find(memory, touched, felt) if felt.size else memory
-        expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
-        (here,) = self.pulp.observe(own[at.pulp], force, expected).nonzero()
-        own[at.coming] = own[at.later]
-        # Forces under the predicted fingertip are felt where they are more than their noise together.
-        if not felt.size and not float(np.add.reduce(force.take(here))) > self.felt * math.sqrt(here.size):
-            own[at.residual] = 0.0
-            waiting: Follower = self.substitute.loss.wait(memory)
-            return waiting
-        if memory.period % EVERY and self._holds(memory, float(np.add.reduce(force))):
-            return memory if not memory.alone else memory._replace(alone=0)
-        own[at.residual] = 0.0
-        if felt.size and self._has_jumped(memory.estimate, touched.quadratic_basis[1:3, felt]):
-            return self._find(memory._replace(losses=memory.losses + 1), touched, felt)
-        return self._fit(memory, touched, here, touched.quadratic_basis.take(here, 1))
-
-    def _holds(self, memory: Follower, force: float) -> bool:
-        """Tell whether a fingertip is slow, and a total force, N, near the set point: then less is solved."""
-        _, _, _, vx, vy, vz, *_ = memory.estimate.mean.tolist()
-        error = abs(force - self.parameters.force_setpoint)
-        return error <= NEAR * self.parameters.force_setpoint and math.hypot(vx, vy, vz) <= SLOW
-
     def predict_under(self, memory: Follower, basis: Floats) -> Floats:
         """Return the underside over cells, (m,), m, of a fingertip that is followed."""
         x, y, z, *_ = memory.estimate.mean.tolist()
         if memory.master.phase is not Phase.IDLE:
             x, y, z = memory.master.x, memory.master.y, memory.master.height
-        return self.finger.find_underside((x, y, z), memory.estimate, basis)
+        return self.finger.find_underside([(x, y, z)], [memory.estimate], basis)
 
-    def _has_jumped(self, guess: Estimate, position: Floats) -> bool:
-        """Tell whether no touched cell, at (2, m), m, is where the fingertip can be."""
-        place, (x, y) = guess.mean.tolist()[:2], position.tolist()
-        return not any(math.dist(place, cell) <= self.farthest for cell in zip(x, y, strict=True))
-
-    def _find(self, memory: Follower, touched: Measurement, here: NDArray[np.intp]) -> Follower:
-        """Begin to follow a fingertip that has touched: at the centroid of its forces (equation 13)."""
-        force, basis = touched.force.take(here), touched.quadratic_basis.take(here, 1)
-        under, _ = self.pulp.find_underside(
-            touched.height.take(here), touched.own[self._at.tension].take(here), self.noise
-        )
-        rows = np.vstack((basis[:3], under, touched.height.take(here)))
-        total, x, y, z, height = rows.dot(force).tolist()
-        x, y, height = x / total, y / total, height / total
-        memory = Follower(
-            Phase.SHAPING,
-            memory.period,
-            self.finger.begin(x, y, z / total),
-            height,
-            height,
-            Heading(x, y),
-            felt=height,
-            losses=memory.losses,
-            due=self._unknown,
-        )
-        return self._fit(memory, touched, here, basis)
-
-    def _fit(self, memory: Follower, touched: Measurement, here: NDArray[np.intp], basis: Floats) -> Follower:
-        """Fit the fingertip to the undersides over the touched cells, whose basis is given."""
-        seen, noise = self.pulp.find_underside(
-            touched.height.take(here), touched.own[self._at.tension].take(here), self.noise
-        )
-        noise *= noise
-        noise += self.finger.spread.underside**2
-        at = self.finger.measure(memory.estimate.mean, basis)
-        estimate, left = self.finger.correct(memory.estimate, at, seen, noise)
-        x, y, *_ = estimate.mean.tolist()
-        if not math.dist((x, y), memory.estimate.mean.tolist()[:2]) <= self.farthest:
-            # No fingertip is that quick: these undersides are not its own.
-            return memory._replace(alone=0)
-        touched.own[self._at.residual, here] = left
-        heading = update_heading(memory.heading, x, y, self.parameters.travel)
-        return memory._replace(estimate=estimate, heading=heading, alone=0)
-
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Form the blister, and drive all pins to their heights; see `Controller`."""
+    def command_all(
+        self, memories: list[Follower], seen: Measurement, sections: Whole = WHOLE
+    ) -> tuple[list[Follower], Commands]:
+        """Form the blisters of fingers that are sorted alike, and drive all pins to their heights."""
         lead, speeds = seen.own[self._at.lead], seen.own[self._at.speeds]
-        if memory.master.phase is not Phase.IDLE:
+        if memories[0].master.phase is not Phase.IDLE:
             unled = seen._replace(target=seen.target - lead)
             lead[:] = speeds[:] = 0.0
-            master, commands = self.substitute.command(memory.master, unled)
-            return memory._replace(master=master, led_radius=0.0), commands
+            master, commands = self.substitute.command(memories[0].master, unled)
+            return [memories[0]._replace(master=master, led_radius=0.0)], commands
         coasting = Coasting(self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds))
         left = seen.target - lead
         rest, band, lowest, highest = self._limits[left.shape]
         mode, target = mark_formed(left, rest, band), left
-        if memory.phase is Phase.IDLE:
-            memory = memory._replace(led_radius=0.0)
+        if memories[0].phase is Phase.IDLE:
+            memories = [memory._replace(led_radius=0.0) for memory in memories]
         else:
-            region = self._surface.survey(memory, seen.quadratic_basis, left)
-            memory = self._follow_force(memory._replace(edge=region.edge), seen, region, coasting)
-            left = self._surface.leave(memory, seen, left, region.cells, mode)
-            target = lead_heights(left, memory.top, region.drop, raised=region.raised)
+            region = self._surface.survey(memories, seen.quadratic_basis, left, sections)
+            memories = [own._replace(edge=edge) for own, edge in zip(memories, region.edges, strict=True)]
+            memories = self._follow_force(memories, seen, region, coasting, sections)
+            edge, top = sections.spread([(own.edge, own.top) for own in memories])
+            left = self._surface.leave((edge, top), seen, left, region.cells, mode)
+            target = lead_heights(left, top, region.drop, sections.spread(region.raised))
             np.maximum(target, lowest, out=target)
             np.minimum(target, highest, out=target)
         most = OVER * self.parameters.force_setpoint
@@ -346,35 +269,57 @@ class HybridControl:
             left, target = np.where(over, low, left), np.where(over, low, target)
         np.subtract(target, left, out=lead)
         command = self.servo.serve(target - coasting.heights, coasting.limits, seen.force, speeds)
-        return memory, Commands(target, mode, command)
+        return memories, Commands(target, mode, command)
 
     def _follow_force(
-        self, memory: Follower, seen: Measurement, region: Region, coasting: Coasting
+        self,
+        memories: list[Follower],
+        seen: Measurement,
+        region: Region,
+        coasting: Coasting,
+        sections: Whole,
+    ) -> list[Follower]:
+        """Turn forces into the heights of tops; without contact go back to where it was felt."""
+        forces = [0.0] * len(memories) if all(own.alone for own in memories) else sections.add(seen.force)
+        found, solved = [(own.felt, 0.0) for own in memories], [False] * len(memories)
+        for i, memory in enumerate(memories):
+            if memory.period % EVERY and not memory.alone and self._observer.holds(memory, forces[i]):
+                found[i] = self._move_top(memory), self.parameters.force_setpoint + memory.trim
+                later = seen.own[self._at.later, sections.parts[i]]
+                later += found[i][0] - memory.top
+            else:
+                solved[i] = not memory.alone
+        if any(solved):
+            for i, top in self._solve_tops(memories, seen, region, coasting, sections, solved).items():
+                found[i] = top
+        counts = sections.count(seen.force)
+        numbers = zip(memories, forces, found, counts, region.aims, region.speeds, strict=True)
+        return [self._move_blister(*own) for own in numbers]
+
+    def _move_blister(
+        self, memory: Follower, force: float, found: tuple[float, float], cells: int, aim: Aim, speed: float
     ) -> Follower:
-        """Turn the force into the height of the top; without contact go back to where it was felt."""
+        """Return the memory with the top moved to where it was found, with a total force predicted, m, N.
+
+        `force` of so many cells, N; lowest point of the fingertip, m, and speed, m/s, when they get there.
+        """
         top, felt, trim = memory.felt, memory.felt, memory.trim
         if memory.alone:
             memory = memory._replace(due=self._unknown)
         else:
-            asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
-            if memory.period % EVERY and self._holds(memory, force):
-                top, coming = self._move_top(memory), asked + trim
-                later = seen.own[self._at.later]
-                later += top - memory.top
-            else:
-                top, coming = self._solve_top(memory, seen, region, coasting)
+            (top, coming), asked = found, self.parameters.force_setpoint
             if self._leaves(memory) and top > (along := self._move_top(memory)):
                 top, coming = along, -1.0  # fewer cells carry the fingertip, and none is to rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
-            memory = self._doubt(memory, force, coming, seen.force.size, top)
+            memory = self._doubt(memory, force, coming, cells, top)
             if abs(asked - force) <= LEARNED * asked:
                 learned = (asked - force) * self.device.period / self.parameters.trim_time
                 trim += learned * (coming >= 0.0)
                 felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
-        x, y, _ = region.aim
-        reach = self.profile.find_reach(top - memory.edge, region.speed)
+        x, y, _ = aim
+        reach = self.profile.find_reach(top - memory.edge, speed)
         return memory._replace(top=top, felt=felt, trim=trim, led_x=x, led_y=y, led_radius=reach)
 
     def _leaves(self, memory: Follower) -> bool:
@@ -403,17 +348,31 @@ class HybridControl:
         speed: float = memory.estimate.mean.tolist()[5]
         return memory.top + speed * self.device.period
 
-    def _solve_top(
-        self, memory: Follower, seen: Measurement, region: Region, coasting: Coasting
-    ) -> tuple[float, float]:
-        """Return the height of the top at which predicted forces add up to the set point, and that sum."""
+    def _solve_tops(
+        self,
+        memories: list[Follower],
+        seen: Measurement,
+        region: Region,
+        coasting: Coasting,
+        sections: Whole,
+        wanted: list[bool],
+    ) -> dict[int, tuple[float, float]]:
+        """Return heights of wanted tops at which predicted forces add up to the set point, and the sums."""
         (near,) = (region.cells.distance <= self.contact_radius).nonzero()
-        if not near.size:
-            return memory.felt, 0.0
+        near, fingers, picked = sections.pick(near, wanted)
+        if not fingers:
+            return {}
+        followed = [memories[i] for i in fingers]
         at, own = self._at, seen.own.take(near, 1)
-        under = self.finger.find_underside(region.aim, memory.estimate, seen.quadratic_basis.take(near, 1))
+        under = self.finger.find_underside(
+            [region.aims[i] for i in fingers],
+            [memory.estimate for memory in followed],
+            seen.quadratic_basis.take(near, 1),
+            picked,
+        )
         under += own[at.residual]
-        seen.own[at.later] = AWAY
+        for i in fingers:
+            seen.own[at.later, sections.parts[i]] = AWAY
         seen.own[at.later, near] = under
         ends = coasting.limits.take(near, 1)
         ends *= self.servo.span
@@ -422,9 +381,12 @@ class HybridControl:
         np.maximum(ends, lowest, out=ends)
         np.minimum(ends, highest, out=ends)
         part = self.blister.evaluate_profile(region.cells.distance.take(near))
-        wanted, lost = self.parameters.force_setpoint + memory.trim, self.pulp.predict_loss(own[at.pulp])
-        reach = Reach(region.edge, region.raised, part, region.drop.take(near), ends)
-        return find_top(wanted, self._move_top(memory), reach, under, lost, self.pulp)
+        lost = self.pulp.predict_loss(own[at.pulp])
+        edge, raised = (picked.spread([of[i] for i in fingers]) for of in (region.edges, region.raised))
+        reach = Reach(edge, raised, part, region.drop.take(near), ends)
+        asked = [self.parameters.force_setpoint + memory.trim for memory in followed]
+        tops = find_tops(asked, list(map(self._move_top, followed)), reach, under, lost, self.pulp, picked)
+        return dict(zip(fingers, tops, strict=True))
 
 
 #: How far beyond the fingertip's largest semi-axis cells may be touched, m.

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Modes, count_true
+from ..base.arrays import Floats, Modes
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
 from .blister import BlisterCells, BlisterRule
-from .finger_estimate import STATES, Estimate
+from .finger_estimate import STATES, Aim, Estimate
+from .finger_sections import WHOLE, Whole
 from .ground import EdgeGround, raise_blister
 from .travel import Heading
 from .virtual_master import Master, Phase
@@ -41,14 +42,17 @@ class LeadProfile:
         quickest = max(speed, self.skirt)
         return self.level + abs(height) * quickest / (self.rise if height > 0.0 else self.fall)
 
-    def find_drop(self, distance: Floats, ahead: Floats, speed: float, *, raised: bool) -> Floats:
-        """Return how far from the top pins may stand, (m,), m, below it if `raised`, at a speed, m/s."""
+    def find_slopes(self, speed: float, *, raised: bool) -> tuple[float, float]:
+        """Return how steep heights may be around and ahead, at a speed, m/s, up to the top if `raised`."""
         free = self.rise if raised else self.fall
         around = free / self.skirt if self.skirt else STEEP
-        forward = free / speed if speed >= SLOWEST else STEEP
+        return around, min(free / speed if speed >= SLOWEST else STEEP, around)
+
+    def find_drop(self, distance: Floats, ahead: Floats, around: Any, forward: Any) -> Floats:
+        """Return how far from the top pins may stand, (m,), m, of slopes (m,) by `find_slopes`."""
         drop: Floats = distance - self.level
         np.maximum(drop, 0.0, out=drop)
-        drop *= np.where(ahead > 0.0, forward, around) if forward < around else around
+        drop *= around if forward is around else np.where(ahead > 0.0, forward, around)
         return drop
 
 
@@ -98,17 +102,17 @@ MARGIN = 2e-3
 
 
 class Region(NamedTuple):
-    """Cells about the predicted place of the fingertip."""
+    """Cells about the predicted places of the fingertips."""
 
-    edge: float
-    raised: bool
-    """Height of the surface ahead, m, and whether the blister's top is above it."""
-    aim: tuple[float, float, float]
-    speed: float
-    """Lowest point of the fingertip then, m, and its speed in the plane, m/s."""
+    edges: list[float]
+    raised: list[bool]
+    """Height of the surface ahead of each, m, and whether the blister's top is above it."""
+    aims: list[Aim]
+    speeds: list[float]
+    """Lowest point of each fingertip then, m, and its speed in the plane, m/s."""
     cells: BlisterCells
     drop: Floats
-    """About the aim, and how far they may stand from the top, (m,), m; see `LeadProfile.find_drop`."""
+    """About the aims, and how far they may stand from the top, (m,), m; see `LeadProfile.find_drop`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,22 +133,36 @@ class LedBlister:
         disc = (x, y, max(self.rule.blister.edge_radius, reach) + MARGIN)
         return enclose_discs(disc, led) if memory.led_radius else disc
 
-    def survey(self, memory: Follower, basis: Floats, left: Floats) -> Region:
-        """Return the cells about the predicted fingertip, by the heights at which pins were left, (m,), m."""
-        x, y, z, vx, vy, vz, *_ = memory.estimate.mean.tolist()
-        time, speed = self.ahead, math.hypot(vx, vy)
-        aim = (x + vx * time, y + vy * time, z + vz * time)
-        cells = self.rule.divide((*aim[:2], *memory.heading[2:]), basis)
-        facing = self.rule.find_edge(cells)
-        count = count_true(facing)
-        edge = float(left.dot(facing)) / count if count else memory.edge
-        raised = memory.top > edge
-        drop = self.profile.find_drop(cells.distance, cells.ahead, speed, raised=raised)
-        return Region(edge, raised, aim, speed, cells, drop)
+    def survey(
+        self, memories: list[Follower], basis: Floats, left: Floats, sections: Whole = WHOLE
+    ) -> Region:
+        """Return the cells about predicted fingertips, by the heights at which pins were left, (m,), m."""
+        time, aims, speeds, poses = self.ahead, [], [], []
+        for memory in memories:
+            x, y, z, vx, vy, vz, *_ = memory.estimate.mean.tolist()
+            aims.append((x + vx * time, y + vy * time, z + vz * time))
+            speeds.append(math.hypot(vx, vy))
+            poses.append((*aims[-1][:2], *memory.heading[2:]))
+        cells = self.rule.divide(sections.spread(poses), basis)
+        edges = sections.average(left, self.rule.find_edge(cells), [memory.edge for memory in memories])
+        raised = [memory.top > edge for memory, edge in zip(memories, edges, strict=True)]
+        find = self.profile.find_slopes
+        slopes = [find(speed, raised=up) for speed, up in zip(speeds, raised, strict=True)]
+        drop = self.profile.find_drop(cells.distance, cells.ahead, *sections.spread(slopes))
+        return Region(edges, raised, aims, speeds, cells, drop)
 
     def leave(
-        self, memory: Follower, seen: Measurement, left: Floats, cells: BlisterCells, mode: Modes
+        self,
+        heights: tuple[Any, Any],
+        seen: Measurement,
+        left: Floats,
+        cells: BlisterCells,
+        mode: Modes,
     ) -> Floats:
-        """Return the heights at which pins are left by the fingertip, m; modes, (m,), are set in place."""
-        heights = memory.edge, memory.top, FORCE_FOLLOW, False
-        return raise_blister(self.rule, GROUND, cells, seen._replace(target=left), heights, mode)
+        """Return the heights at which pins are left by fingertips, m; modes, (m,), are set in place.
+
+        `heights` of surface and top, m, one of all cells or (m,).
+        """
+        return raise_blister(
+            self.rule, GROUND, cells, seen._replace(target=left), (*heights, FORCE_FOLLOW, False), mode
+        )

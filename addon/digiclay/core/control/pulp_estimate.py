@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Flags, Floats
 from ..model.touch import Touch
+from .finger_sections import WHOLE, Whole
 
 #: Expected force from which on a cell counts as touched: a share of the least one that is no noise; and N. At
 #: 1 mN cells at the rim are taken whose undersides are known less exactly, and tilted fingertips are lost.
@@ -134,11 +136,11 @@ SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])
 
 
 class Reach(NamedTuple):
-    """Heights that the cells near the fingertip can have at the time aimed at."""
+    """Heights that the cells near fingertips can have at the time aimed at."""
 
-    edge: float
-    raised: bool
-    """Height of the surface around, m, and whether the blister's top is above it."""
+    edge: Any
+    raised: Any
+    """Height of the surface around, m, and whether the blister's top is above it, of all cells or (m,)."""
     part: Floats
     """(m,): Profile of the blister, 1 at its top."""
     drop: Floats
@@ -147,37 +149,50 @@ class Reach(NamedTuple):
     """(2, m): Lowest and highest they can be, m."""
 
     def form_heights(self, top: Floats | float) -> Floats:
-        """Return heights, m, for tops (t, 1), m: the blister's, or nearer to the top where cells are led."""
+        """Return heights, m, for tops (t, 1) or (t, m), m: the blister's, or nearer to the top where led."""
         heights: Floats = (top - self.edge) * self.part
         heights += self.edge
-        return lead_heights(heights, top, self.drop, raised=self.raised)
+        return lead_heights(heights, top, self.drop, self.raised)
 
 
-def lead_heights(heights: Floats, top: Floats | float, drop: Floats, *, raised: bool) -> Floats:
+def lead_heights(heights: Floats, top: Floats | float, drop: Floats, raised: Any) -> Floats:
     """Return heights (m,) or (t, m), m, but no farther from the top than cells may stand; see `Reach`."""
-    return np.maximum(heights, top - drop) if raised else np.minimum(heights, top + drop)
+    if isinstance(raised, bool):
+        return np.maximum(heights, top - drop) if raised else np.minimum(heights, top + drop)
+    return np.where(raised, np.maximum(heights, top - drop), np.minimum(heights, top + drop))
 
 
-def find_top(
-    wanted: float, guess: float, reach: Reach, under: Floats, lost: Floats, pulp: PulpEstimate
-) -> tuple[float, float]:
-    """Return the height of the top at which the predicted forces add up to a force, m, and their sum, N.
+def find_tops(
+    wanted: list[float],
+    guesses: list[float],
+    reach: Reach,
+    under: Floats,
+    lost: Floats,
+    pulp: PulpEstimate,
+    sections: Whole = WHOLE,
+) -> list[tuple[float, float]]:
+    """Return the heights of tops at which the predicted forces add up to forces, m, and their sums, N.
 
-    Where none does, it is the end of the range nearest to it. `guess`: where the top is sought most closely,
+    Where none does, it is the end of the range nearest to it. `guesses`: where tops are sought most closely,
     m; `under` (m,), predicted undersides, m; `lost` (m,), from `PulpEstimate.predict_loss`, N.
     """
-    (level,) = (reach.part >= reach.part.max()).nonzero()
+    (level,) = (reach.part >= sections.find_largest(reach.part)).nonzero()
     lowest, highest = reach.ends.take(level, 1).tolist()
-    low, high = min(lowest), max(highest)
-    tops = (high - low) * SHARES
-    tops += min(max(guess, low), high)
-    np.maximum(tops, low, out=tops)
-    np.minimum(tops, high, out=tops)
-    depths = reach.form_heights(tops[:, None])
+    tried = []
+    for guess, ends in zip(guesses, pairwise(sections.find_bounds(level)), strict=True):
+        low, high = min(lowest[slice(*ends)]), max(highest[slice(*ends)])
+        tops = (high - low) * SHARES
+        tops += min(max(guess, low), high)
+        np.maximum(tops, low, out=tops)
+        tried.append(np.minimum(tops, high, out=tops))
+    depths = reach.form_heights(sections.spread(tried).reshape(SHARES.size, -1))
     least, most = reach.ends
     np.maximum(depths, least, out=depths)
     np.minimum(depths, most, out=depths)
     depths -= under
-    forces = np.add.reduce(pulp.predict_force(depths, lost), axis=1)
-    weakest, *_, strongest = forces.tolist()
-    return float(np.interp(wanted, forces, tops)), min(max(wanted, weakest), strongest)
+    found = []
+    for force, tops, forces in zip(
+        wanted, tried, sections.add(pulp.predict_force(depths, lost)), strict=True
+    ):
+        found.append((float(np.interp(force, forces, tops)), min(max(force, forces[0]), forces[-1])))
+    return found

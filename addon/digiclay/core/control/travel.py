@@ -75,8 +75,11 @@ def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
 
 
 def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats) -> tuple[Floats, Floats]:
-    """Return how far cells lie from a point, m, and ahead of it in a direction, (m[, b]) each, m."""
-    if basis.ndim == 2:  # one product
+    """Return how far cells lie from a point, m, and ahead of it in a direction, (m[, b]) each, m.
+
+    Of cells in `sections` each has its own point and direction, (m,).
+    """
+    if basis.ndim == 2 and not isinstance(x, np.ndarray):  # one product
         forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
         distance, ahead = np.array((_circle(x, y), forward)).dot(basis)
         np.abs(distance, distance)  # at the point itself rounding may leave a negative square

@@ -225,11 +225,13 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
 def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     """Return the control method for the devices of all fingers."""
     method = find_method(scene.method)
-    controllers: list[Controller] = [method.build(scene.control, device) for device in devices]
+    # Fingers that are alike have one controller.
+    made = {id(device.cell): method.build(scene.control, device) for device in devices}
+    controllers: list[Controller] = [made[id(device.cell)] for device in devices]
     touches = [device.cell.touch for device in devices]
     if len(controllers) == 1 or not all(touches):
         return controllers[0]
-    from ..control.hands import HandOneByOne, HandTogether, follows_finger
+    from ..control.hands import HandInGroups, HandTogether, follows_finger
     from ..control.servo import BatchControl
     from .columns import join_controllers
 
@@ -240,4 +242,4 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     common = tuple(controllers), tuple(sizes), felt
     if isinstance(controllers[0], BatchControl):
         return HandTogether(*common, join_controllers(controllers))
-    return HandOneByOne(*common)
+    return HandInGroups(*common)

@@ -1,0 +1,203 @@
+"""Observer of fingertips: the pulp over their cells, which of them touch, and the fit of each.
+
+Numbers are those of fingers whose cells follow each other; see `finger_sections`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Cells, Floats
+from ..model.control_interface import Measurement
+from .finger_estimate import Estimate, FingerFilter
+from .finger_sections import WHOLE, Whole
+from .led_blister import Follower
+from .pulp_estimate import PulpEstimate
+from .travel import Heading, update_heading
+from .virtual_master import LossRule, Phase
+
+#: Rows of a cell but for its filters and commanded speeds.
+OWN_ROWS = 6
+
+
+class OwnRows(NamedTuple):
+    """Numbers of a cell's state rows."""
+
+    pulp: slice
+    tension: int
+    """Relaxation of the pulp over it with its tension, N, and that tension."""
+    coming: int
+    later: int
+    residual: int
+    """Predicted undersides a period and two from now, m; what the last fit left of the measured one, or 0."""
+    lead: int
+    """How far its commanded height is from the one it will be left at, m."""
+    stamp: int
+    speeds: slice
+    """Period in which its pulp was last observed, 0: never; commanded speeds, the newest first, m/s."""
+
+
+def list_rows(filters: int) -> OwnRows:
+    """Return the numbers of a cell's rows, of which the first are so many filters."""
+    k = filters
+    return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
+
+
+#: While the force is within this share of the set point, and the fingertip no faster than this, m/s, it is
+#: fitted and the top solved for in one of so many periods; in the others the top goes along with it.
+NEAR, SLOW, EVERY = 0.02, 20e-3, 2
+#: How far a touched cell may be from the predicted fingertip, in semi-axes: beyond is a new touch.
+JUMP = 1.5
+#: Underside where none is predicted, m.
+AWAY = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class FingerObserver:
+    """Observer of fingertips by the forces and heights of their cells."""
+
+    at: OwnRows
+    pulp: PulpEstimate
+    finger: FingerFilter
+    felt: float
+    noise: float
+    """Force above which a cell is touched, and standard deviation of forces, N."""
+    loss: LossRule
+    unknown: tuple[float, ...]
+    asked: float
+    travel: float
+    """Forces predicted when none is; set point, N; distance that determines a direction, m."""
+
+    @cached_property
+    def farthest(self) -> float:
+        """Distance from the predicted place beyond which a touch is a new one, m."""
+        return JUMP * max(self.finger.fingertip.length, self.finger.fingertip.width)
+
+    def observe(self, memories: list[Follower], touched: Measurement, sections: Whole) -> list[Follower]:
+        """Observe the pulp of the cells the fingertips may touch, and follow or find them."""
+        at, own, force = self.at, touched.own, touched.force
+        period = sections.spread([memory.period for memory in memories])
+        late = (period - 1.0) - own[at.stamp]
+        if np.count_nonzero(late):
+            self.pulp.age(own[at.pulp], late * (own[at.stamp] > 0.0))
+            np.putmask(own[at.later], late, AWAY)
+            np.putmask(own[at.coming], late, AWAY)
+        own[at.stamp] = period
+        (felt,) = (force > self.felt).nonzero()
+        felt_by = [slice(*ends) for ends in pairwise(sections.find_bounds(felt))]
+        if memories[0].phase is Phase.IDLE:
+            self.pulp.observe(own[at.pulp], force, np.zeros(force.size))
+            own[at.coming] = own[at.later] = AWAY
+            return [
+                self._find(memory, touched, felt[own]) if own.stop > own.start else memory
+                for memory, own in zip(memories, felt_by, strict=True)
+            ]
+        expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
+        (here,) = self.pulp.observe(own[at.pulp], force, expected).nonzero()
+        own[at.coming] = own[at.later]
+        return self._follow(memories, touched, (felt, here), sections)
+
+    def _follow(
+        self, memories: list[Follower], touched: Measurement, cells: tuple[Cells, Cells], sections: Whole
+    ) -> list[Follower]:
+        """Fit the fingertips, but those not felt, those that hold, and those that have jumped.
+
+        `cells`, those whose force is felt, and those under a predicted fingertip.
+        """
+        (felt, here), force = cells, touched.force
+        counts, bounds = sections.find_bounds(felt), sections.find_bounds(here)
+        total = sections.add(force) if any(memory.period % EVERY for memory in memories) else counts
+        after, fits = list(memories), [False] * len(memories)
+        for i, memory in enumerate(memories):
+            # Forces under the predicted fingertip are felt where they are more than their noise together.
+            if counts[i] == counts[i + 1] and not self._is_felt(force.take(here[bounds[i] : bounds[i + 1]])):
+                touched.own[self.at.residual, sections.parts[i]] = 0.0
+                after[i] = self.loss.wait(memory)
+            elif memory.period % EVERY and self.holds(memory, total[i]):
+                after[i] = memory._replace(alone=0) if memory.alone else memory
+            else:
+                fits[i] = True
+        x, y = touched.quadratic_basis[1:3, felt].tolist() if any(fits) and felt.size else ((), ())
+        for i in [i for i, fit in enumerate(fits) if fit]:
+            touched.own[self.at.residual, sections.parts[i]] = 0.0
+            own = slice(counts[i], counts[i + 1])
+            if self._has_jumped(memories[i].estimate, x[own], y[own]):
+                found = memories[i]._replace(losses=memories[i].losses + 1)
+                after[i], fits[i] = self._find(found, touched, felt[own]), False
+        here, fingers, sections = sections.pick(here, fits)
+        if fingers:
+            fitted = self._fit([memories[i] for i in fingers], touched, here, sections)
+            for i, memory in zip(fingers, fitted, strict=True):
+                after[i] = memory
+        return after
+
+    def _is_felt(self, force: Floats) -> bool:
+        """Tell whether forces under a predicted fingertip, N, are more than noise."""
+        return float(np.add.reduce(force)) > self.felt * math.sqrt(force.size)
+
+    def holds(self, memory: Follower, force: float) -> bool:
+        """Tell whether a fingertip is slow, and a total force, N, near the set point: then less is solved."""
+        _, _, _, vx, vy, vz, *_ = memory.estimate.mean.tolist()
+        error = abs(force - self.asked)
+        return error <= NEAR * self.asked and math.hypot(vx, vy, vz) <= SLOW
+
+    def _has_jumped(self, guess: Estimate, x: Sequence[float], y: Sequence[float]) -> bool:
+        """Tell whether cells are touched, at x, y, m, but none where the fingertip can be."""
+        place = guess.mean.tolist()[:2]
+        return bool(x) and not any(math.dist(place, cell) <= self.farthest for cell in zip(x, y, strict=True))
+
+    def _find(self, memory: Follower, touched: Measurement, here: Cells) -> Follower:
+        """Begin to follow a fingertip that has touched: at the centroid of its forces (equation 13)."""
+        force, basis = touched.force.take(here), touched.quadratic_basis.take(here, 1)
+        under, _ = self.pulp.find_underside(
+            touched.height.take(here), touched.own[self.at.tension].take(here), self.noise
+        )
+        rows = np.vstack((basis[:3], under, touched.height.take(here)))
+        total, x, y, z, height = rows.dot(force).tolist()
+        x, y, height = x / total, y / total, height / total
+        memory = Follower(
+            Phase.SHAPING,
+            memory.period,
+            self.finger.begin(x, y, z / total),
+            height,
+            height,
+            Heading(x, y),
+            felt=height,
+            losses=memory.losses,
+            due=self.unknown,
+        )
+        (memory,) = self._fit([memory], touched, here, WHOLE)
+        return memory
+
+    def _fit(
+        self, memories: list[Follower], touched: Measurement, here: Cells, sections: Whole
+    ) -> list[Follower]:
+        """Fit the fingertips to the undersides over the touched cells, in sections."""
+        seen, noise = self.pulp.find_underside(
+            touched.height.take(here), touched.own[self.at.tension].take(here), self.noise
+        )
+        noise *= noise
+        noise += self.finger.spread.underside**2
+        guesses = [memory.estimate for memory in memories]
+        basis = touched.quadratic_basis.take(here, 1)
+        at = self.finger.measure([guess.mean for guess in guesses], basis, sections)
+        estimates, left = self.finger.correct(guesses, at, seen, noise, sections)
+        after = []
+        for memory, estimate, part in zip(memories, estimates, sections.parts, strict=True):
+            x, y, *_ = estimate.mean.tolist()
+            if math.dist((x, y), memory.estimate.mean.tolist()[:2]) <= self.farthest:
+                heading = update_heading(memory.heading, x, y, self.travel)
+                after.append(memory._replace(estimate=estimate, heading=heading, alone=0))
+            else:
+                # No fingertip is that quick: these undersides are not its own.
+                left[part] = 0.0
+                after.append(memory._replace(alone=0))
+        touched.own[self.at.residual, here] = left
+        return after
