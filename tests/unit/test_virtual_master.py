@@ -164,6 +164,12 @@ def test_a_fingertip_is_lost_after_the_loss_time(phase: Phase, count: int, after
     assert (memory.phase, memory.losses) == after
 
 
+def test_a_fingertip_that_is_felt_is_shaped_with_also_without_a_loss_time() -> None:
+    method, memory = make_system(Layout(15, 15), control=VirtualMaster(loss_time=0.0)).controller, master()
+    memory, _ = method.locate(memory, touched((0, 0, 0.3)))
+    assert (memory.phase, memory.height > 45e-3) == (Phase.SHAPING, True)
+
+
 def test_a_fingertip_felt_again_in_time_is_not_lost_and_later_is_a_new_one() -> None:
     waiting = alone(master(felt=44e-3), 9)
     assert waiting.felt == 44e-3 < waiting.height  # where the fingertip was felt last

@@ -57,6 +57,15 @@ class Phase(IntEnum):
     """Shaping under a fingertip that goes off the bed."""
 
 
+#: Python looks a member of an enumeration up five times as long as a plain name.
+IDLE, SPRINGING, SHAPING, LEAVING = Phase
+
+
+def bound(value: float, least: float, most: float) -> float:
+    """Return a number, not below the least and not above the most."""
+    return least if value < least else most if value > most else value
+
+
 @dataclass(frozen=True)
 class LossRule:
     """Rule by which a fingertip that is not felt for a time, s, of control periods, s, is given up."""
@@ -70,18 +79,18 @@ class LossRule:
 
     def wait(self, memory: Any) -> Any:
         """Count a period without a fingertip in a `Master` or `Follower`; give it up after the loss time."""
-        if memory.phase is Phase.IDLE:
+        if memory.phase is IDLE:
             return memory
         if not self.is_given_up(memory.alone):
             return memory._replace(alone=memory.alone + 1)
-        lost = memory.phase is Phase.SHAPING
-        return memory._replace(phase=Phase.IDLE, losses=memory.losses + lost)
+        lost = memory.phase is SHAPING
+        return memory._replace(phase=IDLE, losses=memory.losses + lost)
 
 
 class Master(NamedTuple):
     """Memory of the controller."""
 
-    phase: Phase = Phase.IDLE
+    phase: Phase = IDLE
     x: float = 0.0
     y: float = 0.0
     height: float = 0.0
@@ -101,7 +110,7 @@ class Master(NamedTuple):
     @property
     def place(self) -> tuple[float, float] | None:
         """Where the fingertip is, m; None: none is followed."""
-        return None if self.phase is Phase.IDLE else (self.x, self.y)
+        return None if self.phase is IDLE else (self.x, self.y)
 
     # What changes every period is written out: `_replace` takes nearly twice as long.
 
@@ -109,12 +118,6 @@ class Master(NamedTuple):
         """Return the master where it has felt the fingertip, m."""
         phase, _, _, height, opening, reference, edge, _, felt, _, losses = self
         return Master(phase, x, y, height, opening, reference, edge, heading, felt, 0, losses)
-
-    def lead(self, phase: Phase, height: float, opening: float) -> Master:
-        """Return the master after a period, at a height, m, with its valve's opening."""
-        _, x, y, _, _, reference, edge, heading, felt, alone, losses = self
-        felt = height if alone == 0 else felt
-        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
 
     def with_edge(self, edge: float) -> Master:
         """Return the master in a surface of a height, m."""
@@ -142,9 +145,9 @@ class MasterCell:
     def advance(self, height: float, opening: float, command: float) -> tuple[float, float]:
         """Return height, m, and opening after one period of a constant command."""
         (a, b), (c, d), (e, f) = self.openings
-        first, second = a * opening + b * command, c * opening + d * command
-        speed = 0.5 * (self.speed(first) + self.speed(second))
-        return min(max(height + self.period * speed, 0.0), self.stroke), e * opening + f * command
+        first, second = self.speed(a * opening + b * command), self.speed(c * opening + d * command)
+        height += self.period * (0.5 * (first + second))
+        return bound(height, 0.0, self.stroke), e * opening + f * command
 
     def speed(self, opening: float) -> float:
         """Return the speed of the unloaded pin, m/s."""
@@ -252,7 +255,7 @@ class VirtualMasterControl(BatchControl):
         if total < gains.felt_force:
             waiting: Master = self.loss.wait(master)
             return waiting
-        if master.phase is not Phase.IDLE:
+        if master.phase is not IDLE:
             if near >= gains.felt_force:
                 x, y = near_x / near, near_y / near
                 reversal, reach = self.reversal, self.rim.reach
@@ -263,7 +266,7 @@ class VirtualMasterControl(BatchControl):
             # The fingertip has jumped out of reach: this is a new touch elsewhere.
             master = master._replace(losses=master.losses + 1)
         x, y = x / total, y / total
-        return Master(Phase.SPRING, x, y, math.nan, heading=Heading(x, y), losses=master.losses)
+        return Master(SPRINGING, x, y, math.nan, heading=Heading(x, y), losses=master.losses)
 
     def is_new(self, master: Master) -> bool:
         """Tell whether a master has found a fingertip, and has no height yet."""
@@ -272,53 +275,56 @@ class VirtualMasterControl(BatchControl):
 
     def lead(self, master: Master, force: float, surface: float, noise: float = 0.0) -> Master:
         """VM Control and VM Model: effort, and the height a real cell would make of it; N, N m, noise N."""
-        gains, phase = self.parameters, master.phase
-        if phase is Phase.IDLE:
+        gains, (phase, x, y, height, opening, reference, edge, heading, felt, alone, losses) = (
+            self.parameters,
+            master,
+        )
+        if phase is IDLE:
             return master
         if self.is_new(master):
-            height = surface / force
-            edge = min(max(height, 0.0), self.actuator.stroke)
-            master = master._replace(height=height, reference=height, edge=edge, felt=height)
-        # What it rose in search of the fingertip is taken back, or every lift-off would leave a lump.
-        if self.loss.is_given_up(master.alone):
-            return master._replace(height=master.felt)
-        force += noise
-        if force >= gains.force_setpoint:
-            phase = max(phase, Phase.SHAPING)
-        if phase is Phase.SPRING:
-            effort = gains.position_gain * (master.reference - force / gains.spring_stiffness - master.height)
+            height = reference = felt = surface / force
+            edge = bound(height, 0.0, self.actuator.stroke)
+        if alone and self.loss.is_given_up(alone):
+            # What it rose in search of the fingertip is taken back, or every lift-off would leave a lump.
+            height = felt
         else:
-            effort = gains.force_gain * (gains.force_setpoint - force)
-            x, y, *toward = self.get_pose(master)
-            # Beyond the outer cells their forces no longer tell where the fingertip goes.
-            leaves = self.rim.is_ahead(x, y, *toward) or (phase is Phase.LEAVING and self.rim.is_under(x, y))
-            phase = Phase.LEAVING if leaves else Phase.SHAPING
-            effort = min(effort, 0.0) if leaves else effort
-        height, opening = self.model.advance(master.height, master.opening, min(max(effort, -1.0), 1.0))
-        return master.lead(phase, height, opening)
+            error = gains.force_setpoint - (force + noise)
+            if phase is SPRINGING and error > 0.0:
+                compressed = (force + noise) / gains.spring_stiffness
+                effort = gains.position_gain * (reference - compressed - height)
+            else:
+                effort = gains.force_gain * error
+                # Beyond the outer cells their forces no longer tell where the fingertip goes.
+                leaves = self.rim.is_ahead(x, y, heading.toward_x, heading.toward_y)
+                leaves = leaves or (phase is LEAVING and self.rim.is_under(x, y))
+                phase = LEAVING if leaves else SHAPING
+                effort = min(effort, 0.0) if leaves else effort
+            height, opening = self.model.advance(height, opening, bound(effort, -1.0, 1.0))
+            felt = height if alone == 0 else felt
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
 
     def find_disc(self, master: Master) -> Disc | None:
         """Return the disc that a master controls, m."""
-        return None if master.phase is Phase.IDLE else (master.x, master.y, self.blister.edge_radius)
+        return None if master.phase is IDLE else (master.x, master.y, self.blister.edge_radius)
 
     def is_active(self, master: Master) -> bool:
         """Tell whether a master follows a fingertip."""
-        return master.phase is not Phase.IDLE
+        return master.phase is not IDLE
 
     def get_pose(self, master: Master) -> tuple[float, float, float, float]:
         """Return where a master is, m, and its direction of travel."""
         _, _, toward_x, toward_y = master.heading
-        if master.phase is Phase.IDLE:
+        if master.phase is IDLE:
             return NOWHERE, NOWHERE, toward_x, toward_y
         return master.x, master.y, toward_x, toward_y
 
     def set_edge(self, master: Master, level: float, count: int) -> Master:
         """Put a master into a surface whose height is the mean of `count` cells; `level` is their sum, m."""
-        return master.with_edge(min(max(level / count, 0.0), self.actuator.stroke)) if count else master
+        return master.with_edge(bound(level / count, 0.0, self.actuator.stroke)) if count else master
 
     def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
         """Return heights around and of a master, m, mode of felt cells, whether frozen ones stay behind."""
-        kind = SPRING if master.phase is Phase.SPRING else FORCE_FOLLOW
+        kind = SPRING if master.phase is SPRINGING else FORCE_FOLLOW
         beyond = master.alone > 0 and master.height - master.felt > CARRIED * self.blister.radius
         return master.edge, master.height, kind, beyond
 

@@ -208,9 +208,11 @@ class HandMovement:
         if self._double.size:
             one = moved[0] if len(moved) == 1 else join_moved(moved)
             block[0, self._double] = np.minimum.reduce(one.height[self._copies])
-            pressed = np.count_nonzero(one.presses[self._copies] & self._distinct, axis=0) > 1
-            if any_true(pressed):
-                self._press_together(one, pressed)
+            presses = one.presses[self._copies] & self._distinct
+            if any_true(presses):
+                pressed = np.add.reduce(presses, axis=0, dtype=np.intp) > 1
+                if any_true(pressed):
+                    self._press_together(one, pressed)
         np.add.reduce(block[rows.pressing, :near], axis=0, out=block[rows.force, :near])
 
     def _press_together(self, moved: Moved, pressed: Flags) -> None:
