@@ -93,8 +93,8 @@ class TimeCounts:
 CATCH_UP = 0.05
 #: Width of a bin of the histograms, s.
 BIN = 1e-5
-#: Longest time without a look at whether to stop, s.
-LOOK = 0.1
+#: Longest time without a look at whether there is a new pose, or to stop, s.
+LOOK = 5e-4
 #: Time after which another thread of this process gets the interpreter, s; by default it is five periods.
 SWITCH = 2e-4
 
@@ -125,18 +125,17 @@ def run_session(
     # missed its deadline. Processor time of a simulated one. From its beginning to that of its simulation.
     elapsed, spent, lateness = (TimeCounts(BIN) for _ in range(3))
     schedule = Schedule(time.perf_counter(), period, max(1, round(CATCH_UP / period)))
-    resets, flagged = 0, Counter[str]()
+    resets, flagged, taken = 0, Counter[str](), doors.read_order()
     while not stopped():
-        wait = schedule.begins - time.perf_counter()
+        order, began = doors.read_order(), time.perf_counter()
+        # What is new is not left to wait: its period begins early, by one at most.
+        wait = schedule.begins - began - (period if order is not taken else 0.0)
         if wait > 0.0:
             time.sleep(min(wait, LOOK))
-            if wait > LOOK:
-                continue
-        began, before = time.perf_counter(), time.thread_time()
-        count, begins = schedule.take_due(began)
-        if not count:
             continue
-        order = doors.read_order()
+        taken, before = order, time.thread_time()
+        count, begins = schedule.take_due(max(began, schedule.begins))
+        begins = np.minimum(begins, began)
         if order.resets != resets:
             resets = order.resets
             session = _restart(session, writer, room)

@@ -153,8 +153,10 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
         targets = session.poses
     goals = clamp_pose(targets, system.cell.actuator.stroke)
     way = session.limits.speed * system.period * count
-    ends = np.array([_limit_way(*each, way, clear) for each in zip(session.poses, goals, strict=True)])
     start = session.poses
+    ends = np.array([
+        _limit_way(*each, way, clear) for each in zip(start.tolist(), goals.tolist(), strict=True)
+    ])  # fmt: skip
     path = np.array([start, ends]) if count == 1 else interpolate_path(start, ends, count)
     try:
         after = follow_path(session, path)
@@ -173,7 +175,7 @@ def _keep(session: Session) -> Moment:
     return Moment(session.state.period, snapshot.dump(session.system, session.state), session.poses)
 
 
-def _limit_way(start: Floats, goal: Floats, most: float, clear: float) -> Floats:
+def _limit_way(start: list[float], goal: list[float], most: float, clear: float) -> list[float]:
     """Return the pose (7,) on the way to another at which no point of the fingertip has gone farther, m.
 
     Above a height, m, no way counts.
@@ -181,14 +183,13 @@ def _limit_way(start: Floats, goal: Floats, most: float, clear: float) -> Floats
     if start[2] >= clear:
         if goal[2] >= clear:
             return goal
-        start = np.array([*goal[:2], clear, *goal[3:]])
-    first, last = start.tolist(), goal.tolist()  # faster than arrays of 7
-    cosine = abs(sum(map(operator.mul, first[3:], last[3:])))
-    way = math.dist(first[:3], last[:3]) + ARM * 2.0 * math.acos(min(1.0, cosine))
+        start = [*goal[:2], clear, *goal[3:]]
+    # Lists of 7 are faster than arrays.
+    cosine = abs(sum(map(operator.mul, start[3:], goal[3:])))
+    way = math.dist(start[:3], goal[:3]) + ARM * 2.0 * math.acos(min(1.0, cosine))
     if way <= most * (1.0 + 1e-9):  # rounding
         return goal
-    reached: Floats = interpolate_poses(np.array([[start], [goal]]), np.array([most / way]))[0, 0, 0]
-    return reached
+    return [*interpolate_poses(np.array([[start], [goal]]), np.array([most / way]))[0, 0, 0]]
 
 
 def reset(session: Session) -> Session:
@@ -210,7 +211,7 @@ def make_frame(session: Session) -> Frame:
     total = float(forces.sum())
     each = state.finger_forces() if system.fingers > 1 else np.array([total])
     flags = Flag.POSE_LIMITED if session.behind else Flag(0)
-    if any(exceeds_law(system, state, pose) for pose in session.poses):
+    if exceeds_law(system, state, session.pose):
         flags |= Flag.BEYOND_A_FINGER
     if (largest := float(each.max())) > most:
         flags |= Flag.FORCE_LIMITED

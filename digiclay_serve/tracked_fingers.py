@@ -92,15 +92,16 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
 
     A known identity keeps its fingertip, a new one gets the first that is free; without any it waits.
     """
-    ids, unnamed, tracked = tracks.identities.copy(), tracks.unnamed.copy(), tracks.tracked.copy()
-    poses, fresh = dict(named), np.zeros(len(ids), bool)
-    ids = _find_exchanged(ids, tracked, poses)
-    for identity, pose in poses.items():
-        (slots,) = np.nonzero(ids == identity)
-        slot = slots if slots.size else np.flatnonzero(ids < 0)[:1]
-        way = np.linalg.norm(tracked[slot, :3] - pose[:3], axis=1)
-        fresh[slot] = (not slots.size) | (way > JUMP)
-        ids[slot], unnamed[slot], tracked[slot] = identity, 0.0, pose
+    poses, ids = dict(named), tracks.identities.copy()
+    unnamed, tracked, fresh = tracks.unnamed.copy(), tracks.tracked.copy(), np.zeros(len(ids), bool)
+    _put_back_exchanged(ids, tracked, poses)
+    known = {identity: slot for slot, identity in enumerate(ids.tolist())}
+    free = iter(np.flatnonzero(ids < 0).tolist())
+    taken = {one: known[one] if one in known else next(free, None) for one in poses}
+    found = {one: slot for one, slot in taken.items() if slot is not None}
+    slots, now = [*found.values()], np.array([poses[one] for one in found]).reshape(-1, 7)
+    fresh[slots] = (ids[slots] < 0) | (np.linalg.norm(tracked[slots, :3] - now[:, :3], axis=1) > JUMP)
+    ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, now
     was = fresh[:, None]
     return replace(
         tracks, identities=ids, unnamed=unnamed, tracked=tracked, there=tracks.there & ~fresh,
@@ -109,20 +110,17 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     )  # fmt: skip
 
 
-def _find_exchanged(
-    ids: NDArray[np.int64], tracked: Floats, poses: dict[int, Sequence[float]]
-) -> NDArray[np.int64]:
-    """Return the identities (f,), those that have changed places in a message put back."""
+def _put_back_exchanged(ids: NDArray[np.int64], tracked: Floats, poses: dict[int, Sequence[float]]) -> None:
+    """Put back identities (f,) that have changed places in a message."""
     known = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in poses], np.intp)
-    if known.size < 2:
-        return ids
-    now = np.array([poses[int(ids[slot])][:3] for slot in known])
-    way = np.linalg.norm(now[:, None] - tracked[known, :3], axis=2)
-    stay, cross = way.diagonal()[:, None] + way.diagonal(), way + way.T
+    now = np.array([poses[identity][:3] for identity in ids[known].tolist()]).reshape(-1, 3)
+    own = np.linalg.norm(now - tracked[known, :3], axis=1)
+    if own.max(initial=0.0) <= 0.2 * JUMP:
+        return
+    way, stay = np.linalg.norm(now[:, None] - tracked[known, :3], axis=2), own[:, None] + own
     # Fingers go on where they were: what is far nearer to the other's place has its name.
-    for i, j in np.argwhere(np.triu(2.0 * cross < stay, 1) & (stay > 0.4 * JUMP)).tolist():
+    for i, j in np.argwhere(np.triu(2.0 * (way + way.T) < stay, 1) & (stay > 0.4 * JUMP)).tolist():
         ids[known[[i, j]]] = ids[known[[j, i]]]
-    return ids
 
 
 def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tuple[Tracks, Floats]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import socket
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from time import perf_counter
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,9 +16,9 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, from_bytes, make_take, replay
 
-from digiclay_serve.doors import Order, make_slot, open_slot, pack_order, unpack_order
-from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token
-from digiclay_serve.real_time_loop import Schedule, TimeCounts
+from digiclay_serve.doors import Doors, Order, make_slot, open_slot, pack_order, unpack_order
+from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token, unpack_frame
+from digiclay_serve.real_time_loop import Schedule, TimeCounts, run_session
 from digiclay_serve.served_session import (
     PartWriter,
     Session,
@@ -53,6 +54,42 @@ def test_a_period_is_due_from_its_beginning_once_and_the_oldest_late_ones_are_le
     assert (count, schedule.planned, schedule.left_out) == (5, 9, 4)
     # All that have begun are judged, those left out as well.
     assert begins == pytest.approx(10.0 + PERIOD * np.arange(9))
+
+
+class Asked:
+    """Doors whose clients ask for another pose at each look, or for none, over 5.5 periods."""
+
+    def __init__(self, *, restless: bool) -> None:
+        self.restless = restless
+        self.order, self.end, self.shown = Order(), 0.0, b""
+
+    def read_order(self) -> Order:
+        """Return the newest order."""
+        self.end = self.end or perf_counter() + 5.5 * LONG
+        if self.restless:
+            self.order = self.order._replace(number=self.order.number + 1)
+        return self.order
+
+    def show(self, frame: bytes) -> None:
+        """Keep a frame."""
+        self.shown = frame
+
+    def stopped(self) -> bool:
+        """Return whether it is over."""
+        return 0.0 < self.end < perf_counter()
+
+
+LONG = 0.1
+
+
+@pytest.mark.parametrize(("restless", "done"), [(True, 7), (False, 6)])
+def test_a_new_pose_begins_its_period_early_by_one_at_most(restless: bool, done: int) -> None:
+    session = begin_session(resolve({**SMALL, "trajectory": WAIT, "simulation": {"control_period": LONG}}))
+    doors = Asked(restless=restless)
+    _, figures = run_session(session, cast(Doors, doors), None, 1.0, doors.stopped, print)
+    assert (figures["periods"], unpack_frame(doors.shown).period) == (done, done)
+    # Judged from its own beginning: what begins early has no time to spare.
+    assert figures["elapsed"]["p50"] > 0.0
 
 
 def test_shares_of_times_are_those_of_the_sorted_times() -> None:
