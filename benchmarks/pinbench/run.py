@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -187,46 +188,32 @@ def list_answers(answers: Sequence[Answer]) -> Iterator[str]:
     if other:
         yield "\nForms with another contact model: not comparable with those above.\n"
         yield from tabulate(map(asdict, other), RUNS, left=3)
+    won: set[tuple[str, str]] = set()
     for quantity, unit, factor in (("height_error", "µm", 1e6), ("force_error", "µN", 1e6)):
         yield f"\nThe fastest method at an error of {quantity.partition('_')[0]} of at most, µs a period;"
         yield "(x) is the time of digiclay's fastest over that of the fastest other engine.\n"
-        levels = LEVELS[quantity]
-        rows = [
-            [name, *(compare([a for a in same if a.problem == name], quantity, level) for level in levels)]
-            for name in dict.fromkeys(answer.problem for answer in same)
-        ]
-        yield from table(("problem", *(f"{level * factor:g} {unit}" for level in levels)), rows)
-    lost = sorted({(a.problem, a.engine) for a in list_winners(same) if a.engine != "own"})
-    yield (
-        "\nAnother engine wins at one of these errors at least: "
-        + ("; ".join(f"{engine} on {problem}" for problem, engine in lost) or "none")
-        + "."
-    )
+        rows = {answer.problem: [answer.problem] for answer in same}
+        for (name, row), level in product(rows.items(), LEVELS[quantity]):
+            fit = [a for a in same if a.problem == name and getattr(a, quantity) <= level]
+            won |= {(name, best.engine) for best in fastest(fit)}
+            row.append(compare(fit))
+        yield from table(
+            ("problem", *(f"{level * factor:g} {unit}" for level in LEVELS[quantity])), [*rows.values()]
+        )
+    lost = "; ".join(f"{engine} on {name}" for name, engine in sorted(won) if engine != "own")
+    yield f"\nAnother engine wins at one of these errors at least: {lost or 'none'}."
 
 
-def find_fastest(
-    answers: Sequence[Answer], quantity: str, level: float, *, own: bool | None
-) -> Answer | None:
-    """Return the fastest answer within an error: digiclay's, that of others, or of all."""
-    fit = [a for a in answers if getattr(a, quantity) <= level and own in (None, a.engine == "own")]
-    return min(fit, key=lambda answer: answer.seconds, default=None)
+def fastest(answers: Sequence[Answer]) -> list[Answer]:
+    """Return the fastest of some answers, alone; none of none."""
+    return sorted(answers, key=lambda answer: answer.seconds)[:1]
 
 
-def list_winners(answers: Sequence[Answer]) -> Iterator[Answer]:
-    """Give the fastest answers of all problems at all errors."""
-    for name in dict.fromkeys(answer.problem for answer in answers):
-        for quantity, levels in LEVELS.items():
-            for level in levels:
-                best = find_fastest([a for a in answers if a.problem == name], quantity, level, own=None)
-                if best:
-                    yield best
-
-
-def compare(answers: Sequence[Answer], quantity: str, level: float) -> str:
-    """Return the cell of a problem and an error: the fastest method, and digiclay's time over the others'."""
-    best = find_fastest(answers, quantity, level, own=None)
-    if best is None:
+def compare(fit: Sequence[Answer]) -> str:
+    """Return the fastest method of answers within an error, and digiclay's time over that of the others."""
+    if not fit:
         return "-"
-    ours, theirs = (find_fastest(answers, quantity, level, own=own) for own in (True, False))
-    ratio = f" ({ours.seconds / theirs.seconds:.2f})" if ours and theirs else ""
+    (best,) = fastest(fit)
+    own, others = (fastest([a for a in fit if (a.engine == "own") is ours]) for ours in (True, False))
+    ratio = f" ({own[0].seconds / others[0].seconds:.2f})" if own and others else ""
     return f"{best.method} {best.seconds * 1e6:.0f}{ratio}"

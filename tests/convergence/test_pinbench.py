@@ -168,7 +168,7 @@ def test_the_page_says_where_another_engine_wins_and_keeps_other_contact_models_
     assert page[-1].endswith("fast on p.")
     split = next(i for i, line in enumerate(page) if "another contact model" in line)
     assert not any("other " in line for line in page[:split])
-    assert run.compare(answers[:2], "height_error", 1e-7) == "fast 1000000 (2.00)"
+    assert run.compare(answers[:2]) == "fast 1000000 (2.00)"
     assert list(run.list_answers(answers[:1]))[-1].endswith("none.")
 
 
@@ -177,7 +177,7 @@ def test_an_engine_that_diverges_has_infinite_errors_and_is_never_the_fastest() 
     answer = run.solve(find_adapter("digiclay"), problem, "digiclay runge_kutta_4", 5e-3)
     assert answer is not None
     assert (answer.height_error, answer.force_error) == (np.inf, np.inf)
-    assert run.compare([answer], "force_error", 1.0) == "-"
+    assert answer.method not in "".join(run.list_answers([answer])).partition("The fastest method")[2]
 
 
 def test_a_method_stops_at_settings_that_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
