@@ -85,17 +85,18 @@ def find_contact_force(cell: Cell, y: Floats, under: Floats) -> Floats:
 
 def compute_rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     """Return dy/dt of rows y (r, n) under undersides (k,), m, and held valve commands (n,)."""
-    height, lag, pulp = y[0], y[cell.lag_rows], y[cell.pulp_rows, : under.size]
-    change = np.zeros_like(y)
+    height, lag, pulp, near = y[0], y[cell.lag_rows], y[cell.pulp_rows], under.size
+    change = np.zeros_like(y) if len(pulp) else np.empty_like(y)
     opening = cell.lag.opening(lag, command)
     drop: Floats = cell.supply.pressure(opening)
-    if cell.touch and under.size:
-        tension = cell.touch.contact.tension(height[: under.size] - under)
+    if cell.touch and near:
+        tension = cell.touch.contact.tension(height[:near] - under)
         if len(pulp):
-            change[cell.pulp_rows, : under.size] = cell.touch.pulp.rate(pulp, tension)
+            change[cell.pulp_rows, :near] = cell.touch.pulp.rate(pulp[:, :near], tension)
         # The pressure of the reservoir may be one number for all pins.
-        drop = np.broadcast_to(drop, height.shape).copy()
-        drop[: under.size] -= cell.actuator.pressure(relax_force(cell.touch, tension, pulp))
+        load = np.zeros(height.shape)
+        load[:near] = cell.actuator.pressure(relax_force(cell.touch, tension, pulp[:, :near]))
+        drop = drop - load
     change[0] = cell.actuator.rate(cell.flow.flow(opening, drop), height)
     change[cell.lag_rows] = cell.lag.rate(lag, command)
     return change

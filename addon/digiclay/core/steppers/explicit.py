@@ -59,22 +59,23 @@ class Explicit:
         """Move rows and commands (r + q, n) on by one control period, in place; see `interfaces.Movement`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = rows[: cell.rows], rows[cell.rows :]
-        thrown = np.zeros(y.shape[1:], np.bool_)
-        for part in plan.segments:
-            command, instants = commands[plan.queue.seen(part.start)], under.take(part.nodes, axis=0)
+        height, thrown = y[0], np.zeros(y.shape[1:], np.bool_)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for part in plan.segments:
+                command, instants = commands[plan.queue.seen(part.start)], under.take(part.nodes, axis=0)
 
-            def rates_at(
-                rows: Floats, node: int, command: Floats = command, instants: Floats = instants
-            ) -> Floats:
-                return compute_rates(cell, rows, instants[node], command)
+                def rates_at(
+                    rows: Floats, node: int, command: Floats = command, instants: Floats = instants
+                ) -> Floats:
+                    return compute_rates(cell, rows, instants[node], command)
 
-            lowest, highest = plan.speeds.reach(y[0], instants, part.length)
-            lowest -= ASTRAY * stroke
-            highest += ASTRAY * stroke
-            with np.errstate(over="ignore", invalid="ignore"):
+                lowest, highest = plan.speeds.reach(height, instants, part.length)
+                lowest -= ASTRAY * stroke
+                highest += ASTRAY * stroke
                 y += self.increment(rates_at, y, part.length)
-            np.clip(y[0], 0.0, stroke, out=y[0])
-            thrown |= ~((lowest <= y[0]) & (y[0] <= highest))
+                np.maximum(height, 0.0, out=height)
+                np.minimum(height, stroke, out=height)
+                thrown |= ~((lowest <= height) & (height <= highest))
         y[0][thrown] = np.inf
         return find_contact_force(cell, y, under[-1])
 
