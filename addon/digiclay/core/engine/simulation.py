@@ -63,9 +63,10 @@ def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
 
 def _are_finite(numbers: Floats) -> bool:
     """Return whether numbers (k,) are finite for certain: NaN and infinity remain in a dot product."""
-    starts = range(0, numbers.size, THREADED)
-    parts = [numbers[start : start + THREADED] for start in starts]
-    return all(math.isfinite(part.dot(part)) for part in parts)
+    if numbers.size <= THREADED:
+        return math.isfinite(numbers.dot(numbers))
+    parts = (numbers[start : start + THREADED] for start in range(0, numbers.size, THREADED))
+    return all(map(_are_finite, parts))
 
 
 def simulate_period(system: System, state: State, finger: FingerPeriod | None) -> State:

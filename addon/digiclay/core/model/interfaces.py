@@ -34,9 +34,7 @@ class Flow(Protocol):
 
     def flow(self, opening: Floats, drop: Floats) -> Floats:
         """Return the flow into the cylinder with the sign of `drop`, m3/s, of openings K under drops, Pa."""
-        calm = drop.size > 0 and -self.knee < drop.min() and drop.max() < self.knee
-        conductance: Floats = self.laminar_conductance(opening) if calm else self.conductance(opening, drop)
-        return conductance * drop
+        return self.conductance(opening, drop) * drop
 
 
 class Lag(Protocol):
