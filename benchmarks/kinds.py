@@ -116,7 +116,13 @@ BENCHMARKS = {
         "processes.measure_cluster", "overhead of a Dask cluster, one worker and two", needs="distributed"
     ),
     "serve": Benchmark(
-        "processes.measure_serve", "deadlines of digiclay serve at 1 kHz, with a client", needs="websockets"
+        "processes.measure_serve", "deadlines of digiclay serve, and poses to pins, with a client",
+        ("", "--fingers 10 --rate 200"),
+        {
+            "--rate HZ": (whole_number(1, 1000), "control periods a second; default: 1000", 1000),
+            "--fingers N": (whole_number(1, 10), "fingertips, those of a hand side by side; default: 1", 1),
+        },
+        needs="websockets",
     ),
     "methods": Benchmark(
         "method_figures.measure", "force deviation of Method III in fast drags and on other devices"

@@ -14,6 +14,7 @@ import tarfile
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -226,79 +227,109 @@ def _list_costs(costs: Sequence[Row], bundle: Sequence[Point]) -> Iterator[str]:
     yield f"to a worker {size / len(bundle):.0f} bytes a point, back {back / len(bundle):.0f}"
 
 
-# A server, with a client that moves the fingertip
+# A server, with a client that moves the fingertips
 
-#: Control periods a second, and when the session's fingertip comes down, s.
-RATE, DOWN = 1000, 5.0
+#: When the session's fingertip comes down, s.
+DOWN = 5.0
 #: Seconds that are served, with --quick and without.
 QUICK, FULL = 3.0, 20.0
-SHARES = ("p50", "p99", "p99.9", "longest")
-#: Lines of the report: what is measured, by the names of the server's.
+SHARES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999, "longest": 1.0}
+#: Lines of the report: what is measured, by the names of the server's, and of the client's.
 LINES = {
     "elapsed": "beginning of a period to its frame",
     "lateness": "of which before it is simulated",
     "processor": "processor time of a period",
+    "answer": "pose sent to a frame that has it",
 }
 #: Mark, version, kind, number, pose; and mark, version, kind, pins, period, number of a frame.
 POSE, HEAD = struct.Struct("<2sBBI7d"), struct.Struct("<2sBBIQI")
+#: Several fingers, so far apart, m, come as from a camera, Hz, and go a share of the session's way.
+CAMERA, APART, SHARE = 60.0, (18e-3, 30e-3), 0.2
 
 
 def measure_serve(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Serve for a while."""
-    figures, frames = _serve(QUICK if arguments.quick else FULL)
+    seconds, rate, fingers = QUICK if arguments.quick else FULL, arguments.rate, arguments.fingers
+    figures, frames = _serve(seconds, rate, fingers)
     rows = [{"what": name, **{f"{s}_s": figures[name][s] for s in SHARES}} for name in LINES]
-    return Report(list(_list_deadlines(figures, rows, frames)), rows)
+    often = "after every frame" if fingers == 1 else f"{CAMERA:g} times a second"
+    title = f"\ndigiclay serve {SCENE} --rate {rate} --fingers {fingers}: 625 pins, a pose {often}; ms\n"
+    return Report([title, *_list_deadlines(figures, rows, frames)], rows)
 
 
-def _serve(seconds: float) -> tuple[dict[str, Any], int]:
-    """Run a server and a client; return the server's report, and how many frames the client received."""
+def _serve(seconds: float, rate: int, fingers: int) -> tuple[dict[str, Any], int]:
+    """Run a server and a client; return what they report, and how many frames the client received."""
     token = secrets.token_urlsafe(18)
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
-        command = [sys.executable, "-m", "digiclay", "serve", SCENE, "--rate", str(RATE), "--port", "0"]
+        command = [sys.executable, "-m", "digiclay", "serve", SCENE, "--rate", str(rate), "--port", "0"]
         command += ["--osc-port", "0", f"--token={token}", "--report", str(report), "--seconds", str(seconds)]
-        command += ["--out", str(Path(folder) / "recorded")]
+        command += ["--out", str(Path(folder) / "recorded"), "--fingers", str(fingers)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             head = "".join(process.stdout.readline() for _ in range(3))
             address = re.search(r"ws://127\.0\.0\.1:(\d+)", head)
-            frames = _move(int(address[1]), token) if address else 0
+            answers, frames = _move(int(address[1]), token, rate, fingers) if address else ([], 0)
             process.stdout.read()
-        if process.returncode or not frames:
+        if process.returncode or not answers:
             raise OutputError("digiclay serve has ended early: see above.")
         figures: dict[str, Any] = json.loads(report.read_text(encoding="utf-8"))
-        return figures, frames
+    shares = np.quantile(answers, list(SHARES.values())).tolist()
+    return {**figures, "answer": dict(zip(SHARES, shares, strict=True))}, frames
 
 
-def _move(port: int, token: str) -> int:
-    """Answer every frame by the next pose of the session, until the server ends; return how many came."""
+def _move(port: int, token: str, rate: int, fingers: int) -> tuple[list[float], int]:
+    """Send poses along the session until the server ends; return times to their frames, s, and all frames."""
     from websockets.exceptions import ConnectionClosed
     from websockets.sync.client import connect
 
     scene = load(find(SCENE))
-    times = np.arange(0.0, scene.simulation.duration or scene.periods * 5e-3, 1.0 / RATE)
+    times = np.arange(0.0, scene.simulation.duration or scene.periods * 5e-3, 1.0 / rate)
     poses = sample_poses(scene.trajectories(), times)[:, 0]
-    header, frames = {"Authorization": f"Bearer {token}"}, 0
-    address = f"ws://127.0.0.1:{port}/?format=binary&rate={RATE}"
-    with connect(address, additional_headers=header, compression=None) as client:
-        try:
-            while True:
-                message = client.recv()
-                if not isinstance(message, bytes):
-                    continue
-                frames += 1
-                period = HEAD.unpack_from(message)[4]
-                row = (period + round(DOWN * RATE)) % len(poses)
-                client.send(POSE.pack(b"DC", 1, 2, period % 2**32, *poses[row]))
-        except ConnectionClosed:
-            return frames
+    places = APART * (np.array([(k % 5, k // 5) for k in range(fingers)]) - (2.0, 0.5))
+    header, random, start = (
+        {"Authorization": f"Bearer {token}"},
+        np.random.default_rng(1),
+        time.perf_counter(),
+    )
+    sent, answers, frames, answered, due = [start], list[float](), 0, 0, start
+
+    def make_message(number: int) -> bytes | str:
+        pose = poses[round((time.perf_counter() - start + DOWN) * rate) % len(poses)]
+        if fingers == 1:
+            return POSE.pack(b"DC", 1, 2, number, *pose)
+        there = np.column_stack([places + SHARE * pose[:2], np.full(fingers, pose[2])]).tolist()
+        named = [{"id": identity, "position": place} for identity, place in enumerate(there)]
+        return json.dumps({"type": "poses", "number": number, "fingers": named})
+
+    address = f"ws://127.0.0.1:{port}/?format=binary&rate={rate}"
+    with (
+        suppress(ConnectionClosed),
+        connect(address, additional_headers=header, compression=None) as client,
+    ):
+        while True:
+            if due <= time.perf_counter():
+                message, due = (
+                    make_message(len(sent)),
+                    time.perf_counter() + random.uniform(0.5, 1.5) / CAMERA,
+                )
+                sent.append(time.perf_counter())
+                client.send(message)
+            with suppress(TimeoutError):
+                frame = client.recv(max(0.0, due - time.perf_counter()))
+                if isinstance(frame, bytes):
+                    frames, number = frames + 1, HEAD.unpack_from(frame)[5]
+                    if number > answered:
+                        answers.append(time.perf_counter() - sent[number])
+                        answered = number
+                    due = 0.0 if fingers == 1 else due
+    return answers, frames
 
 
 def _list_deadlines(figures: Row, rows: Sequence[Row], frames: int) -> Iterator[str]:
     """Give the lines of the report."""
-    yield f"\ndigiclay serve {SCENE} --rate {RATE}: 625 pins, a pose from a client after every frame; ms\n"
     named = [{**row, "what": LINES[row["what"]]} for row in rows]
     yield from tabulate(named, {"": "what", **{share: f"{share}_s .2f 1e3" for share in SHARES}})
     periods, missed = figures["periods"], figures["missed"]
-    yield f"\n{periods} periods; past their deadline of 1 ms: {missed} ({100.0 * missed / periods:.2f} %),"
+    yield f"\n{periods} periods; past their deadline: {missed} ({100.0 * missed / periods:.2f} %),"
     yield f"of them left out: {figures['left_out']}; the client received {frames} frames"
