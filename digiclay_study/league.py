@@ -76,6 +76,11 @@ def find_interval(values: Sequence[float | None]) -> Interval | None:
     return Interval(fmean(finite), width * stdev(finite), len(finite))
 
 
+def show_digits(value: float, digits: int = 3) -> str:
+    """Write a number with so many digits that count, and without an exponent below a million."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
 def list_values(table: Table, method: str, trajectory: str, measure: str) -> list[float]:
     """Return a measure of a method on a trajectory, a value a seed that has one."""
     trials = (figures for (own, name, _), figures in table.items() if (own, name) == (method, trajectory))

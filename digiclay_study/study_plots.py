@@ -14,7 +14,7 @@ from digiclay.plots.sweep import read_unit
 from numpy.typing import NDArray
 
 from .indices import CONFIDENCE, Indices
-from .league import MEASURES, find_interval, list_values
+from .league import MEASURES, find_interval, list_values, show_digits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -160,6 +160,8 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
     The shaded band holds the just noticeable differences of the first method's set point.
     """
     names = list(dict.fromkeys(name for (_, name, _), found in table.items() if found.get("rfd") is not None))
+    from matplotlib.ticker import LogFormatter
+
     high = 0.27 * max(len(names), 1)
     with canvas(11.0, high + 1.7, "Reference force deviation by trajectory") as (figure, place):
         axes = place("rfd", 1.7, 0.75, 8.9, high)
@@ -173,6 +175,7 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
         axes.set_yticks(-np.arange(len(names)), names)
         axes.set(ylim=(-len(names) + 0.4, 0.6), xlabel="RFD (mN)", xscale="log")
         axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.4)))  # 20, not 2 × 10¹
         legend_above(axes)
     return figure
 
@@ -222,4 +225,4 @@ def _mark_interval(axes: Any, row: Row, measure: str, line: int, number: int, fa
     style = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
     axes.errorbar(mean, line, xerr=half, markersize=8, capsize=4, **style)
     beside = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 11}
-    axes.annotate(f"{mean:.3g}", (mean + half, line), **beside)
+    axes.annotate(show_digits(mean), (mean + half, line), **beside)

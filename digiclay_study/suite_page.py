@@ -16,7 +16,7 @@ from digiclay.commands.progress import table as aligned
 from digiclay.core.studies.axes import Point, Record
 from digiclay.core.studies.sweep_plan import format_csv
 
-from .league import KIND, MEASURES, Interval, Row, Table, find_interval, list_values
+from .league import KIND, MEASURES, Interval, Row, Table, find_interval, list_values, show_digits
 from .method_trials import LIMITS, LOW, OUTCOMES
 
 
@@ -172,10 +172,10 @@ def format_page(
         *make_table(
             ["method", *titles.values(), WORSE], [_list_cells(row, list(MEASURES)) for row in league]
         ),
-        f"<p>Means over the trajectories, the random drags together as one; ± {escape(KIND)}. Largest "
-        f"force: of all trajectories. Losses: sum. Cost: processor time, median; ratio to {first}. Last "
-        f"column: trajectories with a greater mean RFD than {first}. JND: just noticeable differences of the "
-        "set point.</p>",
+        f"<p>Means over the trajectories, the random drags together as one; ± {escape(KIND)}. Of several "
+        "fingers the worst. Largest force: of all trajectories. Losses: sum. Cost: processor time, median; "
+        f"ratio to {first}. Last column: trajectories with a greater mean RFD than {first}. JND: just "
+        "noticeable differences of the set point.</p>",
         *(f'<p><img alt="{name}" src="{name}"></p>' for name in pictures),
     ]
     for name in SHOWN:
@@ -208,8 +208,8 @@ def _format(found: Interval | None, factor: float) -> str:
     """Write a mean and its interval in the unit shown."""
     if found is None:
         return "–"
-    half = "" if found.half is None else f" ± {found.half * factor:.2g}"
-    return f"{found.mean * factor:.3g}{half}"
+    half = "" if found.half is None else f" ± {show_digits(found.half * factor, 2)}"
+    return f"{show_digits(found.mean * factor)}{half}"
 
 
 def _list_trajectories(table: Table) -> list[str]:

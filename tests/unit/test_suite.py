@@ -21,7 +21,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
 from scipy.stats import t as student
 
-from digiclay_study.league import find_interval, find_league
+from digiclay_study.league import find_interval, find_league, show_digits
 from digiclay_study.method_trials import (
     GROUPS,
     OUTCOMES,
@@ -136,6 +136,13 @@ def test_an_interval_is_student_s_and_one_value_has_none() -> None:
     assert (found.mean, found.number, single.half) == (2.0, 3, None)
     assert found.half == pytest.approx(4.302652729911275 / math.sqrt(3.0))  # t(0.975, 2), table
     assert find_interval([None, math.inf]) is None
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(1652.4, "1650"), (390.1, "390"), (0.0186, "0.0186"), (32.0, "32")]
+)
+def test_a_cost_above_a_millisecond_has_no_exponent(value: float, shown: str) -> None:
+    assert show_digits(value) == shown
 
 
 def test_the_league_counts_worse_trajectories_and_random_drags_as_one() -> None:
