@@ -112,18 +112,6 @@ class Master(NamedTuple):
         """Where the fingertip is, m; None: none is followed."""
         return None if self.phase is IDLE else (self.x, self.y)
 
-    # What changes every period is written out: `_replace` takes nearly twice as long.
-
-    def move_to(self, x: float, y: float, heading: Heading) -> Master:
-        """Return the master where it has felt the fingertip, m."""
-        phase, _, _, height, opening, reference, edge, _, felt, _, losses = self
-        return Master(phase, x, y, height, opening, reference, edge, heading, felt, 0, losses)
-
-    def with_edge(self, edge: float) -> Master:
-        """Return the master in a surface of a height, m."""
-        phase, x, y, height, opening, reference, _, heading, felt, alone, losses = self
-        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
-
 
 @dataclass(frozen=True)
 class MasterCell:
@@ -255,18 +243,21 @@ class VirtualMasterControl(BatchControl):
         if total < gains.felt_force:
             waiting: Master = self.loss.wait(master)
             return waiting
-        if master.phase is not IDLE:
+        # A master that changes every period is made of all its numbers: `_replace` takes twice as long.
+        phase, _, _, height, opening, reference, edge, heading, felt, _, losses = master
+        if phase is not IDLE:
             if near >= gains.felt_force:
                 x, y = near_x / near, near_y / near
                 reversal, reach = self.reversal, self.rim.reach
                 if self.rim.is_under(x, y, reach):
                     # The patch grows and shrinks away from the rim: only farther back is another direction.
                     reversal = max(reversal, reach)
-                return master.move_to(x, y, update_heading(master.heading, x, y, gains.travel, reversal))
+                heading = update_heading(heading, x, y, gains.travel, reversal)
+                return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, 0, losses))
             # The fingertip has jumped out of reach: this is a new touch elsewhere.
-            master = master._replace(losses=master.losses + 1)
+            losses += 1
         x, y = x / total, y / total
-        return Master(SPRINGING, x, y, math.nan, heading=Heading(x, y), losses=master.losses)
+        return Master(SPRINGING, x, y, math.nan, heading=Heading(x, y), losses=losses)
 
     def is_new(self, master: Master) -> bool:
         """Tell whether a master has found a fingertip, and has no height yet."""
@@ -275,10 +266,8 @@ class VirtualMasterControl(BatchControl):
 
     def lead(self, master: Master, force: float, surface: float, noise: float = 0.0) -> Master:
         """VM Control and VM Model: effort, and the height a real cell would make of it; N, N m, noise N."""
-        gains, (phase, x, y, height, opening, reference, edge, heading, felt, alone, losses) = (
-            self.parameters,
-            master,
-        )
+        gains = self.parameters
+        phase, x, y, height, opening, reference, edge, heading, felt, alone, losses = master
         if phase is IDLE:
             return master
         if self.is_new(master):
@@ -301,7 +290,7 @@ class VirtualMasterControl(BatchControl):
                 effort = min(effort, 0.0) if leaves else effort
             height, opening = self.model.advance(height, opening, bound(effort, -1.0, 1.0))
             felt = height if alone == 0 else felt
-        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
+        return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, alone, losses))
 
     def find_disc(self, master: Master) -> Disc | None:
         """Return the disc that a master controls, m."""
@@ -320,7 +309,11 @@ class VirtualMasterControl(BatchControl):
 
     def set_edge(self, master: Master, level: float, count: int) -> Master:
         """Put a master into a surface whose height is the mean of `count` cells; `level` is their sum, m."""
-        return master.with_edge(bound(level / count, 0.0, self.actuator.stroke)) if count else master
+        if not count:
+            return master
+        phase, x, y, height, opening, reference, _, heading, felt, alone, losses = master
+        edge = bound(level / count, 0.0, self.actuator.stroke)
+        return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, alone, losses))
 
     def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
         """Return heights around and of a master, m, mode of felt cells, whether frozen ones stay behind."""
