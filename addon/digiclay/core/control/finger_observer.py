@@ -21,7 +21,7 @@ from .finger_sections import WHOLE, Whole
 from .led_blister import Follower
 from .pulp_estimate import PulpEstimate
 from .travel import Heading, update_heading
-from .virtual_master import LossRule, Phase
+from .virtual_master import IDLE, SHAPING, LossRule
 
 #: Rows of a cell but for its filters and commanded speeds.
 OWN_ROWS = 6
@@ -91,13 +91,13 @@ class FingerObserver:
             np.putmask(own[at.coming], late, AWAY)
         own[at.stamp] = period
         (felt,) = (force > self.felt).nonzero()
-        felt_by = [slice(*ends) for ends in pairwise(sections.find_bounds(felt))]
-        if memories[0].phase is Phase.IDLE:
+        if memories[0].phase is IDLE:
             self.pulp.observe(own[at.pulp], force, np.zeros(force.size))
             own[at.coming] = own[at.later] = AWAY
+            bounds = pairwise(sections.find_bounds(felt))
             return [
-                self._find(memory, touched, felt[own]) if own.stop > own.start else memory
-                for memory, own in zip(memories, felt_by, strict=True)
+                self._find(memory, touched, felt[start:stop]) if stop > start else memory
+                for memory, (start, stop) in zip(memories, bounds, strict=True)
             ]
         expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
         (here,) = self.pulp.observe(own[at.pulp], force, expected).nonzero()
@@ -113,14 +113,13 @@ class FingerObserver:
         """
         (felt, here), force = cells, touched.force
         counts, bounds = sections.find_bounds(felt), sections.find_bounds(here)
-        total = sections.add(force) if any(memory.period % EVERY for memory in memories) else counts
-        after, fits = list(memories), [False] * len(memories)
+        total, after, fits = list[float](), list(memories), [False] * len(memories)
         for i, memory in enumerate(memories):
             # Forces under the predicted fingertip are felt where they are more than their noise together.
             if counts[i] == counts[i + 1] and not self._is_felt(force.take(here[bounds[i] : bounds[i + 1]])):
                 touched.own[self.at.residual, sections.parts[i]] = 0.0
                 after[i] = self.loss.wait(memory)
-            elif memory.period % EVERY and self.holds(memory, total[i]):
+            elif memory.period % EVERY and self.holds(memory, (total := total or sections.add(force))[i]):
                 after[i] = memory._replace(alone=0) if memory.alone else memory
             else:
                 fits[i] = True
@@ -163,7 +162,7 @@ class FingerObserver:
         total, x, y, z, height = rows.dot(force).tolist()
         x, y, height = x / total, y / total, height / total
         memory = Follower(
-            Phase.SHAPING,
+            SHAPING,
             memory.period,
             self.finger.begin(x, y, z / total),
             height,
@@ -194,7 +193,7 @@ class FingerObserver:
             x, y, *_ = estimate.mean.tolist()
             if math.dist((x, y), memory.estimate.mean.tolist()[:2]) <= self.farthest:
                 heading = update_heading(memory.heading, x, y, self.travel)
-                after.append(memory._replace(estimate=estimate, heading=heading, alone=0))
+                after.append(memory.fit(estimate, heading))
             else:
                 # No fingertip is that quick: these undersides are not its own.
                 left[part] = 0.0

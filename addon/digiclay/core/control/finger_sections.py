@@ -28,9 +28,13 @@ class Whole:
         """Return the values of each finger."""
         return [values]
 
-    def add(self, values: Floats) -> list[Any]:
-        """Return the sum over the cells of each finger, of (r, m) a list of r."""
-        return [np.add.reduce(values, axis=-1).tolist()]
+    def add(self, values: Floats) -> list[float]:
+        """Return the sum of values (m,) of each finger."""
+        return [float(np.add.reduce(values))]
+
+    def add_rows(self, rows: Floats) -> Sequence[Floats]:
+        """Return the sums (r,) over the cells of each finger, of rows (r, m)."""
+        return [np.add.reduce(rows, axis=1)]
 
     def count(self, values: Floats) -> list[int]:
         """Return the number of cells of each finger."""
@@ -79,10 +83,14 @@ class Sections(Whole):
         """See `Whole`."""
         return [values[..., part] for part in self.parts]
 
-    def add(self, values: Floats) -> list[Any]:
+    def add(self, values: Floats) -> list[float]:
         """See `Whole`."""
-        sums: list[Any] = np.add.reduceat(values, self.starts, axis=-1).T.tolist()
+        sums: list[float] = np.add.reduceat(values, self.starts).tolist()
         return sums
+
+    def add_rows(self, rows: Floats) -> Sequence[Floats]:
+        """See `Whole`."""
+        return list(np.add.reduceat(rows, self.starts, axis=1).T)
 
     def count(self, values: Floats) -> list[int]:
         """See `Whole`."""
@@ -117,4 +125,17 @@ class Sections(Whole):
         return cells, [i for i, size in enumerate(sizes) if size], Sections([size for size in sizes if size])
 
 
-WHOLE = Whole()
+class Shared(Whole):
+    """All cells are those of each finger: arrays are (f, m), or (r, f, m)."""
+
+    def spread(self, numbers: Sequence[Any]) -> Any:
+        """See `Whole`."""
+        return np.array(numbers).T[..., None]
+
+    def multiply(self, forms: Sequence[Any], basis: Floats, out: Floats | None = None) -> Floats:
+        """See `Whole`."""
+        rows: Floats = np.matmul(np.array(forms).swapaxes(0, 1), basis, out=out)
+        return rows
+
+
+WHOLE, SHARED = Whole(), Shared()

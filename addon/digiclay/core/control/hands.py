@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from ..base.arrays import Cells, Flags, Floats, find_copies
 from ..model.control_interface import Commands, Controller, Measurement
@@ -151,9 +152,10 @@ class HandControl:
         far = ~(apart <= self.capture[:, None] ** 2)
         rank = self._estimate_under(memory, apart)
         if hasattr(self.runs[0], "predict_under"):
-            for finger, (run, own) in enumerate(zip(self.runs, memory.fingers, strict=True)):
-                if own.place:
-                    rank[finger] = run.predict_under(own, basis)
+            for run in set(self.runs):
+                own = [i for i, one in enumerate(memory.fingers) if one.place and self.runs[i] is run]
+                if own:
+                    rank[own] = run.predict_under([memory.fingers[i] for i in own], basis)
         np.putmask(rank, far, np.inf)
         return np.where(far.all(axis=0), NOBODY, rank.argmin(axis=0))
 
@@ -330,7 +332,10 @@ class HandInGroups(HandControl):
         for i, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
             alike = run.sort(own) if counts[i] and hasattr(run, "sort") else None
             groups.setdefault(i if alike is None else (run, alike), []).append(i)
-        places = np.arange(rows)[:, None] + rows * finger
+        # The rows lie apart by the width of the set; of one index numpy makes four times as much as of two.
+        whole, width = seen.own, seen.own.strides[0] // seen.own.itemsize
+        flat = as_strided(whole, (max(width * (len(whole) - 1) + whole.shape[1], 0),), (whole.itemsize,))
+        places = (width * np.arange(rows))[:, None] + (width * rows * finger + cells)
         for group in groups.values():
             chosen: Any = slice(None) if len(group) == len(memory) else np.isin(finger, group)
             at, own = cells[chosen], places[:, chosen]
@@ -340,11 +345,11 @@ class HandInGroups(HandControl):
                 force[chosen],
                 seen.target[at],
                 seen.mode[at],
-                seen.own[own, at],
+                flat.take(own),
                 seen.cells[at],
             )
             yield group, chosen, part, Sections(counts[group].tolist())
-            seen.own[own, at] = part.own
+            flat[own] = part.own
 
 
 def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float]:

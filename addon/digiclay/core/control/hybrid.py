@@ -29,13 +29,13 @@ from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Aim, FingerFilter, Spread
 from .finger_observer import AWAY, EVERY, OWN_ROWS, FingerObserver, OwnRows, list_rows
-from .finger_sections import WHOLE, Whole
+from .finger_sections import SHARED, WHOLE, Whole
 from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
 from .methods import ControlParameters, Pace
 from .pulp_estimate import PulpEstimate, Reach, find_tops, lead_heights
 from .servo import declare_again, mark_formed
-from .virtual_master import HEAVIEST, Master, Phase, VirtualMaster, VirtualMasterControl
+from .virtual_master import HEAVIEST, IDLE, SHAPING, Master, Phase, VirtualMaster, VirtualMasterControl
 from .virtual_master import build as build_master
 
 
@@ -197,22 +197,18 @@ class HybridControl:
 
     def sort(self, memory: Follower) -> Phase | None:
         """Return what is the same for all fingers that are served together; None: one is served alone."""
-        return memory.phase if memory.master.phase is Phase.IDLE else None
+        return memory.phase if memory.master.phase is IDLE else None
 
     def locate_all(
         self, memories: list[Follower], touched: Measurement, sections: Whole = WHOLE
     ) -> tuple[list[Follower], list[Any]]:
         """Observe the pulp, and fit the fingertips, which are sorted alike; see `Controller.locate`."""
-        if memories[0].master.phase is not Phase.IDLE:
+        if memories[0].master.phase is not IDLE:
             memory, disc = self._substitute(memories[0], touched)
             return [memory], [disc]
         predict = self.finger.predict
         memories = [
-            own._replace(
-                period=own.period + 1,
-                estimate=own.estimate if own.phase is Phase.IDLE else predict(own.estimate),
-            )
-            for own in memories
+            own.move_on(own.estimate if own.phase is IDLE else predict(own.estimate)) for own in memories
         ]
         if touched.force.size:
             memories = self._observer.observe(memories, touched, sections)
@@ -229,19 +225,21 @@ class HybridControl:
         period, phase, losses = memory.period + 1, master.phase, master.losses
         return memory._replace(period=period, phase=phase, losses=losses, master=master), disc
 
-    def predict_under(self, memory: Follower, basis: Floats) -> Floats:
-        """Return the underside over cells, (m,), m, of a fingertip that is followed."""
-        x, y, z, *_ = memory.estimate.mean.tolist()
-        if memory.master.phase is not Phase.IDLE:
-            x, y, z = memory.master.x, memory.master.y, memory.master.height
-        return self.finger.find_underside([(x, y, z)], [memory.estimate], basis)
+    def predict_under(self, memories: list[Follower], basis: Floats) -> Floats:
+        """Return the undersides over cells, (f, m), m, of fingertips that are followed."""
+        aims: list[Aim] = []
+        for memory in memories:
+            x, y, z, *_ = memory.estimate.mean.tolist()
+            master = memory.master
+            aims.append((x, y, z) if master.phase is IDLE else (master.x, master.y, master.height))
+        return self.finger.find_underside(aims, [own.estimate for own in memories], basis, SHARED)
 
     def command_all(
         self, memories: list[Follower], seen: Measurement, sections: Whole = WHOLE
     ) -> tuple[list[Follower], Commands]:
         """Form the blisters of fingers that are sorted alike, and drive all pins to their heights."""
         lead, speeds = seen.own[self._at.lead], seen.own[self._at.speeds]
-        if memories[0].master.phase is not Phase.IDLE:
+        if memories[0].master.phase is not IDLE:
             unled = seen._replace(target=seen.target - lead)
             lead[:] = speeds[:] = 0.0
             master, commands = self.substitute.command(memories[0].master, unled)
@@ -250,11 +248,10 @@ class HybridControl:
         left = seen.target - lead
         rest, band, lowest, highest = self._limits[left.shape]
         mode, target = mark_formed(left, rest, band), left
-        if memories[0].phase is Phase.IDLE:
+        if memories[0].phase is IDLE:
             memories = [memory._replace(led_radius=0.0) for memory in memories]
         else:
             region = self._surface.survey(memories, seen.quadratic_basis, left, sections)
-            memories = [own._replace(edge=edge) for own, edge in zip(memories, region.edges, strict=True)]
             memories = self._follow_force(memories, seen, region, coasting, sections)
             edge, top = sections.spread([(own.edge, own.top) for own in memories])
             left = self._surface.leave((edge, top), seen, left, region.cells, mode)
@@ -280,47 +277,58 @@ class HybridControl:
         sections: Whole,
     ) -> list[Follower]:
         """Turn forces into the heights of tops; without contact go back to where it was felt."""
-        forces = [0.0] * len(memories) if all(own.alone for own in memories) else sections.add(seen.force)
-        found, solved = [(own.felt, 0.0) for own in memories], [False] * len(memories)
-        for i, memory in enumerate(memories):
-            if memory.period % EVERY and not memory.alone and self._observer.holds(memory, forces[i]):
-                found[i] = self._move_top(memory), self.parameters.force_setpoint + memory.trim
-                later = seen.own[self._at.later, sections.parts[i]]
-                later += found[i][0] - memory.top
-            else:
-                solved[i] = not memory.alone
-        if any(solved):
-            for i, top in self._solve_tops(memories, seen, region, coasting, sections, solved).items():
-                found[i] = top
+        forces, found = sections.add(seen.force), list[tuple[float, float] | None]()
+        for memory, force, part in zip(memories, forces, sections.parts, strict=True):
+            found.append(None)
+            if memory.period % EVERY and not memory.alone and self._observer.holds(memory, force):
+                top = self._move_top(memory)
+                later = seen.own[self._at.later, part]
+                later += top - memory.top
+                found[-1] = top, self.parameters.force_setpoint + memory.trim
+        if None in found:
+            self._solve_tops(memories, seen, region, coasting, sections, found)
         counts = sections.count(seen.force)
-        numbers = zip(memories, forces, found, counts, region.aims, region.speeds, strict=True)
+        numbers = zip(memories, found, forces, counts, region.edges, region.aims, region.speeds, strict=True)
         return [self._move_blister(*own) for own in numbers]
 
     def _move_blister(
-        self, memory: Follower, force: float, found: tuple[float, float], cells: int, aim: Aim, speed: float
+        self,
+        memory: Follower,
+        found: tuple[float, float] | None,
+        force: float,
+        cells: int,
+        edge: float,
+        aim: Aim,
+        speed: float,
     ) -> Follower:
         """Return the memory with the top moved to where it was found, with a total force predicted, m, N.
 
-        `force` of so many cells, N; lowest point of the fingertip, m, and speed, m/s, when they get there.
+        `force` of so many cells, N; surface, m; lowest point of the fingertip, m, and its speed, m/s.
         """
-        top, felt, trim = memory.felt, memory.felt, memory.trim
-        if memory.alone:
-            memory = memory._replace(due=self._unknown)
-        else:
-            (top, coming), asked = found, self.parameters.force_setpoint
+        top, felt, trim, due, doubt = memory.felt, memory.felt, memory.trim, self._unknown, memory.doubt
+        master = memory.master
+        if not memory.alone:
+            (top, coming), asked = found or (felt, 0.0), self.parameters.force_setpoint
             if self._leaves(memory) and top > (along := self._move_top(memory)):
                 top, coming = along, -1.0  # fewer cells carry the fingertip, and none is to rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
-            memory = self._doubt(memory, force, coming, cells, top)
+            due, doubt = (*memory.due[1:], coming), self._doubt(memory, force, cells)
+            if doubt > (DOUBTED * asked) ** 2:
+                (x, y, *_), due, doubt = memory.estimate.mean.tolist(), memory.due, 0.0
+                shaping, heading, losses = SHAPING, memory.heading, memory.losses
+                master = Master(shaping, x, y, top, 0.0, top, edge, heading, top, 0, losses)
             if abs(asked - force) <= LEARNED * asked:
                 learned = (asked - force) * self.device.period / self.parameters.trim_time
                 trim += learned * (coming >= 0.0)
                 felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
         x, y, _ = aim
-        reach = self.profile.find_reach(top - memory.edge, speed)
-        return memory._replace(top=top, felt=felt, trim=trim, led_x=x, led_y=y, led_radius=reach)
+        reach = self.profile.find_reach(top - edge, speed)
+        first, heading, (alone, losses) = memory[:3], memory.heading, memory[8:10]
+        return Follower(
+            *first, top, edge, heading, trim, felt, alone, losses, x, y, reach, due, doubt, master
+        )
 
     def _leaves(self, memory: Follower) -> bool:
         """Tell whether the fingertip goes off the bed."""
@@ -329,19 +337,12 @@ class HybridControl:
         goes = speed > SLOWEST and rim.is_ahead(x, y, vx / speed, vy / speed)
         return goes or rim.is_under(x, y, -rim.reach)
 
-    def _doubt(self, memory: Follower, force: float, coming: float, cells: int, top: float) -> Follower:
-        """Compare a force of some cells, N, with its prediction; hand over to Method I when they disagree."""
-        (due, *later), asked = memory.due, self.parameters.force_setpoint
-        error = min(abs(force - due), LEARNED * asked) if due >= 0.0 else 0.0
+    def _doubt(self, memory: Follower, force: float, cells: int) -> float:
+        """Return the doubt, N², after a force of some cells, N: beyond a limit Method I takes over."""
+        due, most = memory.due[0], LEARNED * self.parameters.force_setpoint
+        error = min(abs(force - due), most) if due >= 0.0 else 0.0
         doubt = memory.doubt + (error * error - cells * self.noise**2 - memory.doubt) / PERIODS
-        doubt = max(doubt, 0.0)
-        if doubt <= (DOUBTED * asked) ** 2:
-            return memory._replace(due=(*later, coming), doubt=doubt)
-        x, y, *_ = memory.estimate.mean.tolist()
-        master = Master(
-            Phase.SHAPING, x, y, top, 0.0, top, memory.edge, memory.heading, top, 0, memory.losses
-        )
-        return memory._replace(master=master, doubt=0.0)
+        return max(doubt, 0.0)
 
     def _move_top(self, memory: Follower) -> float:
         """Return the height of the top, m, along with the fingertip for a period."""
@@ -355,21 +356,24 @@ class HybridControl:
         region: Region,
         coasting: Coasting,
         sections: Whole,
-        wanted: list[bool],
-    ) -> dict[int, tuple[float, float]]:
-        """Return heights of wanted tops at which predicted forces add up to the set point, and the sums."""
+        found: list[tuple[float, float] | None],
+    ) -> None:
+        """Find, in place, the tops at which predicted forces add up to the set point, with the sums."""
         (near,) = (region.cells.distance <= self.contact_radius).nonzero()
+        wanted = [not (one or own.alone) for one, own in zip(found, memories, strict=True)]
         near, fingers, picked = sections.pick(near, wanted)
         if not fingers:
-            return {}
-        followed = [memories[i] for i in fingers]
+            return
+        aims, estimates, asked, guesses, edges, raised = [], [], [], [], [], []
+        for i in fingers:
+            aims.append(region.aims[i])
+            estimates.append(memories[i].estimate)
+            asked.append(self.parameters.force_setpoint + memories[i].trim)
+            guesses.append(self._move_top(memories[i]))
+            edges.append(region.edges[i])
+            raised.append(region.raised[i])
         at, own = self._at, seen.own.take(near, 1)
-        under = self.finger.find_underside(
-            [region.aims[i] for i in fingers],
-            [memory.estimate for memory in followed],
-            seen.quadratic_basis.take(near, 1),
-            picked,
-        )
+        under = self.finger.find_underside(aims, estimates, seen.quadratic_basis.take(near, 1), picked)
         under += own[at.residual]
         for i in fingers:
             seen.own[at.later, sections.parts[i]] = AWAY
@@ -382,11 +386,12 @@ class HybridControl:
         np.minimum(ends, highest, out=ends)
         part = self.blister.evaluate_profile(region.cells.distance.take(near))
         lost = self.pulp.predict_loss(own[at.pulp])
-        edge, raised = (picked.spread([of[i] for i in fingers]) for of in (region.edges, region.raised))
-        reach = Reach(edge, raised, part, region.drop.take(near), ends)
-        asked = [self.parameters.force_setpoint + memory.trim for memory in followed]
-        tops = find_tops(asked, list(map(self._move_top, followed)), reach, under, lost, self.pulp, picked)
-        return dict(zip(fingers, tops, strict=True))
+        drop = region.drop.take(near)
+        reach = Reach(picked.spread(edges), picked.spread(raised), part, drop, ends)
+        for i, top in zip(
+            fingers, find_tops(asked, guesses, reach, under, lost, self.pulp, picked), strict=True
+        ):
+            found[i] = top
 
 
 #: How far beyond the fingertip's largest semi-axis cells may be touched, m.

@@ -17,7 +17,7 @@ from .finger_estimate import STATES, Aim, Estimate
 from .finger_sections import WHOLE, Whole
 from .ground import EdgeGround, raise_blister
 from .travel import Heading
-from .virtual_master import Master, Phase
+from .virtual_master import IDLE, Master, Phase
 
 #: A fingertip slower than this has no direction, m/s.
 SLOWEST = 1e-3
@@ -59,7 +59,7 @@ class LeadProfile:
 class Follower(NamedTuple):
     """Memory of the controller."""
 
-    phase: Phase = Phase.IDLE
+    phase: Phase = IDLE
     period: int = 0
     """IDLE or SHAPING; control periods so far."""
     estimate: Estimate = Estimate(np.zeros(STATES), np.zeros((STATES, STATES)))
@@ -84,10 +84,21 @@ class Follower(NamedTuple):
     master: Master = Master()
     """Memory of Method I while it takes over; IDLE: it does not."""
 
+    # What changes every period is written out: `_replace` takes twice as long.
+
+    def move_on(self, estimate: Estimate) -> Follower:
+        """Return the memory a period later, with a predicted fingertip."""
+        return Follower(self.phase, self.period + 1, estimate, *self[3:])
+
+    def fit(self, estimate: Estimate, heading: Heading) -> Follower:
+        """Return the memory with a fingertip that has been felt."""
+        phase, period, _, top, edge, _, trim, felt, *_ = self
+        return Follower(phase, period, estimate, top, edge, heading, trim, felt, 0, *self[9:])
+
     @property
     def place(self) -> tuple[float, float] | None:
         """Where the fingertip is, m; None: none is followed."""
-        if self.phase is Phase.IDLE or self.master.phase is not Phase.IDLE:
+        if self.phase is IDLE or self.master.phase is not IDLE:
             return self.master.place
         x, y, *_ = self.estimate.mean.tolist()
         return x, y
@@ -126,7 +137,7 @@ class LedBlister:
     def find_disc(self, memory: Follower) -> Disc | None:
         """Return the disc of the pins to command: those led now, and those led before."""
         led = (memory.led_x, memory.led_y, memory.led_radius)
-        if memory.phase is Phase.IDLE:
+        if memory.phase is IDLE:
             return led if memory.led_radius else None
         x, y, _, vx, vy, *_ = memory.estimate.mean.tolist()
         reach = self.profile.find_reach(memory.top - memory.edge, math.hypot(vx, vy))

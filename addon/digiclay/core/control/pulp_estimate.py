@@ -185,14 +185,15 @@ def find_tops(
         tops += min(max(guess, low), high)
         np.maximum(tops, low, out=tops)
         tried.append(np.minimum(tops, high, out=tops))
-    depths = reach.form_heights(sections.spread(tried).reshape(SHARES.size, -1))
+    spread = sections.spread(tried)
+    depths = reach.form_heights(spread if spread.ndim == 2 else spread[:, None])
     least, most = reach.ends
     np.maximum(depths, least, out=depths)
     np.minimum(depths, most, out=depths)
     depths -= under
     found = []
-    for force, tops, forces in zip(
-        wanted, tried, sections.add(pulp.predict_force(depths, lost)), strict=True
-    ):
-        found.append((float(np.interp(force, forces, tops)), min(max(force, forces[0]), forces[-1])))
+    sums = sections.add_rows(pulp.predict_force(depths, lost))
+    for force, tops, forces in zip(wanted, tried, sums, strict=True):
+        weakest, *_, strongest = forces.tolist()
+        found.append((float(np.interp(force, forces, tops)), min(max(force, weakest), strongest)))
     return found
