@@ -1,7 +1,5 @@
 """What a user does to beds with Blender's own operators, and what the scene has after it."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -63,7 +61,6 @@ def done(step: str) -> None:
 
 
 def looked() -> None:
-    """Let what waits for an evaluation happen."""
     bpy.context.view_layer.update()
     unit.settle()
     bpy.context.view_layer.update()
@@ -76,7 +73,6 @@ def undone() -> None:
 
 
 def redone() -> None:
-    """Redo one step, as the user counts them."""
     bpy.ops.ed.redo()
     looked()
 
@@ -99,8 +95,26 @@ def select(*things: Any) -> None:
         bpy.context.view_layer.objects.active = thing
 
 
+def duplicate(*things: Any, linked: bool = False) -> Any:
+    """Duplicate objects as a user does; return the active copy."""
+    select(*things)
+    bpy.ops.object.duplicate(linked=linked)
+    done("Duplicate")
+    return bpy.context.object
+
+
+def delete(*things: Any) -> None:
+    select(*things)
+    bpy.ops.object.delete()
+    done("Delete")
+
+
+def save_and_open(file: Path) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+
+
 def beds() -> list[Any]:
-    """Return the beds of the scene."""
     return [thing for thing in bpy.context.scene.objects if is_bed(thing)]
 
 
@@ -129,7 +143,6 @@ def inventory() -> dict[str, list[str]]:
 
 
 def housings() -> int:
-    """Count the housings drawn."""
     graph = bpy.context.evaluated_depsgraph_get()
     drawn = (item.object for item in graph.object_instances if not item.is_instance)
     meshes = (thing.data for thing in drawn if thing.type == "MESH")

@@ -1,9 +1,5 @@
 """What the tests inside Blender share: the extension enabled and taken back, and an empty file."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import bpy
 import digiclay
 import numpy as np
@@ -26,7 +22,7 @@ def enable(on: bool) -> None:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def factory_settings() -> Iterator[None]:
+def factory_settings():
     """Start every file of tests from Blender's own preferences and add-ons.
 
     What stays registered after the last one crashes or hangs Blender at its exit.
@@ -37,7 +33,7 @@ def factory_settings() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
-def factory_file(request: pytest.FixtureRequest) -> None:
+def factory_file(request):
     """Start every test from Blender's factory file, with a cube, and with the extension where it asks for it.
 
     Preferences and the extension stay within a file of tests: each takes twice as long as the file.
@@ -47,13 +43,13 @@ def factory_file(request: pytest.FixtureRequest) -> None:
 
 
 @pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+def quick_machine(monkeypatch):
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
     monkeypatch.setattr(live_session, "SHARE", 1e9)
 
 
 @pytest.fixture
-def extension(factory_file: None) -> Iterator[None]:
+def extension(factory_file):
     """End all sessions of a test, with which the extension is enabled, and its messages."""
     yield
     handlers.end_all("ended with its test")
@@ -62,7 +58,7 @@ def extension(factory_file: None) -> Iterator[None]:
 
 
 @pytest.fixture
-def formed() -> Instant:
+def formed():
     """A staggered bed in which every pin has a height of its own and every mode occurs."""
     layout = Layout(rows=6, columns=8, arrangement="staggered")
     bed = make_grid(layout)
@@ -78,7 +74,7 @@ def formed() -> Instant:
 
 
 @pytest.fixture
-def watched(extension: None) -> Iterator[None]:
+def watched(extension):
     """Look after beds as in a window, in an empty scene; take all back."""
     unit.watch()
     bpy.ops.object.select_all(action="SELECT")

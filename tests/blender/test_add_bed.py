@@ -1,26 +1,34 @@
-"""Add > Mesh > Digital Clay: what its redo panel offers, and that the bed is what was asked for."""
+"""What a bed begins from: Add > Mesh > Digital Clay, presets of the user's own, samples and scene files."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
+import dataclasses
+import os
+from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
+from digiclay.core.base.errors import OutputError
 from digiclay.core.control.methods import METHODS
 from digiclay.core.model.layout import Layout
+from digiclay.core.scene.scene_source import SAMPLES, find, list_samples, load
 from digiclay.core.scene.toml_table import PRESETS, resolve
-from digiclay.roles import fingertip_of
+from digiclay.core.shapes.fitting import list_shapes
+from digiclay.operators.add_bed import SceneFiles
+from digiclay.recorded import takes
+from digiclay.roles import fingertip_of, is_bed
 from digiclay.settings import own_presets, properties
 from digiclay.settings.devices import BEDS, make_scene
+
+from tests.assemble import replayed
+from tests.blender.at_hand import new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
 
 
 @pytest.fixture
-def preset() -> Iterator[str]:
+def preset():
     """A preset of the user's own, and the name it goes by."""
     table = {"control": {"method": "cell_states", "force_setpoint": 0.03}, "valve": {"stroke": 41e-6}}
     own_presets.save("Stiff clay", resolve(table))
@@ -29,7 +37,6 @@ def preset() -> Iterator[str]:
 
 
 def add(**chosen: Any) -> Any:
-    """Add a bed; return it."""
     assert bpy.ops.mesh.digital_clay_add(**chosen) == {"FINISHED"}
     return bpy.context.object
 
@@ -42,7 +49,7 @@ CHOICES: list[tuple[dict[str, str], dict[str, Any]]] = [
 ]
 
 
-def test_a_bed_is_a_scene_files_but_for_the_ground() -> None:
+def test_a_bed_is_a_scene_files_but_for_the_ground():
     for number, (chosen, table) in enumerate(CHOICES):
         wanted = resolve(table)
         if wanted.method == "virtual_master":
@@ -54,13 +61,9 @@ def test_a_bed_is_a_scene_files_but_for_the_ground() -> None:
             assert properties.scene_of(bed) == wanted.with_sections(name=bed.name), chosen
 
 
-def test_a_preset_of_the_user_s_own_is_offered_and_taken(preset: str) -> None:
-    bed = add(preset=preset, method="cell_states", rows=30)
-    scene = properties.scene_of(bed)
+def test_a_preset_of_the_user_s_own_is_taken_and_another_method_brings_its_own_gains(preset):
+    scene = properties.scene_of(add(preset=preset, method="cell_states", rows=30))
     assert (scene.layout.rows, scene.valve.stroke, scene.control.force_setpoint) == (30, 41e-6, 0.03)
-
-
-def test_another_method_than_the_preset_s_brings_its_own_gains(preset: str) -> None:
     scene = properties.scene_of(add(preset=preset, method="elastic"))
     plain = resolve({"control": {"method": "elastic"}})
     assert (scene.control, scene.blister, scene.valve.stroke) == (plain.control, None, 41e-6)
@@ -68,14 +71,14 @@ def test_another_method_than_the_preset_s_brings_its_own_gains(preset: str) -> N
 
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 9), (6, 6)])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
-def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows: int, columns: int, method: str) -> None:
+def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows, columns, method):
     scene = make_scene("paper", Layout(rows=rows, columns=columns), method)
     assert scene.blister.radius <= max(rows, columns) * 3e-3 / 2 * (1 + 1e-9)
     assert scene.blister.flat_radius < scene.blister.radius < scene.blister.edge_radius
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 2.5])
-def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale: float) -> None:
+def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale):
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     bed = add(rows=6, columns=6, scale=scale)
     assert bpy.context.selected_objects == [bed]
@@ -87,17 +90,8 @@ def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale:
     assert bridge.pose(fingertip_of(bed))[2] > 0.040
 
 
-def test_the_scale_shown_leaves_the_device_as_it_is() -> None:
-    small, large = add(rows=6, columns=6), add(rows=6, columns=6, scale=3.0)
-    bpy.context.view_layer.update()
-    poses = [bridge.pose(fingertip_of(bed)) for bed in (small, large)]
-    # Blender's matrices are float32, here of lengths up to 0.5 units: 0.05 m of the device.
-    np.testing.assert_allclose(poses[0], poses[1], rtol=0, atol=1e-7)
-    assert properties.scene_of(large).layout == properties.scene_of(small).layout
-
-
 @pytest.mark.parametrize("name", BEDS)
-def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name: str) -> None:
+def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name):
     scene, wanted = properties.scene_of(add(bed=name)), BEDS[name]
     assert (scene.layout.rows, scene.layout.columns) == (wanted.rows, wanted.columns)
     assert scene.layout.pitch == pytest.approx(wanted.pitch, rel=1e-12)
@@ -110,7 +104,7 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name: str) -> None:
     assert (scene.preset, scene.method) == (wanted.preset, wanted.method)
 
 
-def test_beds_for_a_person_are_made_for_hands_and_one_that_a_script_does_not_name_is_the_paper_s() -> None:
+def test_beds_for_a_person_are_made_for_hands_and_one_that_a_script_does_not_name_is_the_paper_s():
     made = [properties.scene_of(add(**named)) for named in ({}, {"bed": "design"}, {"bed": "fine"})]
     assert [(scene.preset, scene.method) for scene in made] == [
         ("paper", "virtual_master"), ("design", "hybrid"), ("design", "hybrid"),
@@ -119,23 +113,185 @@ def test_beds_for_a_person_are_made_for_hands_and_one_that_a_script_does_not_nam
     assert (plain.preset, plain.method) == ("fast", "elastic")
 
 
-def test_a_bed_of_a_kind_may_have_another_plan() -> None:
-    scene = properties.scene_of(add(bed="design", rows=6, columns=30, pitch=2.7, arrangement="staggered"))
-    # The pitch is the number typed, and not its 32 bits.
-    assert (scene.layout.rows, scene.layout.columns, scene.layout.pitch) == (6, 30, 2.7e-3)
-    assert (scene.layout.arrangement, scene.fingers[0].fingertip.length) == ("staggered", 5e-3)
-
-
-def test_a_pitch_at_which_cylinders_would_overlap_makes_them_narrower() -> None:
+def test_a_pitch_at_which_cylinders_would_overlap_makes_them_narrower():
     scene = properties.scene_of(add(rows=6, columns=6, pitch=0.5))
     assert scene.actuator.bore == pytest.approx(2 / 3 * scene.layout.pitch)
     assert properties.scene_of(add(rows=6, columns=6, pitch=2.5)).actuator.bore == 2e-3
 
 
-def test_a_preset_that_cannot_be_read_is_refused_in_one_line(preset: str) -> None:
+def test_a_preset_that_cannot_be_read_is_refused_in_one_line(preset):
     own_presets.path(preset).write_text("valve = 3\n")
     before = len(bpy.data.objects)
     with pytest.raises(RuntimeError, match=r"valve must be a section") as caught:
         bpy.ops.mesh.digital_clay_add(preset=preset)
     assert "Traceback" not in str(caught.value)
     assert len(bpy.data.objects) == before
+
+
+@pytest.fixture(autouse=True)
+def no_presets():
+    yield
+    for name in own_presets.names():
+        own_presets.remove(name)
+
+
+@pytest.fixture
+def bed():
+    return new_bed()
+
+
+def test_a_saved_preset_is_a_scene_file_of_all_parameters(bed):
+    bed.digiclay.valve.stroke = 0.041
+    assert bpy.ops.digiclay.preset_save(name="Stiff clay") == {"FINISHED"}
+    scene = load(own_presets.path("Stiff clay"))
+    assert scene == dataclasses.replace(properties.scene_of(bed), name="Stiff clay")
+    bed.digiclay.valve.stroke = 0.05
+    bpy.ops.digiclay.preset_save(name="Stiff clay")  # replaces the former
+    assert load(own_presets.path("Stiff clay")).valve.stroke == 50e-6
+    assert [file.name for file in own_presets.folder().iterdir()] == ["Stiff clay.toml"]
+    for name in ("Ärger über Öl", "a b", "v1.2"):
+        bpy.ops.digiclay.preset_save(name=name)
+        assert bpy.ops.digiclay.preset_apply(preset=name) == {"FINISHED"}
+    assert set(own_presets.names()) == {"Stiff clay", "Ärger über Öl", "a b", "v1.2"}
+
+
+def test_applying_a_preset_sets_everything_but_the_layout(bed):
+    table = {"layout": {"rows": 30}, "preset": "viscous", "control": {"method": "elastic", "stiffness": 33.0}}
+    own_presets.save("Rubber", resolve(table))
+    assert bpy.ops.digiclay.preset_apply(preset="Rubber") == {"FINISHED"}
+    scene, wanted = properties.scene_of(bed), resolve({**table, "layout": {}}, bed.name)
+    assert scene == wanted
+    assert bed.digiclay.own_preset == "Rubber"
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_applying_one_of_the_core_s_presets_changes_what_a_scene_file_would(name, bed):
+    assert bpy.ops.digiclay.preset_apply(preset=name) == {"FINISHED"}
+    assert properties.scene_of(bed) == resolve({"preset": name, "control": {"ground": "cell"}}, bed.name)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "  ", "paper", "Viscous", "../up", "a/b", ".hidden", "x" * 61, "a\nb", "what?", "end."]
+)
+def test_a_name_that_no_preset_can_have_is_refused(name, bed):
+    with pytest.raises(OutputError, match=r"^The preset's name must"):
+        own_presets.save(name, properties.scene_of(bed))
+    assert own_presets.names() == []
+
+
+def test_removing_a_preset_leaves_the_bed_its_parameters(bed):
+    assert not bpy.ops.digiclay.preset_remove.poll(), "those that come along stay"
+    bed.digiclay.valve.stroke = 0.041
+    bpy.ops.digiclay.preset_save(name="Mine")
+    assert bpy.ops.digiclay.preset_remove() == {"FINISHED"}
+    assert own_presets.names() == []
+    assert (bed.digiclay.own_preset, properties.scene_of(bed).valve.stroke) == ("", 41e-6)
+
+
+@pytest.mark.parametrize(
+    "content", [None, "", "valve = 3\n", "[valve]\nstroke = nan\n", "import os\n", "\x00"]
+)
+def test_a_preset_that_was_spoilt_or_is_gone_is_told_of_in_one_line(content, bed):
+    before = properties.scene_of(bed)
+    own_presets.folder().mkdir(parents=True, exist_ok=True)
+    if content is not None:
+        own_presets.path("Spoilt").write_text(content)
+    if content == "":  # an empty scene file is a whole scene
+        assert bpy.ops.digiclay.preset_apply(preset="Spoilt") == {"FINISHED"}
+        return
+    with pytest.raises(RuntimeError, match=r"Spoilt\.toml") as caught:
+        bpy.ops.digiclay.preset_apply(preset="Spoilt")
+    assert "Traceback" not in str(caught.value)
+    assert properties.scene_of(bed) == before
+
+
+def test_a_folder_that_cannot_be_made_is_told_of(bed):
+    folder: Path = own_presets.folder()
+    if folder.exists():
+        folder.rmdir()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.write_text("a file stands in the way")
+    try:
+        with pytest.raises(OutputError, match=r"^Cannot write .*Mine\.toml"):
+            own_presets.save("Mine", properties.scene_of(bed))
+    finally:
+        os.unlink(folder)
+
+
+@pytest.mark.parametrize("name", ["ridge_mound_valley", "dome_peaked", list_samples()[-1]])
+def test_a_sample_session_opens_as_the_bed_it_describes(name):
+    assert bpy.ops.digiclay.add_sample(sample=f"session:{name}", take=False) == {"FINISHED"}
+    bed, wanted = bpy.context.object, load(find(name))
+    made = properties.scene_of(bed)
+    for section in ("layout", "control", "fingertip"):
+        assert made.section(section) == wanted.section(section)
+    start = wanted.section("trajectory").waypoints[0].position
+    # 32 bits of a few tenths of a Blender unit.
+    assert np.abs(bridge.pose(fingertip_of(bed))[:3] - start).max() < 1e-7
+    # What a scene needs from elsewhere is in the .blend.
+    assert (made.shape is None) == (wanted.shape is None)
+    assert made.shape is None or made.shape.heights
+
+
+@pytest.mark.parametrize("name", ["face", "knot", list_shapes()[-1]])
+def test_a_sample_shape_opens_on_a_bed_that_displays_it(name):
+    assert bpy.ops.digiclay.add_sample(sample=f"shape:{name}") == {"FINISHED"}
+    height = bridge.read_cells(bpy.context.object.data)["height"]
+    # The dead band at either end.
+    assert np.ptp(height) == pytest.approx(15e-3, abs=21e-6)
+
+
+@pytest.mark.parametrize("name", ["tap", "dome_peaked"])
+def test_a_sample_s_session_is_a_take_that_replays_bit_for_bit(name):
+    assert bpy.ops.digiclay.add_sample(sample=f"session:{name}") == {"FINISHED"}
+    bed = bpy.context.object
+    (entry,) = takes.list_takes(bed)
+    assert entry.name == name
+    assert entry.seconds == pytest.approx(load(find(name)).simulation.duration, abs=5e-3)
+    assert replayed(takes.read(bed, entry.number))
+
+
+@pytest.mark.parametrize("how", ["EXEC_DEFAULT", "INVOKE_DEFAULT"], ids=["in the dialog", "dropped"])
+def test_a_scene_file_opens_and_a_session_too_long_to_wait_for_is_left_to_the_command_line(tmp_path, how):
+    path = tmp_path / "mein Beet äöü.toml"
+    for text, pins in (((SAMPLES / "tap.toml").read_text(), 121), ("simulation.duration = 3600", 625)):
+        path.write_text(text, encoding="utf-8")
+        assert bpy.ops.digiclay.open_scene(how, filepath=str(path)) == {"FINISHED"}
+        assert is_bed(bpy.context.object)
+        assert len(bpy.context.object.data.vertices) == pins
+    assert takes.list_takes(bpy.context.object) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "cannot be read"),
+        ("[valve\n", "line 1"),
+        ("[layout]\nrows = 0", "layout.rows must be at least 1"),
+        ('[shape]\nfile = "nowhere.stl"', "nowhere.stl: there is no such file"),
+    ],
+)
+def test_a_file_that_is_no_scene_is_refused_whole(tmp_path, content, said):
+    path = tmp_path / "odd.toml"
+    if content is not None:
+        path.write_text(content, encoding="utf-8")
+    before = len(bpy.data.objects), len(bpy.data.meshes)
+    with pytest.raises(RuntimeError, match=said):
+        bpy.ops.digiclay.open_scene(filepath=str(path))
+    assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
+
+
+def test_a_scene_file_may_be_dropped_into_a_3d_view_only():
+    class Context:
+        area: Any = None
+
+    class Area:
+        type = "VIEW_3D"
+
+    context = Context()
+    assert not SceneFiles.poll_drop(context)
+    context.area = Area()
+    assert SceneFiles.poll_drop(context)
+    context.area.type = "IMAGE_EDITOR"
+    assert not SceneFiles.poll_drop(context)
+    assert SceneFiles.bl_import_operator == "digiclay.open_scene"

@@ -1,9 +1,6 @@
 """Every operator with odd things active, in every mode: it is refused or does its work, and never fails."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -69,7 +66,7 @@ ODD: dict[str, Callable[[Any], object]] = {
 
 
 @pytest.fixture
-def file(extension: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def file(extension, tmp_path, monkeypatch):
     """A file with a small bed, active, beside Blender's cube: it loads quicker than a bed is made."""
     monkeypatch.chdir(tmp_path)  # for what is exported
     new_bed(rows=5, columns=5)
@@ -129,7 +126,7 @@ def call(operator: Any, how: str, settings: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize("live", [False, True])
 @pytest.mark.parametrize("odd", ODD)
-def test_no_operator_fails(file: str, odd: str, live: bool, capfd: pytest.CaptureFixture[str]) -> None:
+def test_no_operator_fails(file, odd, live, capfd):
     before, said = prepare(file, odd, live), []
     for operator, how, settings in calls(live and odd in FOR_ADDS):
         said.append((operator.idname(), settings, call(operator, how, settings)))

@@ -1,10 +1,12 @@
-"""Enabling and disabling the extension, its import as a user runs it, and its preferences."""
-
-from __future__ import annotations
+"""Enabling and disabling the extension, its import, its preferences, and its zip in a Blender of its own."""
 
 import itertools
+import json
+import os
+import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -22,13 +24,13 @@ from digiclay.device.instant import Instant
 from digiclay.device.parts import ROLE
 from digiclay.settings import properties
 
+from tests.timeouts import TIMEOUT
+
 #: Positions are float32 and drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
-MANIFEST = Path(digiclay.__file__).with_name("blender_manifest.toml")
 
 
 def ours(functions: Iterable[Any]) -> int:
-    """Count the functions that are of this package."""
     return sum(getattr(function, "__module__", "").startswith("digiclay") for function in functions)
 
 
@@ -45,7 +47,7 @@ def footprint() -> set[str]:
     return found | {f"{ours(each)} in {name}" for name, each in handlers.items() if ours(each)}
 
 
-def test_the_extension_registers_unregisters_and_registers_again_without_a_trace() -> None:
+def test_the_extension_registers_unregisters_and_registers_again_without_a_trace():
     assert footprint() == set()
     digiclay.register()
     first, command = footprint(), command_line.COMMAND.handle
@@ -60,19 +62,8 @@ def test_the_extension_registers_unregisters_and_registers_again_without_a_trace
     assert footprint() == set()
 
 
-def test_importing_the_package_imports_nothing_heavy_and_registers_nothing() -> None:
-    heavy = "{'bpy', 'numpy', 'trimesh'}"
-    script = f"import digiclay, sys; print(sorted({heavy} & {{name.split('.')[0] for name in sys.modules}}))"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=MANIFEST.parents[1], capture_output=True, text=True
-    )
-    assert done.stdout == "[]\n", done.stderr
-
-
 @pytest.mark.usefixtures("extension")
-def test_an_imported_run_has_its_settings_and_shows_the_row_asked_for(
-    tmp_path: Path, formed: Instant
-) -> None:
+def test_an_imported_run_has_its_settings_and_shows_the_row_asked_for(tmp_path, formed):
     heights = np.stack([formed.height, formed.height[::-1]])
     scene = 'control = "absent"\n[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n'
     scene += "[valve]\nstroke = 41e-6\n"
@@ -95,7 +86,7 @@ def test_an_imported_run_has_its_settings_and_shows_the_row_asked_for(
 
 
 @pytest.mark.parametrize("row", [2, -3])
-def test_a_row_the_history_does_not_have_is_refused(row: int, formed: Instant) -> None:
+def test_a_row_the_history_does_not_have_is_refused(row, formed):
     names = ("height", "mode", "force", "fingertip")
     history = {name: np.stack([getattr(formed, name)] * 2) for name in names}
     with pytest.raises(OutputError, match=r"2 rows, 0 to 1 \(got -?\d\)"):
@@ -104,7 +95,7 @@ def test_a_row_the_history_does_not_have_is_refused(row: int, formed: Instant) -
 
 @pytest.mark.usefixtures("extension")
 @pytest.mark.parametrize("content", [None, b"", b"not a run"])
-def test_a_file_that_is_no_run_is_refused_in_one_line(tmp_path: Path, content: bytes | None) -> None:
+def test_a_file_that_is_no_run_is_refused_in_one_line(tmp_path, content):
     path = tmp_path / "history.npz"
     (tmp_path / "scene.toml").write_text("")
     if content is not None:
@@ -136,7 +127,6 @@ XYZ = np.array(
 
 
 def lab(light: np.ndarray) -> np.ndarray:
-    """Return CIE L*a*b* of linear light."""
     x, y, z = (np.cbrt(v) if v > 216 / 24389 else (24389 / 27 * v + 16) / 116 for v in XYZ @ light)
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
@@ -149,7 +139,7 @@ def mode_color(mode: Mode) -> tuple[float, ...]:
 
 @pytest.mark.parametrize("vision", VISION)
 @pytest.mark.parametrize("name", palettes.PALETTES)
-def test_any_two_modes_look_different_with_any_color_vision(name: str, vision: str) -> None:
+def test_any_two_modes_look_different_with_any_color_vision(name, vision):
     seen = [
         lab(np.clip(VISION[vision] @ linear(color)[:3], 0.0, 1.0))
         for color in palettes.PALETTES[name].values()
@@ -159,38 +149,30 @@ def test_any_two_modes_look_different_with_any_color_vision(name: str, vision: s
 
 
 @pytest.mark.usefixtures("extension")
-def test_a_palette_recolors_the_beds_of_the_file() -> None:
+def test_a_palette_recolors_the_beds_of_the_file_and_a_second_bed_leaves_colors_the_user_has_changed():
+    before = len(bpy.data.materials)
+    palettes.set_palette("brightness")  # without a bed
+    assert (palettes.has_palette(), len(bpy.data.materials)) == (False, before)
     bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
     palettes.set_palette("tol_muted")
     for mode, color in palettes.PALETTES["tol_muted"].items():
         # float32 numbers up to 1.
         np.testing.assert_allclose(mode_color(mode), linear(color), rtol=0, atol=1e-6)
-
-
-@pytest.mark.usefixtures("extension")
-def test_a_second_bed_leaves_colors_the_user_has_changed() -> None:
-    bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
     (material,) = (item for item in bpy.data.materials if item.get(ROLE) == "rest")
     material.diffuse_color = (1.0, 0.0, 0.0, 1.0)
     bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
     assert mode_color(Mode.REST) == (1.0, 0.0, 0.0, 1.0)
 
 
-def test_a_palette_in_a_file_without_a_bed_does_nothing() -> None:
-    before = len(bpy.data.materials)
-    palettes.set_palette("brightness")
-    assert (palettes.has_palette(), len(bpy.data.materials)) == (False, before)
-
-
 @pytest.mark.usefixtures("extension")
-def test_where_the_package_is_not_enabled_the_preferences_are_the_defaults_of_the_properties() -> None:
+def test_where_the_package_is_not_enabled_the_preferences_are_the_defaults_of_the_properties():
     assert preferences.get(bpy.context) == preferences.defaults()
     shown = preferences.Preferences.bl_rna.properties
     for name, value in vars(preferences.defaults()).items():
         assert shown[name].default == value
 
 
-def test_what_fails_to_register_leaves_nothing_registered(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_fails_to_register_leaves_nothing_registered(monkeypatch):
     from digiclay import panels
 
     def refuse() -> None:
@@ -201,3 +183,96 @@ def test_what_fails_to_register_leaves_nothing_registered(monkeypatch: pytest.Mo
         digiclay.register()
     assert not hasattr(bpy.types.Object, "digiclay")
     assert "MESH_OT_digital_clay_add" not in dir(bpy.types)
+
+
+HERE = Path(__file__).parent
+TOOL = HERE.parents[1] / "tools" / "extension.py"
+#: Packages that stand beside the extension.
+BESIDE = ("benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study")
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    out = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, str(TOOL), "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
+    assert done.returncode == 0, done.stderr
+    (found,) = out.glob("*.zip")
+    return found
+
+
+@pytest.fixture(scope="module")
+def seen(archive, tmp_path_factory):
+    """What a Blender of its own, with settings of its own, saw of the installed extension."""
+    folder = tmp_path_factory.mktemp("used")
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "settings")}
+    # Started elsewhere and without the checkout's path: it has the zip and nothing else of digiclay.
+    environment.pop("PYTHONPATH", None)
+    command = [sys.executable, "-P", str(HERE / "use_the_zip.py"), str(archive), str(folder)]
+    done = subprocess.run(
+        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
+    )
+    assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    assert "Traceback" not in done.stderr
+    result: dict[str, Any] = json.loads((folder / "seen.json").read_text())
+    return result | {"files": sorted(file.name for file in folder.iterdir())}
+
+
+def test_no_benchmark_and_no_module_of_the_paper_or_the_studies_is_in_the_zip(archive):
+    files = [path for folder in BESIDE for path in (TOOL.parents[1] / folder).glob("*.py")]
+    contents = {path.read_bytes() for path in files}
+    assert len(contents) > 30
+    with zipfile.ZipFile(archive) as zipped:
+        assert [name for name in zipped.namelist() if zipped.read(name) in contents] == []
+
+
+def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path):
+    """The tags are looked at: they go unchecked unless the tool is told where they stand."""
+    copy = tmp_path / "checkout"
+    for name in ("addon", "tools", "requirements", "LICENSE", "LICENSES"):
+        source = TOOL.parents[1] / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, copy / name)
+    subprocess.run(["git", "init", "-q", str(copy)], check=True)
+    wheels = TOOL.parents[1] / "build" / "wheels"
+    if wheels.is_dir():
+        shutil.copytree(wheels, copy / "build" / "wheels")
+    manifest = copy / "addon" / "digiclay" / "blender_manifest.toml"
+    manifest.write_text(manifest.read_text().replace('"Modeling"', '"Pottery"'))
+    command = [sys.executable, str(copy / "tools" / "extension.py")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
+    assert done.returncode != 0
+    assert "Pottery" in done.stderr
+    assert not (copy / "dist").exists()
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"installed": ["FINISHED"], "enabled": True}, "the zip installs and enables"),
+        ({"bundled": 1, "imported at once": []}, "trimesh comes along and is not imported at once"),
+        ({"added": ["FINISHED"], "scene": 36}, "the operator adds a bed with its settings"),
+        ({"redraw rate": 24}, "the preferences are those Blender shows"),
+        ({"own presets": [str(Path("presets", "Mine.toml"))]}, "presets stand in the extension's own folder"),
+        ({"describe": 0, "run": 0, "export": 0, "render": 0}, "the command carries out"),
+        ({"own method": "mine", "own run": 0}, "a method of one's own is offered and runs"),
+        ({"own methods": [[], ["mine"]]}, "it goes and comes back with the extension"),
+        ({"left behind": [], "added again": ["FINISHED"]}, "disabled it leaves nothing; it is enabled again"),
+    ],
+)
+def test_in_a_blender_of_its_own(seen, wanted, words):
+    assert {name: seen[name] for name in wanted} == wanted, words
+    assert {"a tap", "surface.stl", "still.png"} <= set(seen["files"])
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("paper", "run 'pip install digiclay[plots]' first."),
+        ("study", "run 'pip install digiclay[study]' first."),
+        ("tune", "run 'pip install digiclay[study]' first."),
+        ("benchmark", "'python -m benchmarks --help'"),
+    ],
+)
+def test_the_command_says_in_a_line_what_it_lacks(command, said, seen):
+    code, told = seen[command]
+    assert (code, told.count("\n"), said in told) == (2, 1, True)

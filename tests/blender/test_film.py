@@ -1,7 +1,6 @@
-"""Films show the recorded rows, one after another, and leave nothing behind."""
+"""Films show the recorded rows and leave nothing behind; by commands, in a batch, in ranges of frames."""
 
-from __future__ import annotations
-
+import json
 import os
 import subprocess
 from pathlib import Path
@@ -10,18 +9,25 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.commands.render import stage_moving
+from digiclay.cli import main
+from digiclay.commands.gallery import WIDTH as THUMBNAIL
+from digiclay.commands.job_steps import Work, find_frames, is_done
+from digiclay.commands.render import ARRAYS, stage_moving
 from digiclay.compat import scratch
-from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.base.errors import OutputError
 from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.files.formats import is_whole_picture
+from digiclay.core.files.run_folder import lock_name
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.render_settings import Film, Still, Turntable
-from digiclay.core.session.run_scene import run
+from digiclay.core.session.finished_run import read_run
+from digiclay.core.session.render_settings import Film, Still, Turntable, list_missing, name_frame
+from digiclay.core.session.run_scene import run as simulate
+from digiclay.core.studies.job_table import read_outputs
 from digiclay.device.instant import Instant
 from digiclay.pictures import film, still
+from digiclay.pictures.film import draw_frames
 from digiclay.roles import BED, ROLE, fingertips_of
 
 from tests.blender.at_hand import film_strip, inventory, read_picture
@@ -31,7 +37,7 @@ SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 4}
 
 
 @pytest.fixture
-def history() -> dict[str, np.ndarray]:
+def history():
     """One second of a bed that turns from one mode into another half way, while the force rises."""
     bed = make_grid(Layout(rows=5, columns=5))
     time = np.linspace(0.0, 1.0, 201)
@@ -71,7 +77,6 @@ def render(shown: Any, out: Path, looks: Any, set_point: float | None = None, **
 
 
 def filmed(shown: Any, path: Path, looks: Any) -> list[np.ndarray]:
-    """Draw a film of a history, or a turntable of an instant, and read its frames."""
     assert render(shown, path, looks) == path
     return frames_of(path, path.with_suffix(""))[1]
 
@@ -85,7 +90,7 @@ def looks_like(pixels: np.ndarray, mode: Mode) -> int:
     return int((cosine > 0.97).sum())
 
 
-def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path: Path, history: Any) -> None:
+def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path, history):
     before, told = inventory(), list[tuple[int, int]]()
     history["total_force"][:] = 0.3
     looks = Film(**SMALL, arrows=False)
@@ -95,7 +100,6 @@ def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path: Path, histo
     assert inventory() == before
     assert told == [(i, 5) for i in range(1, 6)]
     assert [file.name for file in tmp_path.iterdir()] == ["a film.mp4"]
-    assert path is not None
     rate, pictures = frames_of(path, tmp_path / "frames")
     assert (rate, len(pictures), pictures[0].shape) == (4.0, 5, (HEIGHT, WIDTH, 3))
     blue = [looks_like(picture, Mode.HOLD) for picture in pictures]
@@ -110,7 +114,7 @@ def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path: Path, histo
     np.testing.assert_allclose(shares[1:], 0.03 + 0.94 * np.arange(1, 5) / 4, rtol=0, atol=0.03)
 
 
-def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: Any) -> None:
+def test_arrows_are_red_and_only_there_when_asked_for(tmp_path, history):
     counts = []
     for arrows in (False, True):
         looks = Film(**SMALL, start=0.4, stop=0.45, arrows=arrows, strip=False)
@@ -120,7 +124,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
     assert counts[0] < 5 < counts[1]
 
 
-def test_a_bed_colored_by_force_changes_its_colors_with_the_force(tmp_path: Path, history: Any) -> None:
+def test_a_bed_colored_by_force_changes_its_colors_with_the_force(tmp_path, history):
     history["force"] = history["force"] * 10.0
     pictures = filmed(history, tmp_path / "film.mp4", Film(**SMALL, color="force", arrows=False))
     middle = [picture[HEIGHT // 2 :, WIDTH // 3 :].reshape(-1, 3) for picture in pictures]
@@ -128,7 +132,7 @@ def test_a_bed_colored_by_force_changes_its_colors_with_the_force(tmp_path: Path
     assert yellow[0] < 5 < yellow[-1] / 10
 
 
-def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: Any) -> None:
+def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path, history):
     # One half of the bed is blue: its middle goes round.
     history["mode"][-1] = np.where(history["position"][:, 0] > 0.0, Mode.HOLD, Mode.REST)
     instant = Instant.of(history, -1)
@@ -144,29 +148,19 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: 
     assert np.all(np.sum(turns[:2] * turns[2:], axis=1) < 0.0)
 
 
-def test_a_film_that_is_stopped_leaves_nothing(tmp_path: Path, history: Any) -> None:
+def test_a_film_that_is_stopped_leaves_nothing_and_a_folder_that_cannot_be_written_is_told(tmp_path, history):
     asked = iter([False, True])
     path = tmp_path / "film.mp4"
     assert render(history, path, Film(**SMALL), stopped=lambda: next(asked)) is None
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_part_that_is_not_in_the_session_is_refused_before_any_work(tmp_path: Path, history: Any) -> None:
-    with pytest.raises(ParameterError, match="start must be between 0 s and 1 s"):
-        render(history, tmp_path / "film.mp4", Film(start=3.0))
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, history: Any) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match=r"film\.mp4 cannot be written") as caught:
         render(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
     assert "\n" not in str(caught.value)
 
 
-def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any) -> None:
+def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path, history):
     path = render(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.3))
-    assert path is not None
     data = path.read_bytes()
     assert film.is_whole_film(data)
     assert not any(film.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1))
@@ -179,7 +173,7 @@ def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can make a small disk")
-def test_on_a_full_disk_nothing_half_written_stays(tmp_path: Path, history: Any) -> None:
+def test_on_a_full_disk_nothing_half_written_stays(tmp_path, history):
     disk = tmp_path / "disk"
     disk.mkdir()
     made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4k", "tmpfs", str(disk)], capture_output=True)
@@ -194,7 +188,7 @@ def test_on_a_full_disk_nothing_half_written_stays(tmp_path: Path, history: Any)
         subprocess.run(["umount", str(disk)], check=True)
 
 
-def test_a_film_of_two_fingers_shows_both_and_plots_the_force_of_the_worst() -> None:
+def test_a_film_of_two_fingers_shows_both_and_plots_the_force_of_the_worst():
     def press(x: float, low: float) -> dict[str, Any]:
         ways = [{"time": t, "position": [x, 0.0, z]} for t, z in ((0.0, 0.041), (0.2, low))]
         return {"trajectory": {"waypoints": ways}}
@@ -202,10 +196,152 @@ def test_a_film_of_two_fingers_shows_both_and_plots_the_force_of_the_worst() -> 
     fingers = [press(-0.01, 0.0405), press(0.01, 0.038)]
     bed = {"layout": {"rows": 7, "columns": 13}, "control": {"method": "elastic"}}
     scene = resolve({**bed, "finger": fingers})
-    history = run(scene).history
+    history = simulate(scene).history
     with stage_moving(scene, history, Film(**SMALL)) as shots:
         shots.show(shots.count - 1)
         (bed,) = (thing for thing in shots.scene.objects if thing.get(ROLE) == BED)
         assert len(fingertips_of(bed)) == 2
         words = {thing.data.body for thing in shots.scene.objects if thing.type == "FONT"}
     assert f"force of finger 2 {history['finger_force'][-1, 1]:.2f} N" in words
+
+
+JOBS = """
+scenes = ["tap"]
+methods = ["cell_states"]
+errors = false
+settings.short.simulation.duration = 0.3
+[still]
+width = 160
+height = 100
+engine = "cycles"
+samples = 1
+[turntable]
+width = 64
+height = 40
+frames = 2
+[film]
+width = 160
+height = 100
+rate = 5
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("short") / "run"
+    settings = ["--set", "simulation.duration=0.2", "--no-errors", "--quiet"]
+    assert main(["run", "tap", "--out", str(folder), *settings]) == 0
+    return folder
+
+
+def test_a_run_is_filmed_and_turned_by_commands(run, capsys):
+    small = ["--size", "64x40", "--rate", "5", "--quiet"]
+    assert main(["render", str(run), "--film", "--speed", "0.5", "--color", "force", *small]) == 0
+    assert main(["render", str(run), "--turntable", "--frames", "2", *small]) == 0
+    assert {path.name for path in run.glob("*.mp4")} == {"film.mp4", "turntable.mp4"}
+    assert capsys.readouterr().out == ""
+
+
+def test_a_batch_draws_what_is_asked_for_and_shows_it_on_its_page(capfd):
+    Path("drawn.toml").write_text(JOBS, encoding="utf-8")
+    assert main(["batch", "drawn.toml", "--jobs", "2"]) == 0, capfd.readouterr().out
+    page = Path("drawn/index.html").read_text(encoding="utf-8")
+    folder = Path("drawn/runs/tap-cell_states-short")
+    drawn = {"still.png", "thumbnail.jpg", "turntable.mp4", "film.mp4"}
+    assert drawn <= {path.name for path in folder.iterdir()}
+    # An MP4 file says so at its start.
+    assert all((folder / film).read_bytes()[4:8] == b"ftyp" for film in ("turntable.mp4", "film.mp4"))
+    assert f'href="runs/{folder.name}/film.mp4"' in page
+    timing = json.loads((folder / "timing.json").read_text(encoding="utf-8"))
+    # Blender's module needs some tenths of a second to come up, on any machine.
+    assert 0.2 < timing["start_up"] < 60.0
+    image = bpy.data.images.load(str((folder / "thumbnail.jpg").resolve()))
+    assert tuple(image.size) == (THUMBNAIL, THUMBNAIL * 100 // 160)
+    assert page.count("data:image/jpeg;base64,") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--film", "--size", "65x40"], "--size must be an even number"),
+        (["--film", "--rate", "0"], "--rate must be at least 1"),
+        (["--film", "--start", "7"], "--start must be between 0 s and"),
+        (["--film", "--time", "0"], "--time must not be given with --film"),
+        (["--speed", "2"], "--speed must be given with --film only"),
+        (["--film", "--frames", "9"], "--frames must be given with --turntable only"),
+        (["--film", "--turntable"], "not allowed with argument"),
+    ],
+)
+def test_options_that_do_not_go_together_are_told_in_one_line(arguments, told, run, capsys):
+    assert main(["render", str(run), *arguments]) == 2
+    _, err = capsys.readouterr()
+    assert told in err
+    assert err.count("\n") == 1
+
+
+RANGES = """
+scenes = ["tap"]
+errors = false
+settings.short.simulation.duration = 0.4
+[film]
+width = 64
+height = 40
+rate = 10
+"""
+COUNT = 5
+JOB, RUN = Path("two/jobs/tap-short"), Path("two/runs/tap-short")
+
+
+def test_frames_drawn_in_ranges_are_those_of_the_film(here, capsys):
+    Path("two.toml").write_text(RANGES, encoding="utf-8")
+    assert main(["batch", "two.toml", "--prepare", "--quiet"]) == 0
+    assert main(["job", str(JOB), "--only", "run", "--quiet"]) == 0
+    folder, whole = find_frames(RUN, "film"), here / "whole"
+    whole.mkdir()
+    assert main(["job", str(JOB), "--only", "film", "--frames", "2-3", "--quiet"]) == 0
+    assert list_missing(folder, range(COUNT)) == [0, 1, 4]
+    outputs, found = read_outputs(JOB / "job.toml"), read_run(RUN, *ARRAYS)
+    with stage_moving(found.scene, found.history, outputs.film) as shots:
+        assert shots.count == COUNT
+        assert draw_frames(shots, range(COUNT), whole, here / "film.mp4")
+    for frame in (2, 3):
+        np.testing.assert_array_equal(
+            read_picture(name_frame(folder, frame)), read_picture(name_frame(whole, frame))
+        )
+        assert (read_picture(name_frame(whole, frame)) != read_picture(name_frame(whole, frame - 1))).any()
+    # Another range draws no frame that is there, and again one that a copy cut off; a stop keeps those drawn.
+    kept = name_frame(folder, 3).stat().st_mtime_ns
+    name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
+    asked = iter([False, True])
+    with pytest.raises(KeyboardInterrupt):
+        Work(JOB, RUN, outputs, lambda: next(asked), lambda step, share: None).make_frames("film", "2-4")
+    assert list_missing(folder, range(COUNT)) == [0, 1, 4]
+    assert name_frame(folder, 3).stat().st_mtime_ns == kept
+    np.testing.assert_array_equal(read_picture(name_frame(folder, 2)), read_picture(name_frame(whole, 2)))
+    # A second process on the same frames is refused, and frames that the film does not have.
+    with lock_name(folder / "3-4"):
+        assert main(["job", str(JOB), "--only", "film", "--frames", "3-4", "--quiet"]) == 2
+    assert "3-4 is being written by another digiclay" in capsys.readouterr().err
+    assert main(["job", str(JOB), "--only", "film", "--frames", "0-5", "--quiet"]) == 2
+    assert capsys.readouterr().err == "--frames must be within 0-4, first frame first (got 0-5).\n"
+    # The job as a whole keeps its run, draws what is missing, and makes the film.
+    assert not is_done(JOB, RUN)
+    before = (RUN / "history.npz").stat().st_mtime_ns
+    assert main(["job", str(JOB), "--quiet"]) == 0
+    with scratch():
+        _, count = film_strip(bpy.data.scenes.new("reading"), RUN / "film.mp4")
+    assert (count, folder.exists(), is_done(JOB, RUN)) == (COUNT, False, True)
+    assert (RUN / "history.npz").stat().st_mtime_ns == before
+    timing = json.loads((RUN / "timing.json").read_text(encoding="utf-8"))
+    assert timing["files"]["film.mp4"] == (RUN / "film.mp4").stat().st_size
+    made = (RUN / "film.mp4").stat().st_mtime_ns
+    for part in (["--only", "film"], ["--only", "film", "--frames", "0-3"], []):
+        assert main(["job", str(JOB), *part]) == 0
+        assert " already" in capsys.readouterr().out
+    assert (RUN / "film.mp4").stat().st_mtime_ns == made

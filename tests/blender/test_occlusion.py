@@ -1,8 +1,6 @@
 """An object in front of the pins takes the click, where a view shows it and shows it in front."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -25,14 +23,13 @@ COVERED, BARE = np.array([[0.0, 0.0, 0.04]]), np.array([[0.03, 0.03, 0.04]])
 
 
 @pytest.fixture
-def factory_view(extension: None) -> Iterator[Any]:
-    """The context of the factory file's view, in perspective and Solid mode."""
+def factory_view(extension):
     with in_the_view():
         yield bpy.context
 
 
 @pytest.fixture
-def context(extension: None) -> Iterator[Any]:
+def context(extension):
     """The context of that view, with nothing but a bed."""
     new_bed().scale = (LARGER,) * 3
     with in_the_view():
@@ -43,7 +40,6 @@ def context(extension: None) -> Iterator[Any]:
 
 
 def points_at(context: Any, place: np.ndarray) -> bool:
-    """Return whether the pixel of a place of the bed points at the bed."""
     context.view_layer.update()
     (xy,) = bridge.project(context, beds()[0], place)
     return aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
@@ -58,27 +54,119 @@ def cover(context: Any, distance: float = 4.0) -> Any:
 
 
 def _eye(context: Any) -> Vector:
-    """Return where the view's eye is."""
     return context.region_data.view_matrix.inverted().translation
 
 
-def test_an_object_in_front_hides_the_pins_behind_it_and_no_others(context: Any) -> None:
+def look(context: Any, bed: Any) -> float:
+    """Return how far the eye is from the covered place."""
+    return (_eye(context) - bed.matrix_world @ Vector(COVERED[0] * SCALE)).length
+
+
+def hang(thing: Any, bed: Any) -> None:
+    thing.parent, thing.matrix_parent_inverse = bed, bed.matrix_world.inverted()
+
+
+def isolate(bed: Any, times: int) -> None:
+    """Enter or leave a local view of the bed."""
+    bpy.ops.object.select_all(action="DESELECT")
+    for part in (bed, *bed.children_recursive):
+        part.select_set(True)
+    for _ in range(times):
+        bpy.ops.view3d.localview(frame_selected=False)
+
+
+def shade(context: Any, kind: str, xray: str) -> None:
+    context.space_data.shading.type = kind
+    setattr(context.space_data.shading, xray, True)
+
+
+def add_flat_things(context: Any) -> Any:
+    """Add what has no surface or no size where a cube would hide the pins; return a curve among it."""
+    where = cover(context).location.copy()
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.object.empty_add(location=where)
+    bpy.ops.curve.primitive_bezier_circle_add(radius=0.5, location=where)
+    curve = bpy.context.object
+    bpy.ops.object.light_add(location=where)
+    bpy.ops.mesh.primitive_cube_add(location=where)
+    bpy.context.object.scale = (0.0, 1.0, 1.0)
+    context.scene.collection.objects.link(bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing")))
+    return curve
+
+
+def fill(curve: Any) -> None:
+    curve.dimensions, curve.fill_mode = "2D", "BOTH"
+
+
+def instance(context: Any) -> Any:
+    """Make a cube in front an instance of a collection that the scene does not have."""
+    cube, apart = cover(context), bpy.data.collections.new("Apart")
+    for held in list(cube.users_collection):
+        held.objects.unlink(cube)
+    apart.objects.link(cube)
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", apart
+    context.scene.collection.objects.link(empty)
+    return empty
+
+
+def in_front(thing: Any) -> Any:
+    thing.show_in_front = True
+    return thing
+
+
+#: What is done, and whether the pixel of the covered place points at the bed then.
+IN_FRONT: dict[str, tuple[Callable[[Any, Any], object], bool]] = {
+    "nothing": (lambda view, bed: None, True),
+    "a cube": (lambda view, bed: cover(view), False),
+    "a cube behind the pins": (lambda view, bed: cover(view, -4.0), True),
+    "a cube as wires": (lambda view, bed: setattr(cover(view), "display_type", "WIRE"), True),
+    "a cube as bounds": (lambda view, bed: setattr(cover(view), "display_type", "BOUNDS"), True),
+    "a cube parented to the bed, no part of it": (lambda view, bed: hang(cover(view), bed), False),
+    "a hidden cube": (lambda view, bed: cover(view).hide_set(True), True),
+    "a disabled cube": (lambda view, bed: setattr(cover(view), "hide_viewport", True), True),
+    "a cube where no curves are shown": (
+        lambda view, bed: (cover(view), setattr(view.space_data, "show_object_viewport_curve", False)), False,
+    ),
+    "a cube outside the local view": (lambda view, bed: (cover(view), isolate(bed, 1)), True),
+    "a cube after the local view": (lambda view, bed: (cover(view), isolate(bed, 2)), False),
+    "a cube in X-ray": (lambda view, bed: (cover(view), shade(view, "SOLID", "show_xray")), True),
+    "a cube of wires in X-ray": (
+        lambda view, bed: (cover(view), shade(view, "WIREFRAME", "show_xray_wireframe")), True,
+    ),
+    "a cube of a material": (lambda view, bed: (cover(view), shade(view, "MATERIAL", "show_xray")), False),
+    "a cube behind the eye": (lambda view, bed: cover(view, look(view, bed) + 2.0), True),
+    # 2.5 mm about the eye; drawn from 10 mm on.
+    "a cube nearer than is drawn": (
+        lambda view, bed: setattr(cover(view, look(view, bed)), "scale", (0.01, 0.01, 0.01)), True,
+    ),
+    "a cube, the bed in front of all": (lambda view, bed: (cover(view), in_front(bed)), True),
+    "both in front of all": (lambda view, bed: in_front(cover(view)) and in_front(bed), False),
+    "a cube behind the pins in front of all": (lambda view, bed: in_front(cover(view, -4.0)), False),
+    "what has no surface or size": (lambda view, bed: add_flat_things(view), True),
+    "a filled curve": (
+        lambda view, bed: fill(add_flat_things(view).data), False,
+    ),
+    "an instance of a collection": (lambda view, bed: instance(view), False),
+    "a hidden instance": (lambda view, bed: instance(view).hide_set(True), True),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", IN_FRONT)
+def test_what_a_view_shows_in_front_of_the_pins_takes_the_click(context, case):
+    change, met = IN_FRONT[case]
     assert points_at(context, COVERED)
-    cover(context, distance=-4.0)  # behind the pins
-    assert points_at(context, COVERED)
-    cube = cover(context)
-    assert not points_at(context, COVERED)
+    change(context, beds()[0])
+    assert points_at(context, COVERED) is met
     assert points_at(context, BARE)
-    for kind in ("WIRE", "BOUNDS"):
-        cube.display_type = kind
-        assert points_at(context, COVERED)
-    # What a user has parented to the bed is no part of it.
-    cube.display_type = "SOLID"
-    cube.parent, cube.matrix_parent_inverse = beds()[0], beds()[0].matrix_world.inverted()
-    assert not points_at(context, COVERED)
 
 
-def test_the_bed_does_not_hide_itself_with_its_fingertip(context: Any) -> None:
+def test_where_no_meshes_are_shown_neither_is_the_bed(context):
+    context.space_data.show_object_viewport_mesh = False
+    assert not points_at(context, BARE)
+
+
+def test_the_bed_does_not_hide_itself_with_its_fingertip(context):
     tip = fingertip_of(beds()[0])
     tip.location = Vector(COVERED[0] * SCALE) + Vector((0.0, 0.0, 0.02))
     assert points_at(context, COVERED)
@@ -87,71 +175,7 @@ def test_the_bed_does_not_hide_itself_with_its_fingertip(context: Any) -> None:
     assert not points_at(context, COVERED)
 
 
-def test_what_the_view_does_not_show_hides_nothing(context: Any) -> None:
-    cube = cover(context)
-    cube.hide_set(True)
-    assert points_at(context, COVERED)
-    cube.hide_set(False)
-    cube.hide_viewport = True
-    assert points_at(context, COVERED)
-    cube.hide_viewport = False
-    context.space_data.show_object_viewport_curve = False
-    assert not points_at(context, COVERED)
-    context.space_data.show_object_viewport_mesh = False
-    assert not points_at(context, BARE), "the bed is a mesh too"
-
-
-def test_outside_a_local_view_with_the_bed_an_object_hides_nothing(context: Any) -> None:
-    cover(context)
-    bpy.ops.object.select_all(action="DESELECT")
-    for part in (beds()[0], *beds()[0].children_recursive):
-        part.select_set(True)
-    bpy.ops.view3d.localview(frame_selected=False)
-    assert points_at(context, COVERED)
-    bpy.ops.view3d.localview(frame_selected=False)
-    assert not points_at(context, COVERED)
-
-
-@pytest.mark.parametrize(
-    ("kind", "xray", "through"),
-    [
-        ("SOLID", "show_xray", True),
-        ("WIREFRAME", "show_xray_wireframe", True),
-        ("MATERIAL", "show_xray", False),
-    ],
-)
-def test_xray_shows_the_pins_through_an_object(context: Any, kind: str, xray: str, through: bool) -> None:
-    cover(context)
-    shading = context.space_data.shading
-    shading.type = kind
-    setattr(shading, xray, False)
-    assert not points_at(context, COVERED)
-    setattr(shading, xray, True)
-    assert points_at(context, COVERED) is through
-
-
-def test_behind_the_eye_and_nearer_than_the_view_is_drawn_an_object_hides_nothing(context: Any) -> None:
-    far = (_eye(context) - beds()[0].matrix_world @ Vector(COVERED[0] * SCALE)).length
-    cube = cover(context, distance=far + 2.0)
-    assert points_at(context, COVERED)
-    bpy.data.objects.remove(cube)
-    cover(context, distance=far).scale = (0.01, 0.01, 0.01)  # 2.5 mm about the eye; drawn from 10 mm on
-    assert points_at(context, COVERED)
-
-
-def test_in_front_of_all_others_a_bed_is_seen_and_so_is_an_object(context: Any) -> None:
-    cube = cover(context)
-    beds()[0].show_in_front = True
-    assert points_at(context, COVERED)
-    cube.show_in_front = True
-    assert not points_at(context, COVERED)
-    bpy.data.objects.remove(cube)
-    beds()[0].show_in_front = False
-    cover(context, distance=-4.0).show_in_front = True
-    assert not points_at(context, COVERED)
-
-
-def test_a_clipping_region_takes_away_what_is_outside_it(context: Any) -> None:
+def test_a_clipping_region_takes_away_what_is_outside_it(context):
     looking = context.region_data
     cover(context)
     (xy,) = bridge.project(context, beds()[0], BARE)
@@ -173,38 +197,6 @@ def test_a_clipping_region_takes_away_what_is_outside_it(context: Any) -> None:
     assert points_at(context, COVERED)
 
 
-def test_the_instances_of_a_collection_hide_and_its_hidden_original_does_not(context: Any) -> None:
-    cube = cover(context)
-    apart = bpy.data.collections.new("Apart")
-    apart.objects.link(cube)
-    for held in list(cube.users_collection):
-        if held != apart:
-            held.objects.unlink(cube)
-    assert points_at(context, COVERED)
-    empty = bpy.data.objects.new("Instance", None)
-    empty.instance_type, empty.instance_collection = "COLLECTION", apart
-    context.scene.collection.objects.link(empty)
-    assert not points_at(context, COVERED)
-    empty.hide_set(True)
-    assert points_at(context, COVERED)
-
-
-def test_objects_without_a_surface_or_a_size_hide_nothing(context: Any) -> None:
-    where = cover(context).location.copy()
-    bpy.data.objects.remove(bpy.data.objects["Cube"])
-    bpy.ops.object.empty_add(location=where)
-    bpy.ops.curve.primitive_bezier_circle_add(radius=0.5, location=where)
-    curve = bpy.context.object
-    bpy.ops.object.light_add(location=where)
-    bpy.ops.mesh.primitive_cube_add(location=where, scale=(0.0, 0.0, 0.0))
-    bpy.context.object.scale = (0.0, 1.0, 1.0)
-    bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing"))
-    context.scene.collection.objects.link(bpy.data.objects["Nothing"])
-    assert points_at(context, COVERED)
-    curve.data.dimensions, curve.data.fill_mode = "2D", "BOTH"
-    assert not points_at(context, COVERED)
-
-
 ON_TOP, BESIDE, CURSOR = "on top of it", "beside it", ""
 #: The factory file's cube, changed, or what is added in place of it; where and how high a bed stands then.
 PLACES: dict[str, tuple[dict[str, Any], str, float]] = {
@@ -224,7 +216,7 @@ PLACES: dict[str, tuple[dict[str, Any], str, float]] = {
 
 
 @pytest.mark.parametrize("case", PLACES)
-def test_a_new_bed_stands_at_the_cursor_unless_what_is_there_hides_it(factory_view: Any, case: str) -> None:
+def test_a_new_bed_stands_at_the_cursor_unless_what_is_there_hides_it(factory_view, case):
     values, where, height = PLACES[case]
     cube, add = bpy.data.objects["Cube"], values.get("add")
     if add is not None:
@@ -243,7 +235,7 @@ def test_a_new_bed_stands_at_the_cursor_unless_what_is_there_hides_it(factory_vi
     assert bpy.context.selected_objects == []
 
 
-def test_a_bed_with_a_location_is_put_there_and_a_sample_where_it_is_seen(factory_view: Any) -> None:
+def test_a_bed_with_a_location_is_put_there_and_a_sample_where_it_is_seen(factory_view):
     bpy.ops.mesh.digital_clay_add(location=(0.0, 0.2, 0.1))
     new = bpy.context.object
     assert [*new.location.xy, new.location.z + view.underside(new)] == pytest.approx([0.0, 0.2, 0.1])

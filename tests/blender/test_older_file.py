@@ -1,7 +1,5 @@
 """A file saved before the modules were moved and renamed opens, and its beds go on as they did then."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +29,12 @@ HEIGHTS = dict(np.load(SAMPLES / "heights.npz"))
 
 
 @pytest.fixture(autouse=True)
-def older_file(extension: None) -> None:
+def older_file(extension):
     """Open the file that was saved by Blender 4.2 with the code of 22 November 2026."""
     bpy.ops.wm.open_mainfile(filepath=str(SAMPLES / "beds.blend"))
 
 
 def bed(name: str) -> Any:
-    """Return a bed of the file, active."""
     found = bpy.data.objects[name]
     bpy.context.view_layer.objects.active = found
     return found
@@ -53,13 +50,13 @@ def go_on(name: str, x: float) -> None:
 
 
 @pytest.mark.parametrize(("name", "stored"), [("Session", "session"), ("Settings", "settings")])
-def test_the_kept_state_has_the_stored_heights_and_is_what_is_drawn(name: str, stored: str) -> None:
+def test_the_kept_state_has_the_stored_heights_and_is_what_is_drawn(name, stored):
     np.testing.assert_array_equal(exact(bed(name)), HEIGHTS[stored])
     np.testing.assert_allclose(shown(bed(name)), HEIGHTS[stored], rtol=0, atol=FLOAT32)
 
 
 @pytest.mark.parametrize(("name", "x"), [("Session", 4.0), ("Settings", 0.0)])
-def test_the_session_goes_on_to_the_stored_heights(name: str, x: float) -> None:
+def test_the_session_goes_on_to_the_stored_heights(name, x):
     go_on(name, x)
     stored = HEIGHTS[f"{name.lower()}_later"]
     assert np.abs(stored - HEIGHTS[name.lower()]).max() > 1e-4  # the press forms something
@@ -67,7 +64,7 @@ def test_the_session_goes_on_to_the_stored_heights(name: str, x: float) -> None:
     np.testing.assert_allclose(exact(bed(name)), stored, rtol=0, atol=FLOAT32)
 
 
-def test_an_older_bed_is_colored_by_force_under_the_former_names() -> None:
+def test_an_older_bed_is_colored_by_force_under_the_former_names():
     found = bed("Session")
     shown_as = found.digiclay_display
     shown_as.color, shown_as.top_force = "force", 0.5
@@ -76,7 +73,7 @@ def test_an_older_bed_is_colored_by_force_under_the_former_names() -> None:
     assert {"Colour by Force", "Top Colour at (N)"} <= names
 
 
-def test_the_take_replays_to_the_stored_heights() -> None:
+def test_the_take_replays_to_the_stored_heights():
     found = bed("Session")
     first, second = takes.list_takes(found)
     assert (first.name, second.name) == ("A press", "Take 2")  # the second was recorded when it was saved
@@ -88,7 +85,7 @@ def test_the_take_replays_to_the_stored_heights() -> None:
     np.testing.assert_allclose(exact(found), HEIGHTS["take_end"], rtol=0, atol=ROUNDING)
 
 
-def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip() -> None:
+def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip():
     found = bed("Session")
     pose = bridge.pose(fingertip_of(found))
     np.testing.assert_allclose(pose, beds.read_poses(found)[0], rtol=0, atol=1e-6)  # Blender's 32 bits
@@ -98,7 +95,7 @@ def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip(
     assert running.list_sessions() == ()
 
 
-def test_settings_and_features_of_the_user_s_own_are_those_of_the_scene_file() -> None:
+def test_settings_and_features_of_the_user_s_own_are_those_of_the_scene_file():
     found = bed("Settings")
     assert properties.scene_of(found) == load(SAMPLES / "settings.toml")
     display = found.digiclay_display

@@ -1,14 +1,10 @@
 """Control methods of one's own in Blender: a folder that is off at first, parameters, a file without it."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
 import pytest
-from digiclay import preferences, translations
+from digiclay import preferences
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.methods import METHODS, list_added
 from digiclay.core.scene.toml_table import format_scene
@@ -34,7 +30,7 @@ class Faulty(OwnMethod):
 
 
 @pytest.fixture
-def chosen(tmp_path: Path) -> Iterator[Any]:
+def chosen(tmp_path):
     """Yield the preferences of the extension, with a folder of methods that is not allowed to run yet."""
     write_method(tmp_path)
     write_method(tmp_path, FAULTY, "faulty.py")
@@ -53,7 +49,7 @@ def choose(bed: Any, name: str) -> Any:
     return properties.part_group(bed.digiclay, "control")
 
 
-def test_no_code_is_run_until_the_preferences_allow_it(chosen: Any, tmp_path: Path) -> None:
+def test_no_code_is_run_until_the_preferences_allow_it(chosen, tmp_path):
     assert not preferences.defaults().run_own_methods
     assert (chosen.run_own_methods, list_added()) == (False, {})
     assert not bpy.ops.digiclay.methods_reload.poll()
@@ -75,9 +71,8 @@ def test_no_code_is_run_until_the_preferences_allow_it(chosen: Any, tmp_path: Pa
     assert own_folder.read_present() == ((), ())
 
 
-def test_a_folder_beside_the_file_is_stored_as_a_full_path_or_refused(chosen: Any, tmp_path: Path) -> None:
+def test_a_folder_beside_the_file_is_stored_as_a_full_path_or_refused(chosen, tmp_path):
     def enter() -> None:
-        """Enter the folder as in the preferences."""
         chosen.methods_folder = "//own"
 
     enter()  # beside a file that was never saved
@@ -88,13 +83,13 @@ def test_a_folder_beside_the_file_is_stored_as_a_full_path_or_refused(chosen: An
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     chosen.run_own_methods = True  # as older preferences do when Blender starts: not of whatever file is open
     assert (list_added(), own_folder.read_present().refused) == ({}, (line,))
-    enter()
+    chosen.methods_folder = "//own"
     assert (chosen.methods_folder, chosen.run_own_methods) == (str(tmp_path / "own"), False)
     chosen.run_own_methods = True
     assert list(list_added()) == ["soft_pad"]
 
 
-def test_its_parameters_are_properties_with_units_and_bounds(chosen: Any) -> None:
+def test_its_parameters_are_properties_with_units_and_bounds(chosen):
     chosen.run_own_methods = True
     bed = new_bed(rows=9, columns=9)
     group = choose(bed, "soft_pad")
@@ -115,7 +110,7 @@ def test_its_parameters_are_properties_with_units_and_bounds(chosen: Any) -> Non
     assert (bed.digiclay.chosen_method, properties.scene_of(bed).method) == ("elastic", "elastic")
 
 
-def test_a_session_forms_with_it_and_one_mistake_pauses_the_session(chosen: Any) -> None:
+def test_a_session_forms_with_it_and_one_mistake_pauses_the_session(chosen):
     chosen.run_own_methods = True
     bed = new_bed(rows=9, columns=9)
     choose(bed, "soft_pad")
@@ -134,7 +129,7 @@ def test_a_session_forms_with_it_and_one_mistake_pauses_the_session(chosen: Any)
     tick.stop(bed.session_uid)
 
 
-def test_a_file_without_its_method_says_so_and_uses_no_other(chosen: Any, tmp_path: Path) -> None:
+def test_a_file_without_its_method_says_so_and_uses_no_other(chosen, tmp_path):
     chosen.run_own_methods = True
     bed = new_bed(rows=9, columns=9)
     group = choose(bed, "soft_pad")
@@ -159,9 +154,3 @@ def test_a_file_without_its_method_says_so_and_uses_no_other(chosen: Any, tmp_pa
     bpy.context.view_layer.objects.active = bed
     chosen.run_own_methods = True
     assert format_scene(properties.scene_of(bed)) == format_scene(scene)  # its class is a new one
-
-
-def test_what_it_adds_to_the_preferences_is_translated() -> None:
-    texts = ("Every Python file in this folder is run with all your rights:",
-             "choose a folder that only you can write to, with code that you have read.")  # fmt: skip
-    assert [text for text in texts if translations.translate(text, "de") is None] == []

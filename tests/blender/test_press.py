@@ -1,8 +1,7 @@
-"""The mouse points at the pin drawn under it, and the Press tool comes and goes with the extension."""
+"""The Press tool: where the mouse points, size and presets of the brush, and strokes that a script plays."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
+import ast
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -13,10 +12,15 @@ from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import make_grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.live import beds
+from digiclay.operators.press_adjust import AdjustStrength, BrushMenu
 from digiclay.press import aim, brush, tool
+from digiclay.press.brush import FINGERS, find_kind
 from digiclay.press.tool import drape
 from digiclay.roles import fingertip_of
-from digiclay.settings import properties
+from digiclay.sessions import running
+from digiclay.settings import devices, properties
 from digiclay.strokes.stroke import Brush
 
 from tests.blender.at_hand import in_the_view, new_bed
@@ -40,7 +44,7 @@ def tools() -> list[str]:
 
 
 @pytest.fixture
-def bed(extension: None) -> Any:
+def bed(extension):
     """A staggered bed whose pins all have heights of their own, turned, moved and scaled uniformly."""
     made = new_bed(rows=12, columns=15, arrangement="staggered")
     made.scale = (LARGER,) * 3
@@ -52,20 +56,19 @@ def bed(extension: None) -> Any:
 
 
 @pytest.fixture
-def context(bed: Any) -> Iterator[Any]:
-    """The context as in the main region of the 3D view."""
+def context(bed):
     with in_the_view():
         yield bpy.context
 
 
-def test_blender_reads_the_icon_of_the_tool() -> None:
+def test_blender_reads_the_icon_of_the_tool():
     # As Blender's toolbar does: the name with the ending of its format.
     handle = bpy.app.icons.new_triangles_from_file(f"{tool.PressTool.bl_icon}.dat")
     assert handle > 0
     bpy.app.icons.release(handle)
 
 
-def test_the_tool_comes_and_goes_with_the_extension() -> None:
+def test_the_tool_comes_and_goes_with_the_extension():
     assert tools() == []
     for _ in range(2):
         digiclay.register()
@@ -74,19 +77,17 @@ def test_the_tool_comes_and_goes_with_the_extension() -> None:
         assert tools() == []
 
 
-def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, context: Any) -> None:
+def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed, context):
     cells, height = aim.read_surface(bed)
     tops = np.column_stack([cells.positions, height])
     pixels = bridge.project(context, bed, tops)
     met = [aim.find_target(context, tuple(xy)) for xy in pixels]
     assert all(found is not None and found.bed == bed for found in met)
-    hit = np.array([found.pin for found in met])
     near = np.array([found.point for found in met])
     # A pin may hide another; whatever is met lies in front of the top that was asked for, on the same ray.
-    eye = np.array(context.region_data.view_matrix.inverted().translation)
-    eye = np.array(bed.matrix_world.inverted()) @ [*eye, 1.0]
-    eye = eye[:3] / bridge.SCALE
-    visible = hit == np.arange(cells.count)
+    eye = np.array(bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation)
+    eye /= bridge.SCALE
+    visible = np.array([found.pin for found in met]) == np.arange(cells.count)
     assert visible.sum() > 0.9 * cells.count
     # Blender's matrices are float32, at a distance of 2 m of the device.
     np.testing.assert_allclose(near[visible], tops[visible], rtol=0, atol=2e-6)
@@ -94,7 +95,7 @@ def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, context: Any) 
     assert closer.all()
 
 
-def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, context: Any) -> None:
+def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed, context):
     from bpy_extras.view3d_utils import location_3d_to_region_2d
     from mathutils import Vector
 
@@ -108,7 +109,7 @@ def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, conte
     assert np.isnan(bridge.project(context, bed, 1.5 * eye[None] / bridge.SCALE)).all()
 
 
-def test_a_hidden_or_unevenly_scaled_bed_is_looked_through_and_says_why(bed: Any, context: Any) -> None:
+def test_a_hidden_or_unevenly_scaled_bed_is_looked_through_and_says_why(bed, context):
     cells, height = aim.read_surface(bed)
     middle = np.array([[0.0, 0.0, float(height.max())]])
     xy = tuple(bridge.project(context, bed, middle)[0])
@@ -126,14 +127,14 @@ def test_a_hidden_or_unevenly_scaled_bed_is_looked_through_and_says_why(bed: Any
         aim.hit_point(context, bed, cells, height, xy)
 
 
-def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
+def test_without_a_session_the_surface_is_what_is_drawn(bed):
     cells, height = aim.read_surface(bed)
     wanted = make_grid(properties.scene_of(bed).layout)
     np.testing.assert_array_equal(cells.positions, wanted.positions)
     np.testing.assert_array_equal(height, bridge.read_cells(bed.data)["height"])
 
 
-def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_pressed_in(bed: Any) -> None:
+def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_pressed_in(bed):
     cells, height = aim.read_surface(bed)
     rim = tool.touch_outline(bed, cells, height, np.array([0.002, 0.001, 0.04]), 4e-3)
     finger = bridge.finger_of(fingertip_of(bed))
@@ -143,7 +144,7 @@ def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_presse
     np.testing.assert_array_equal(rim, drape(cells, height, rim[:, :2]))
 
 
-def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit() -> None:
+def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit():
     finger = Fingertip()
     assert brush.describe_brush(finger, Brush.RAISE, 15e-3) == "Size 16 mm   Raise, height 15 mm"
     assert brush.describe_brush(finger, Brush.LOWER, 4e-3, 0.5) == "Size 16 mm   Lower, depth 4 mm × 50 %"
@@ -152,3 +153,209 @@ def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_uni
     assert brush.describe_brush(finger, Brush.UNLOCK, 4e-3) == "Size 16 mm   Unlock"
     assert brush.describe_brush(finger, Brush.STAMP, 4e-3) == "Size 16 mm   Stamp, height 4 mm"
     assert [one for one in Brush if brush.amount_name(one) == "height"] == [Brush.RAISE, Brush.STAMP]
+
+
+@pytest.fixture
+def paper(extension):
+    made = new_bed()
+    bpy.context.view_layer.update()
+    return made
+
+
+def lengths(paper: Any) -> tuple[float, ...]:
+    """Return size of the fingertip, then radius, edge and flat radius of the blister, mm."""
+    scene = properties.scene_of(paper)
+    blister = scene.blister
+    width = 2.0 * scene.fingers[0].fingertip.width
+    lengths = (width, blister.radius, blister.edge_radius, blister.flat_radius)
+    return tuple(round(1e3 * length, 4) for length in lengths)
+
+
+@pytest.mark.parametrize(
+    ("follows", "size", "wanted"),
+    [
+        (True, 8.0, (8.0, 7.5, 9.25, 3.0)), (False, 8.0, (8.0, 15.0, 18.5, 6.0)),
+        (False, 60.0, (60.0, 15.0, 18.5, 6.0)),
+    ],
+)  # fmt: skip
+def test_the_ellipsoid_follows_the_size_and_the_blister_unless_it_is_set_by_itself(
+    paper, follows, size, wanted
+):
+    before = bridge.pose(fingertip_of(paper))
+    paper.digiclay.blister_follows = follows
+    paper.digiclay.size = size
+    assert lengths(paper) == wanted
+    bpy.context.view_layer.update()
+    finger, half = bridge.finger_of(fingertip_of(paper)), size * 0.5e-3
+    assert (finger.length, finger.width, finger.height) == pytest.approx((1.25 * half, half, half), rel=1e-6)
+    # The lowest point stays: a larger finger does not press.
+    np.testing.assert_allclose(bridge.pose(fingertip_of(paper)), before, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(("name", "usual"), [("length", 20.0), ("width", 16.0), ("height", 16.0)])
+def test_the_panel_shows_whole_widths_and_stores_semi_axes(paper, name, usual):
+    group, lowest = paper.digiclay.fingertip, bridge.pose(fingertip_of(paper))
+    assert getattr(group, f"whole_{name}") == usual
+    setattr(group, f"whole_{name}", 12.6)
+    bpy.context.view_layer.update()
+    (finger,) = properties.scene_of(paper).fingers
+    assert getattr(finger.fingertip, name) == 6.3e-3
+    assert paper.digiclay.size == pytest.approx(12.6 if name == "width" else 16.0)
+    np.testing.assert_allclose(bridge.pose(fingertip_of(paper)), lowest, rtol=0, atol=1e-7)
+    assert group.bl_rna.properties[f"whole_{name}"].description.endswith(f"by default {usual:g} mm")
+
+
+@pytest.mark.parametrize(
+    ("typed", "share"),
+    [("0.5", 0.5), (".25", 0.25), ("1", 1.0), ("50", 0.5), ("50 %", 0.5), ("0.5%", 5e-3), ("2*0.3", 0.6)],
+)
+def test_a_strength_is_typed_as_a_share_or_in_per_cent(typed, share):
+    assert AdjustStrength.parse(None, typed) == pytest.approx(share, rel=1e-9)
+
+
+def test_a_blister_that_the_bed_limits_is_the_same_again_with_the_size_before(paper):
+    paper.digiclay.size = 100.0
+    # Half the bed's longer side; a wider blister is no valid scene.
+    assert lengths(paper)[:2] == (100.0, 37.5)
+    paper.digiclay.size = 80.0
+    assert lengths(paper)[1] == 37.5
+    paper.digiclay.size = 16.0
+    assert lengths(paper) == pytest.approx((16.0, 15.0, 18.5, 6.0), rel=1e-5)
+
+
+@pytest.mark.parametrize(("asked", "got"), [(-5.0, 1.0), (0.0, 1.0), (1e9, 200.0)])
+def test_a_size_stays_within_what_a_finger_can_have(paper, asked, got):
+    devices.set_size(paper.digiclay, 1e-3 * asked)
+    assert lengths(paper)[0] == pytest.approx(got, rel=1e-6)
+
+
+def test_the_bracket_keys_scale_it_and_undo_brings_it_back_and_without_a_fingertip_they_do_nothing(paper):
+    bpy.ops.ed.undo_push(message="Add")
+    bpy.ops.digiclay.press_scale("EXEC_DEFAULT", True, scalar=1.5)
+    assert lengths(bpy.context.object)[0] == pytest.approx(24.0)
+    bpy.ops.ed.undo()
+    assert lengths(bpy.context.object)[0] == pytest.approx(16.0)
+    bpy.data.objects.remove(fingertip_of(bpy.context.object))
+    assert not bpy.ops.digiclay.press_scale.poll()
+
+
+@pytest.mark.parametrize("kind", list(FINGERS))
+def test_each_preset_finger_can_be_simulated_and_is_undone_in_one_step(paper, kind):
+    bpy.ops.ed.undo_push(message="Add")
+    paper.digiclay.size = 30.0
+    bpy.ops.ed.undo_push(message="Size")
+    bpy.ops.digiclay.press_finger("EXEC_DEFAULT", True, kind=kind)
+    scene = properties.scene_of(bpy.context.object)
+    assert find_kind(scene.fingers[0].fingertip) is FINGERS[kind]
+    assert scene.blister.radius == pytest.approx(min(37.5e-3, 15 / 8 * FINGERS[kind].finger.width), rel=1e-5)
+    assemble(scene)
+    bpy.ops.ed.undo()
+    assert lengths(bpy.context.object)[0] == pytest.approx(30.0)
+
+
+SHIPPED = Path(brush.HOME, "presets", brush.SUBFOLDER)
+
+
+@pytest.fixture
+def settings(extension, tmp_path, monkeypatch):
+    """The settings of the tool in hand, over a bed; the user's own presets are in a folder of their own."""
+    monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(tmp_path))
+    new_bed()
+    with in_the_view():
+        bpy.ops.wm.tool_set_by_id(name=brush.TOOL)
+        yield brush.tool_settings(bpy.context)
+
+
+def apply(name: str) -> None:
+    """Apply a preset as its entry in the menu does."""
+    (folder,) = [Path(path) for path in bpy.utils.preset_paths(brush.SUBFOLDER)][-1:]
+    file = next(path for path in (SHIPPED / f"{name}.py", folder / f"{name}.py") if path.is_file())
+    bpy.ops.digiclay.press_brush(filepath=str(file), menu_idname=BrushMenu.bl_idname)
+
+
+@pytest.mark.parametrize("file", sorted(SHIPPED.glob("*.py")), ids=lambda file: file.stem)
+def test_each_preset_sets_a_known_finger_and_every_setting(settings, file):
+    shown = settings.bl_rna.properties
+    wanted = {name: shown[name].default for name in brush.list_settings(settings)}
+    lines = [line.split(" = ") for line in file.read_text().splitlines() if line.startswith("settings.")]
+    wanted |= {name.removeprefix("settings."): ast.literal_eval(value) for name, value in lines}
+    settings.brush, settings.depth, settings.height, settings.strength = "LEVEL", 9.0, 9.0, 0.5
+    settings.symmetry, settings.path, settings.stabilizer, settings.pressure_curve = "XY", "LINE", 9.0, "SOFT"
+    settings.use_pressure = settings.use_tilt = False
+    assert str(SHIPPED) in bpy.utils.preset_paths(brush.SUBFOLDER)
+    bpy.context.object.digiclay.size = 40.0
+    apply(file.stem)
+    assert find_kind(devices.read_finger(bpy.context.object.digiclay)) in FINGERS.values()
+    assert {name: getattr(settings, name) for name in wanted} == wanted
+
+
+def test_a_preset_that_cannot_be_run_changes_nothing(settings, tmp_path):
+    settings.depth, settings.symmetry = 7.5, "XY"
+    file = tmp_path / "broken.py"
+    file.write_text("settings.depth = 3.0")
+    with pytest.raises(RuntimeError, match="settings"):
+        bpy.ops.digiclay.press_brush(filepath=str(file), menu_idname=BrushMenu.bl_idname)
+    assert (settings.depth, settings.symmetry) == (7.5, "XY")
+
+
+def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings, tmp_path):
+    settings.depth, settings.symmetry, settings.path = 7.5, "XY", "RING"
+    bpy.context.object.digiclay.size = 11.0
+    bpy.ops.digiclay.press_brush_save(name="Of my own")
+    (saved,) = [
+        file for path in bpy.utils.preset_paths(brush.SUBFOLDER) for file in Path(path).glob("Of_my_own.py")
+    ]
+    assert saved.is_relative_to(tmp_path)
+    settings.depth, settings.symmetry, settings.path = 2.0, "NONE", "FREE"
+    bpy.context.object.digiclay.size = 30.0
+    bpy.ops.digiclay.press_brush(filepath=str(saved), menu_idname=BrushMenu.bl_idname)
+    assert (settings.depth, settings.symmetry, settings.path) == (7.5, "XY", "RING")
+    assert bpy.context.object.digiclay.size == pytest.approx(11.0, abs=1e-3)
+    bpy.ops.digiclay.press_brush_save(name="Of_my_own", remove_name=True)
+    assert not saved.exists()
+    bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    assert not bpy.ops.digiclay.press_brush.poll()
+
+
+PRESS = "[[stroke]]\ndepth = 0.003\nwidth = 0.012\nmoves = [[0, -0.006, 0], [0.2, 0.006, 0]]\n"
+
+
+@pytest.fixture
+def small(extension):
+    return new_bed(rows=9, columns=11)
+
+
+def depths(small: Any) -> Any:
+    """Return how far the pins drawn are below rest, mm."""
+    return 40.0 - 1e3 * bridge.read_cells(small.data)["height"].reshape(9, 11)
+
+
+def test_strokes_are_formed_and_kept_by_the_bed(small, tmp_path):
+    file = tmp_path / "press.toml"
+    file.write_text(PRESS, encoding="utf-8")
+    assert bpy.ops.digiclay.play_strokes(filepath=str(file)) == {"FINISHED"}
+    assert depths(small)[4, 5] > 1.5
+    assert running.find(small) is None
+    assert beds.read_snapshot(small) is not None
+    # Its fingertip is above the bed again, of its own size.
+    assert bridge.finger_of(fingertip_of(small)).width == pytest.approx(8e-3)
+    assert bridge.pose(fingertip_of(small))[2] > 40e-3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[[stroke", "line 1"),
+        (f"{PRESS}wide = 3", "known key"),
+        (f'{PRESS}{PRESS}brush = "raise"\n', r"Stroke 2 \(raise\) needs a method with a blister"),
+    ],
+)
+def test_strokes_that_cannot_be_read_or_formed_leave_the_bed_as_it_was(small, tmp_path, text, said):
+    small.digiclay.method = "elastic"
+    file = tmp_path / "wrong.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(RuntimeError, match=said) as caught:
+        bpy.ops.digiclay.play_strokes(filepath=str(file))
+    assert "Traceback" not in str(caught.value)
+    assert np.abs(depths(small)).max() < 1e-3
+    assert running.find(small) is None

@@ -1,10 +1,6 @@
-"""Takes kept in the .blend and baked: what they show frame by frame, and what undoing them leaves."""
-
-from __future__ import annotations
+"""Takes: what the buttons of their panel do, what a bake shows, and what undoing them leaves."""
 
 import functools
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -13,8 +9,10 @@ import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.engine.simulation import begin
+from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
@@ -22,18 +20,155 @@ from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.take import Take
 from digiclay.device import view
 from digiclay.device.instant import Instant
+from digiclay.live import beds, tick
 from digiclay.recorded import bake, takes
 from digiclay.roles import ROLE, fingertip_of
+from digiclay.sessions import running
 from numpy.typing import NDArray
 
-from tests.blender.at_hand import open_bed
+from tests.blender.at_hand import new_bed, open_bed, save_and_open
+
+#: Time between two ticks, s: a session follows ten control periods in each.
+TICK = 0.05
+
+
+@pytest.fixture
+def clay(extension):
+    """Return a bed added as a user adds it, active, in a file that plays 40 frames a second."""
+    made = new_bed(rows=12, columns=12)
+    bpy.context.scene.render.fps = 40
+    return made
+
+
+def press(clay: Any, ticks: int = 12, *, deep: float = 8e-3) -> None:
+    """Let a session live while the finger goes down from 2 mm above the pins."""
+    tip = fingertip_of(clay)
+    top = bridge.read_cells(clay.data)["height"].max() * bridge.SCALE
+    reach = bridge.pose(tip)[2] * bridge.SCALE - tip.location.z
+    for count in range(ticks + 1):
+        tip.location.z = top - reach + (2e-3 - deep * count / ticks) * bridge.SCALE
+        bpy.context.view_layer.update()
+        tick.tick(bpy.context, 100.0 + TICK * count)
+
+
+def find_heights(clay: Any) -> NDArray[np.float64]:
+    return bridge.read_cells(clay.data)["height"]
+
+
+def begin_recording(clay: Any) -> None:
+    tick.start(bpy.context, clay)
+    bpy.ops.digiclay.take_record()
+
+
+def record(clay: Any) -> str:
+    """Record a press and keep it; return the take's number. The session is stopped."""
+    begin_recording(clay)
+    press(clay)
+    assert bpy.ops.digiclay.take_keep(name="A press") == {"FINISHED"}
+    tick.stop(clay.session_uid)
+    return takes.list_takes(clay)[-1].number
+
+
+def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(clay):
+    number = record(clay)
+    kept, drawn = beds.read_snapshot(clay), find_heights(clay)
+    tick.start(bpy.context, clay)
+    press(clay, deep=11e-3)
+    tick.stop(clay.session_uid)
+    assert beds.read_snapshot(clay) != kept
+    assert bpy.ops.digiclay.take_replay(take=number) == {"FINISHED"}
+    assert beds.read_snapshot(clay) == kept == takes.read(clay, number).end
+    assert np.array_equal(find_heights(clay), drawn)
+    tick.start(bpy.context, clay)  # it goes on from there
+    assert running.find(clay).state.period == takes.read(clay, number).periods
+    tick.stop(clay.session_uid)
+    # Finer steps end near, but not at, the same heights: steps of 5 ms leave some µm.
+    assert bpy.ops.digiclay.take_replay(take=number, parts=8) == {"FINISHED"}
+    assert 0.0 < np.abs(find_heights(clay) - drawn).max() < 20e-6
+
+
+def test_a_baked_take_shows_its_end_at_its_last_frame_and_starts_no_session(clay):
+    record(clay)
+    drawn = find_heights(clay)
+    assert bpy.ops.digiclay.bake(source="TAKE", first=10) == {"FINISHED"}
+    bpy.context.scene.frame_set(10 + 24)  # 0.6 s at 40 frames a second
+    next(one for one in clay.modifiers if one.name == view.MODIFIER).show_viewport = False
+    bpy.context.view_layer.update()
+    mesh = clay.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert np.abs(bridge.read_cells(mesh)["height"] - drawn).max() < 1e-7  # float32
+    with pytest.raises(Exception, match="free the bake"):
+        tick.start(bpy.context, clay)
+
+
+def test_an_animated_fingertip_bakes_in_the_background_without_a_session(clay):
+    tip = fingertip_of(clay)
+    for frame, down in ((1, 0.0), (21, 14e-3)):
+        tip.location.z -= down * bridge.SCALE
+        tip.keyframe_insert("location", frame=frame)
+    curves = sum(map(len, bake.curves(tip)))
+    assert bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=41) == {"FINISHED"}
+    assert bake.is_baked(clay)
+    assert sum(map(len, bake.curves(tip))) == curves  # its own animation stays
+    assert bpy.ops.digiclay.bake_free() == {"FINISHED"}
+    assert not bake.is_baked(clay)
+
+
+def test_an_exported_take_is_a_scene_that_runs_as_long(clay, tmp_path):
+    number = record(clay)
+    begin_recording(clay)  # meanwhile a session may record
+    press(clay, deep=12e-3)
+    file = tmp_path / "ein Täke 1.5.toml"
+    # What follows the point of a number is no ending.
+    assert bpy.ops.digiclay.take_export(filepath=str(file).removesuffix(".toml")) == {"FINISHED"}
+    scene = load(file)
+    assert scene.name == "A press"
+    assert scene.simulation.duration == pytest.approx(0.6)
+    assert scene.cells == 144
+    assert len(running.find(clay).recording.path) > 1
+    tick.stop(clay.session_uid)
+    assert bpy.ops.digiclay.take_remove(take=number) == {"FINISHED"}
+    assert number not in [entry.number for entry in takes.list_takes(clay)]
+
+
+def test_a_take_from_a_formed_bed_is_not_exported_and_the_file_is_not_made(clay, tmp_path):
+    record(clay)
+    record(clay)
+    file = tmp_path / "late.toml"
+    with pytest.raises(RuntimeError, match="begins on a bed that is formed already"):
+        bpy.ops.digiclay.take_export(filepath=str(file))
+    assert not file.exists()
+
+
+def test_keeping_a_take_of_nothing_says_so_and_a_reset_keeps_what_was_recorded(clay):
+    begin_recording(clay)
+    assert bpy.ops.digiclay.take_keep() == {"CANCELLED"}
+    assert running.find(clay).recording is None
+    bpy.ops.digiclay.take_record()
+    press(clay)
+    assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
+    assert [one.seconds for one in takes.list_takes(clay)] == [pytest.approx(0.6)]
+    assert running.find(clay).recording is None
+    tick.stop(clay.session_uid)
+
+
+def test_a_changed_parameter_ends_the_recording_and_keeps_it_as_a_take_of_the_former_scene(clay):
+    begin_recording(clay)
+    press(clay)
+    clay.digiclay.control.virtual_master.force_setpoint = 0.8
+    (note,) = tick.tick(bpy.context, 101.0)
+    assert "The recording ended and was kept as Take 1" in note.message
+    (entry,) = takes.list_takes(clay)
+    assert takes.read(clay, entry.number).scene.set_point == SetPoint(0.4)
+    assert running.find(clay).recording is None
+    tick.stop(clay.session_uid)
+    assert bpy.ops.digiclay.take_replay() == {"FINISHED"}
+
 
 Floats = NDArray[np.float64]
 COUNT = 100  # control periods of 5 ms: half a second
 
 
 def scene() -> Scene:
-    """Return a bed of 12 x 12 pins under Method I."""
     return resolve({"layout": {"rows": 12, "columns": 12}})
 
 
@@ -52,15 +187,13 @@ def taken(count: int = COUNT) -> tuple[Take, Floats]:
 
 
 def build() -> Any:
-    """Return another bed in the open file."""
     made = scene()
     rest = Instant.at_rest(made.layout, made.actuator, made.section("fingertip"))
     return view.build(rest, bpy.context.collection)
 
 
 @pytest.fixture
-def bed() -> Any:
-    """Return a bed in the open file."""
+def bed():
     made = open_bed("rest", build)
     bpy.context.scene.render.fps = 40  # a frame is five control periods
     return made
@@ -79,19 +212,17 @@ def shown(bed: Any, frame: float) -> Floats:
 
 
 def baked(bed: Any, take: Take, first: int = 1) -> bake.BakedFrames:
-    """Bake a take into a bed."""
     *_, moments = bake.simulate_frames(take, 40.0)
     assert isinstance(moments, bake.BakedFrames)
     bake.apply(bed, moments, first, [Fingertip()], keyframe_fingers=True)
     return moments
 
 
-def test_a_take_kept_in_a_bed_comes_back_after_saving_and_loading(bed: Any, tmp_path: Path) -> None:
+def test_a_take_kept_in_a_bed_comes_back_after_saving_and_loading(bed, tmp_path):
     take, _ = taken()
     name = bed.name
     entry = takes.add(bed, take, "A press")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
+    save_and_open(tmp_path / "kept.blend")
     again = bpy.data.objects[name]
     assert takes.list_takes(again) == [entry]
     read = takes.read(again, entry.number)
@@ -99,7 +230,7 @@ def test_a_take_kept_in_a_bed_comes_back_after_saving_and_loading(bed: Any, tmp_
     assert (read.start, read.end) == (take.start, take.end)
 
 
-def test_a_number_is_not_used_again_while_later_takes_stand(bed: Any) -> None:
+def test_a_number_is_not_used_again_while_later_takes_stand(bed):
     take, _ = taken(5)
     numbers = [takes.add(bed, take).number for _ in range(3)]
     takes.remove(bed, numbers[1])
@@ -109,7 +240,7 @@ def test_a_number_is_not_used_again_while_later_takes_stand(bed: Any) -> None:
         takes.read(bed, "7")
 
 
-def test_every_frame_shows_heights_modes_forces_and_fingertip_of_its_moment(bed: Any) -> None:
+def test_every_frame_shows_heights_modes_forces_and_fingertip_of_its_moment(bed):
     take, heights = taken()
     moments = baked(bed, take, first=10)
     between = (heights[50] + heights[55]) / 2.0
@@ -130,7 +261,7 @@ def test_every_frame_shows_heights_modes_forces_and_fingertip_of_its_moment(bed:
     assert np.abs(bridge.pose(fingertip_of(bed))[:3] - take.poses[60, 0, :3]).max() < 1e-7
 
 
-def test_a_bake_replaces_the_former_and_freed_leaves_nothing(bed: Any) -> None:
+def test_a_bake_replaces_the_former_and_freed_leaves_nothing(bed):
     meshes, trees = len(bpy.data.meshes), len(bpy.data.node_groups)
     for count in (2, COUNT):  # baked again, the former bake is replaced
         moments = baked(bed, taken(count)[0])
@@ -155,9 +286,7 @@ def same_action(bed: Any) -> Any:
 
 @pytest.mark.parametrize("made", [same_action, lambda bed: bed.copy()], ids=["an action", "its curves"])
 @pytest.mark.parametrize("freed", [0, 1])
-def test_freeing_one_of_two_bakes_that_share_leaves_the_other(
-    bed: Any, made: Callable[[Any], Any], freed: int
-) -> None:
+def test_freeing_one_of_two_bakes_that_share_leaves_the_other(bed, made, freed):
     take, heights = taken()
     baked(bed, take)
     beds = [bed, made(bed)]
@@ -170,7 +299,7 @@ def test_freeing_one_of_two_bakes_that_share_leaves_the_other(
     assert np.abs(shown(left, 21) - heights[100]).max() < 1e-7
 
 
-def test_a_bake_is_keyframed_in_the_beds_own_curves_where_it_shares_them(bed: Any) -> None:
+def test_a_bake_is_keyframed_in_the_beds_own_curves_where_it_shares_them(bed):
     bed.keyframe_insert("location", frame=1)
     other = bed.copy()
     bpy.context.collection.objects.link(other)
@@ -179,19 +308,18 @@ def test_a_bake_is_keyframed_in_the_beds_own_curves_where_it_shares_them(bed: An
     assert [len(one) for one in paths] == [3, 4]
 
 
-def test_a_bake_plays_without_the_extension(bed: Any, tmp_path: Path) -> None:
+def test_a_bake_plays_without_the_extension(bed, tmp_path):
     # No handler and no driver: what plays is a modifier and its curve.
     take, heights = taken()
     baked(bed, take)
     name = bed.name
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
+    save_and_open(tmp_path / "baked.blend")
     assert not bpy.app.handlers.frame_change_pre
     assert not bpy.app.handlers.frame_change_post
     assert np.abs(shown(bpy.data.objects[name], 21) - heights[100]).max() < 1e-7
 
 
-def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
+def test_an_animated_fingertip_is_read_once_a_control_period(bed):
     tip = fingertip_of(bed)
     bridge.place_fingertips(bed, np.array([[0.0, 0.0, 45e-3, *LEVEL]]), [Fingertip()])
     tip.keyframe_insert("location", frame=1)
@@ -208,11 +336,11 @@ def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
 
 
 @pytest.mark.parametrize(("first", "last"), [(5, 5), (9, 2), (1, 300_000)])
-def test_a_range_of_frames_that_cannot_be_is_refused(bed: Any, first: int, last: int) -> None:
+def test_a_range_of_frames_that_cannot_be_is_refused(bed, first, last):
     with pytest.raises(DigiclayError, match="The frames to bake must have from 1 to"):
         next(bake.sample_path(bpy.context.scene, bed, first, last, 5e-3))
 
 
-def test_each_frame_shows_the_nearest_period() -> None:
+def test_each_frame_shows_the_nearest_period():
     take, _ = taken()
     assert bake.frame_periods(take, 24.0).tolist() == [0, 8, 17, 25, 33, 42, 50, 58, 67, 75, 83, 92, 100]

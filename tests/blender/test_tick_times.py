@@ -1,7 +1,5 @@
 """The benchmarks of ticks: every tick of every bed is timed, part by part, and leaves nothing."""
 
-from __future__ import annotations
-
 import csv
 import os
 import subprocess
@@ -23,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 BED = (11, 11, 3e-3, 2e-3)
 
 
-def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
+def test_every_tick_is_timed_and_its_parts_are_within_it():
     before, objects = (sculpting.advance, beds.write), len(bpy.data.objects)
     timed = draw_circles(*BED, ticks=12)
     assert (sculpting.advance, beds.write, len(bpy.data.objects)) == (*before, objects)
@@ -35,7 +33,7 @@ def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
     assert (sum(timed.parts[name] for name in PARTS if name != "garbage") <= timed.spent).all()
 
 
-def test_the_finger_presses_while_ticks_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_finger_presses_while_ticks_are_timed(monkeypatch):
     lowest, periods = [], []
     advance = sculpting.advance
 
@@ -54,16 +52,14 @@ def test_the_finger_presses_while_ticks_are_timed(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.usefixtures("extension")  # as where a user has enabled it: everything is registered already
-def test_a_session_does_not_gather_memory_as_it_goes_on() -> None:
+def test_a_session_does_not_gather_memory_as_it_goes_on():
     # What fits into the rings of trace and gestures is kept, and filled arrays of known widths: up to
     # 77 kB in ten runs. A leak of a state a tick were 25 times 13 kB.
     assert measure_bed(12, 12, 25)["growth_bytes"] < 200e3
     assert hasattr(bpy.types.Object, "digiclay")
 
 
-def test_the_commands_print_tables_write_figures_and_draw_the_histogram(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_the_commands_print_tables_write_figures_and_draw_the_histogram(monkeypatch, capsys, tmp_path):
     pytest.importorskip("matplotlib", reason="the histogram needs it; `make test` has it")
     monkeypatch.setattr(tick_times, "BEDS", (Bed(*BED, 8e-3), Bed(20, 21, 1.5e-3, 1e-3, 16e-3)))
     monkeypatch.setattr(tick_times, "VIEWPORT", ((12, 12, 5e-3), (12, 14, 5e-3)))
@@ -87,7 +83,7 @@ def test_the_commands_print_tables_write_figures_and_draw_the_histogram(
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system keeps no thread to a core")
-def test_threads_that_were_started_before_are_kept_to_the_core_too() -> None:
+def test_threads_that_were_started_before_are_kept_to_the_core_too():
     script = (
         "import os, threading\n"
         "from benchmarks.tick_times import keep_to_one_core\n"

@@ -1,8 +1,5 @@
 """A bed, its housing and its fingertip are one: appended, deleted, duplicated and hidden together."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -19,7 +16,21 @@ from digiclay.roles import BALL, ROLE, fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import properties
 
-from tests.blender.at_hand import added, beds, done, housings, looked, older, redone, select, undone, whole
+from tests.blender.at_hand import (
+    added,
+    beds,
+    delete,
+    done,
+    duplicate,
+    housings,
+    looked,
+    older,
+    redone,
+    save_and_open,
+    select,
+    undone,
+    whole,
+)
 from tests.blender.session.live import Clock, press, started
 
 pytestmark = pytest.mark.usefixtures("watched")
@@ -32,16 +43,20 @@ def still(bed: Any) -> bake.BakedFrames:
     return bake.BakedFrames(cells["position"], **twice, pose=np.array([bridge.pose(fingertip_of(bed))] * 2))
 
 
+def reset_to_empty() -> None:
+    bpy.ops.wm.read_homefile(use_empty=True)
+    looked()
+    done("Empty")
+
+
 @pytest.mark.parametrize("how", ["append", "append baked", "link"])
-def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_path: Path, how: str) -> None:
+def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_path, how):
     bed = added()
     if how == "append baked":
         bake.apply(bed, still(bed), 1, [Fingertip()], keyframe_fingers=False)
-    at = bridge.pose(fingertip_of(bed))
-    name = bed.name
+    at, name = bridge.pose(fingertip_of(bed)), bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True)
-    looked()
+    reset_to_empty()
     source = {"directory": str(tmp_path / "bed.blend" / "Object") + "/", "filename": name}
     if how == "link":
         bpy.ops.wm.link(**source)
@@ -54,54 +69,42 @@ def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_pat
         return
     bpy.ops.wm.append(**source)
     # As Blender leaves it, without any help.
-    (bed,) = beds()
-    assert whole(bed)
+    assert whole(*beds())
     assert len(bpy.context.scene.collection.children) == 0
     done("Append")
-    assert whole(bed)
-    assert housings() == 1
-    bpy.context.view_layer.update()
+    (bed,) = beds()
+    assert (whole(bed), housings()) == (True, 1)
     np.testing.assert_allclose(bridge.pose(fingertip_of(bed)), at, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("by_hand", [True, False])
-def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand: bool) -> None:
-    added()
-    bpy.ops.object.duplicate()
-    done("Duplicate")
-    copy = bpy.context.object
+def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand):
+    copy = duplicate(added())
     if by_hand:
-        select(fingertip_of(copy))
-        bpy.ops.object.delete()
+        delete(fingertip_of(copy))
     else:
         bpy.data.objects.remove(fingertip_of(copy))
-    done("Delete")
+        done("Delete")
     copy.location.x = 1.0
     done("Move")
     undone()
-    without = [bed for bed in beds() if fingertip_of(bed) is None]
-    assert [bed.location.x for bed in without] == [0.0]
+    assert [bed.location.x for bed in beds() if fingertip_of(bed) is None] == [0.0]
 
 
 @pytest.mark.parametrize("everything", [False, True], ids=["the bed", "all that can be selected"])
-def test_a_bed_is_deleted_with_its_fingertip_and_undo_brings_both_back(everything: bool) -> None:
+def test_a_bed_is_deleted_with_its_fingertip_and_undo_brings_both_back(everything):
     bed = added()
-    bpy.ops.object.select_all(action="SELECT" if everything else "DESELECT")
-    bed.select_set(True)
-    done("Select")
-    bpy.ops.object.delete()
-    done("Delete")
+    delete(*(bpy.context.selectable_objects if everything else ()), bed)
     assert len(bpy.data.objects) == len([one for one in bpy.data.objects if one.get(ROLE) == "pin"])
     undone()
-    assert whole(*beds())
-    assert len(beds()) == 1
+    assert (whole(*beds()), len(beds())) == (True, 1)
     redone()
     assert len(bpy.context.scene.objects) == 0
     undone()
     assert whole(*beds())
 
 
-def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone() -> None:
+def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone():
     bed, other = added(), added(1.0)
     tip = fingertip_of(bed)
     tip[BALL].hide_select, tip[BALL].lock_location = True, (False, False, False)  # as in older files
@@ -125,7 +128,7 @@ def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone() -> None:
 
 @pytest.mark.parametrize("linked", [False, True])
 @pytest.mark.parametrize("along", [False, True], ids=["the bed", "its fingertip too"])
-def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked: bool, along: bool) -> None:
+def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked, along):
     bed = added()
     tip = fingertip_of(bed)
     tip.keyframe_insert("location", frame=1)
@@ -134,41 +137,30 @@ def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked: bool, along: bool) -
     bpy.ops.object.duplicate(linked=linked)
     bpy.context.object.location.x = 1.0
     done("Duplicate")
-    assert len(beds()) == 2
-    assert whole(*beds())
-    assert housings() == 2
+    assert (len(beds()), whole(*beds()), housings()) == (2, True, 2)
     tips = [fingertip_of(one) for one in beds()]
-    poses = [bridge.pose(one) for one in tips]
-    np.testing.assert_allclose(*poses, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(*map(bridge.pose, tips), rtol=0, atol=1e-7)
     if not (linked and along):  # else Blender has copied it, and was asked to share
         assert tips[0].animation_data.action != tips[1].animation_data.action
-    undone()
-    assert len(beds()) == 1
-    assert whole(*beds())
-    redone()
-    assert len(beds()) == 2
-    assert whole(*beds())
+    for step, count in ((undone, 1), (redone, 2)):
+        step()
+        assert (len(beds()), whole(*beds())) == (count, True)
 
 
-def test_several_beds_are_copied_at_once_and_the_first_ones_deleted_before_anybody_looks() -> None:
+def test_several_beds_are_copied_at_once_and_the_first_ones_deleted_before_anybody_looks():
     first = [added(), added(1.0)]
     select(*first)
     bpy.ops.object.duplicate()
     copies = list(bpy.context.selected_objects)
-    select(*first)
-    bpy.ops.object.delete()
-    done("Delete")
+    delete(*first)
     assert set(copies) == set(beds())
     assert whole(*copies)
 
 
-def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_session() -> None:
+def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_session():
     bed = added()
-    tip = fingertip_of(bed)
-    at = bridge.pose(tip)
-    select(tip)
-    bpy.ops.object.delete()
-    done("Delete")
+    at = bridge.pose(fingertip_of(bed))
+    delete(fingertip_of(bed))
     assert list(bpy.context.scene.objects) == [bed]
     notes = tick.start(bpy.context, bed)
     assert [note.message for note in notes] == [f"{bed.name} got its fingertip back"]
@@ -176,15 +168,11 @@ def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_se
     np.testing.assert_array_equal(bridge.pose(fingertip_of(bed)), at)
 
 
-def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state() -> None:
+def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state():
     bed, clock = added(), Clock()
-    bpy.ops.object.select_all(action="DESELECT")
     started(bed)
     press(bed, clock)
-    select(bed)
-    bpy.ops.object.duplicate()
-    done("Duplicate")
-    copy = bpy.context.object
+    copy = duplicate(bed)
     select(bed)
     bpy.ops.object.delete()
     clock.tick()
@@ -195,7 +183,7 @@ def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state(
     assert running.find(copy).state.row(0).min() < 39e-3
 
 
-def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is() -> None:
+def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is():
     bed = added()
     bed.location.z = 0.0  # what hangs on something that is deleted goes to the origin: that is Blender's way
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -209,97 +197,73 @@ def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is() -> None:
     np.testing.assert_allclose(camera.matrix_world, where, rtol=0, atol=1e-6)
 
 
-def hidden(name: str, *things: Any) -> list[bool]:
-    """Tell of objects whether they are hidden, by the eye or a switch of their own."""
-    return [thing.hide_get() if name == "eye" else getattr(thing, name) for thing in things]
-
-
 @pytest.mark.parametrize("name", ["eye", "hide_viewport", "hide_render"])
-def test_a_bed_is_hidden_and_shown_with_its_fingertip(name: str) -> None:
+def test_a_bed_is_hidden_and_shown_with_its_fingertip(name):
     bed = added()
     tip = fingertip_of(bed)
-    parts = bed, tip, tip[BALL]
 
-    def hide(thing: Any, on: bool) -> None:
+    def hide(thing: Any, on: bool) -> list[bool]:
+        """Hide or show by the eye or a switch; return what is hidden of bed, fingertip and ball."""
         thing.hide_set(on) if name == "eye" else setattr(thing, name, on)
         done("Hide")
+        return hidden()
 
-    for _ in range(2):
-        hide(bed, True)
-        assert hidden(name, *parts) == [True] * 3
-        hide(bed, False)
-        assert hidden(name, *parts) == [False] * 3
-    hide(tip, True)
-    assert hidden(name, *parts) == [False, True, True]
+    def hidden() -> list[bool]:
+        tip = fingertip_of(beds()[0])
+        parts = beds()[0], tip, tip[BALL]
+        return [thing.hide_get() if name == "eye" else getattr(thing, name) for thing in parts]
+
+    steps = [(bed, True, [True] * 3), (bed, False, [False] * 3)] * 2
     # What was hidden for itself is not shown along.
-    hide(bed, True)
-    hide(bed, False)
-    assert hidden(name, *parts) == [False, True, True]
-    hide(tip, False)
-    assert hidden(name, *parts) == [False] * 3
-    hide(bed, True)
+    steps += [(tip, True, [False, True, True]), (bed, True, [True] * 3), (bed, False, [False, True, True])]
+    for thing, on, wanted in [*steps, (tip, False, [False] * 3), (bed, True, [True] * 3)]:
+        assert hide(thing, on) == wanted
     undone()
-    tip = fingertip_of(beds()[0])
-    assert hidden(name, beds()[0], tip, tip[BALL]) == [False] * 3
+    assert hidden() == [False] * 3
 
 
-def test_a_bed_whose_settings_do_not_go_together_is_exported_as_it_is_drawn_and_copied() -> None:
+def test_a_bed_whose_settings_do_not_go_together_is_exported_as_it_is_drawn_and_copied():
     bed = added()
     bed.digiclay.layout.pitch = 1.0  # mm, less than the bore
     with pytest.raises(ParameterError, match="Pitch must be"):
         properties.read_scene(bed)
     assert bpy.ops.digiclay.find_features() == {"FINISHED"}
     np.testing.assert_array_equal(formed_bed.read_formed(bed).height, bridge.read_cells(bed.data)["height"])
-    select(bed)
-    bpy.ops.object.duplicate()
-    done("Duplicate")
-    assert whole(bed, bpy.context.object)
+    copy = duplicate(bed)
+    assert whole(bed, copy)
     # Not by an operator: what the outliner and scripts do is looked after as well.
-    copy = bpy.context.object
     bpy.data.objects.remove(bed)
     done("Delete")
     assert whole(copy)
 
 
-def test_a_bed_of_an_older_file_stays_as_it_is_and_is_one_all_the_same(tmp_path: Path) -> None:
+def test_a_bed_of_an_older_file_stays_as_it_is_and_is_one_all_the_same(tmp_path):
     older(added())
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    save_and_open(tmp_path / "older.blend")
     looked()
     (bed,) = beds()
-    assert len(bpy.context.scene.objects) == 4
-    assert housings() == 1
+    assert (len(bpy.context.scene.objects), housings()) == (4, 1)
     bed.hide_set(True)
     done("Hide")
     assert not [thing for thing in bpy.context.scene.objects if thing.visible_get()]
     bed.hide_set(False)
     done("Show")
-    select(bed)
-    done("Select")
-    bpy.ops.object.duplicate()
-    done("Duplicate")
-    copy = bpy.context.object
-    assert len(bpy.context.scene.objects) == 7
-    assert housings() == 2
+    copy = duplicate(bed)
+    assert (len(bpy.context.scene.objects), housings()) == (7, 2)
     assert not view.shows_force(copy)
-    select(bed)
-    bpy.ops.object.delete()
-    done("Delete")
+    delete(bed)
     assert whole(copy)
 
 
-def test_a_bed_appended_from_an_older_file_is_made_whole_and_its_helpers_put_away(tmp_path: Path) -> None:
+def test_a_bed_appended_from_an_older_file_is_made_whole_and_its_helpers_put_away(tmp_path):
     bed = added()
     older(bed)
     name = bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True)
-    looked()
-    done("Empty")
+    reset_to_empty()
     bpy.ops.wm.append(directory=str(tmp_path / "older.blend" / "Object") + "/", filename=name)
     assert len(bpy.context.scene.objects) == 1 + 27
     done("Append")
-    assert whole(*beds())
-    assert housings() == 1
+    assert (whole(*beds()), housings()) == (True, 1)
     undone()
     assert len(bpy.context.scene.objects) == 0

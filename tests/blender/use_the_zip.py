@@ -3,8 +3,6 @@
 usage: use_the_zip.py ZIP FOLDER. What was seen is written as JSON to FOLDER/seen.json.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import sys
@@ -19,12 +17,10 @@ ARCHIVE, FOLDER = Path(sys.argv[1]), Path(sys.argv[2])
 
 
 def part(name: str) -> object:
-    """Import a module of the installed extension."""
     return importlib.import_module(f"{EXTENSION}.{name}")
 
 
 def main() -> None:
-    """Install, use, disable, enable again, remove."""
     import addon_utils  # Blender's own, found once Blender is there
 
     seen: dict[str, object] = {}

@@ -1,14 +1,10 @@
 """The benchmarks: their commands, tables and files, what they count and vary."""
 
-from __future__ import annotations
-
 import re
 import statistics
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from types import FrameType
 
 import numpy as np
@@ -37,7 +33,6 @@ from benchmarks.session_parts import (
     PARTS,
     TERMS,
     Counted,
-    Ledger,
     note_methods,
     period_calls,
     without,
@@ -46,14 +41,14 @@ from tests.assemble import sample
 
 
 @pytest.fixture
-def ledger() -> Iterator[Ledger]:
+def ledger():
     """A ledger of its own, in place of the class's."""
     former, Counted.ledger = Counted.ledger, Counter()
     yield Counted.ledger
     Counted.ledger = former
 
 
-def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger: Ledger) -> None:
+def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger):
     a = np.ones(3).view(Counted)
     b = a + 1.0  # add
     np.exp(b, b)  # exp
@@ -73,7 +68,7 @@ def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger: Ledger
     assert type(product) is Counted
 
 
-def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted() -> None:
+def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted_and_of_method_iii_under_224():
     # A count, not seconds: the same wherever it is taken, and a call more for the cells is one more.
     scene, asked = sample("ridge_mound_valley"), 0
     system, trajectories = assemble(scene), scene.trajectories()
@@ -93,12 +88,9 @@ def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted() -> Non
         sys.setprofile(None)
     assert counted["dot"] >= asked > 100
     assert (len(calls), statistics.median(calls) <= 114) == (300, True)
-
-
-def test_a_period_of_method_iii_makes_fewer_than_twice_the_numpy_calls_of_method_i() -> None:
+    # While the force is near its set point Method III solves every second period for less: 222.7 on average.
     scene = sample("ridge_mound_valley", "control.method=hybrid")
     calls, _ = period_calls(assemble(scene), scene.trajectories(), 400)
-    # While the force is near its set point every second period solves for less: 222.7 calls on average.
     assert statistics.mean(calls[300:]) < 224
 
 
@@ -140,14 +132,13 @@ def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(
     assert "pip install" in capsys.readouterr().err
 
 
-def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys):
     scene = sample("tap")
     for term, section in TERMS.items():
         less = without(scene, term)
         part = scene.section(section)
         assert (less and less.with_sections(**{section: part})) == (None if part is None else scene)
     less = without(replace(scene, simulation=replace(scene.simulation, physics_step=1e-3)), LONGER)
-    assert less is not None
     assert less.simulation.physics_step == less.simulation.control_period
     assert without(less, LONGER) is None
     assert main(["terms", "tap", "--quick", "--quiet"]) == 0
@@ -156,7 +147,7 @@ def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys: pytest.Captu
         assert name in out
 
 
-def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
+def test_two_commits_are_timed_by_their_own_code(tmp_path):
     tree = processes.extract("HEAD", tmp_path)
     times = processes.run_commit(tree, "HEAD", 2)
     assert len(times) == len(processes.CASES) + 1
@@ -170,7 +161,7 @@ def test_two_commits_are_timed_by_their_own_code(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", list(STUDIES))
-def test_the_runs_of_a_study_differ_and_form_one_batch(name: str) -> None:
+def test_the_runs_of_a_study_differ_and_form_one_batch(name):
     scenes = study(sample("tap"), name, LEAST)
     section, key, low, high = STUDIES[name]
     usual = getattr(sample("tap").section(section), key)
@@ -216,7 +207,7 @@ def press(**control: float) -> Scene:
     return scene.with_sections(trajectory=FingerPath("linear", points), simulation=simulation)
 
 
-def test_a_controller_without_a_part_differs_from_the_whole_and_parameters_leave_parts_out() -> None:
+def test_a_controller_without_a_part_differs_from_the_whole_and_parameters_leave_parts_out():
     scene = press()
     controller = assemble(scene).controller
     assert isinstance(controller, HybridControl)

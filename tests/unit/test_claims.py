@@ -1,7 +1,5 @@
 """Folders are claimed and files locked: one process at a time, and what a killed one leaves goes away."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -42,7 +40,6 @@ pytestmark = pytest.mark.usefixtures("here")
 
 @contextmanager
 def running(*arguments: str, sign: str) -> Iterator[Any]:
-    """Keep a process that works for hours, from the time a file of it is there; then kill it."""
     process = start(PROGRAM, *arguments)
     try:
         wait_until(lambda: process.poll() is not None or list(Path().glob(sign)))
@@ -54,11 +51,10 @@ def running(*arguments: str, sign: str) -> Iterator[Any]:
 
 
 def names(folder: Path = Path()) -> list[str]:
-    """Return what lies in a folder, hidden things too."""
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refused: Any) -> None:
+def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refused):
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
     assert main(["batch", "jobs.toml", "--out", "b", "--prepare", "--quiet"]) == 0
     assert main(["run", "my.toml", "--out", "older", "--quiet", "--no-errors"]) == 0
@@ -78,7 +74,7 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
 
 
 @pytest.mark.parametrize("line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"])
-def test_a_second_series_in_one_folder_is_refused_at_once(line: str, refused: Any) -> None:
+def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
     command = line.split()
     finished = [*command, "--prepare"] if command[0] == "batch" else command  # nothing is to be simulated
@@ -89,7 +85,7 @@ def test_a_second_series_in_one_folder_is_refused_at_once(line: str, refused: An
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it() -> None:
+def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it():
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
     main(["batch", "jobs.toml", "--prepare", "--quiet"])
     scene = Path("jobs/jobs/my/scene.toml")
@@ -109,14 +105,14 @@ def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it
     assert names(Path("jobs/runs")) == ["my"]
 
 
-def test_an_older_run_that_was_moved_aside_when_its_process_was_killed_is_put_back(refused: Any) -> None:
+def test_an_older_run_that_was_moved_aside_when_its_process_was_killed_is_put_back(refused):
     main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors"])
     shutil.move("o", f".o.{dead()}@{find_host()}.old")
     refused(["run", "my.toml", "--out", "o", "--quiet"], "o is not empty")
     assert names() == ["my.toml", "o"]
 
 
-def test_what_comes_in_between_is_not_replaced_at_the_end() -> None:
+def test_what_comes_in_between_is_not_replaced_at_the_end():
     def interfere() -> None:
         with write_folder(Path("o"), overwrite=False):
             Path("o").mkdir()
@@ -127,7 +123,7 @@ def test_what_comes_in_between_is_not_replaced_at_the_end() -> None:
     assert names(Path("o")) == ["thesis.doc"]
 
 
-def test_a_claim_ends_with_its_block_and_leaves_no_folder() -> None:
+def test_a_claim_ends_with_its_block_and_leaves_no_folder():
     with claim_folder(Path("a/b/o"), overwrite=False):
         Path("link").symlink_to("a")
         for name in ("a/b/o", "link/../link/b/o"):  # one folder by two names
@@ -141,10 +137,17 @@ def test_a_claim_ends_with_its_block_and_leaves_no_folder() -> None:
     with pytest.raises(ZeroDivisionError), claim_folder(Path("c/d/o"), overwrite=False):
         raise ZeroDivisionError
     assert names() == ["a", "link", "my.toml"]
+    # Two exports do not write one file at once.
+    with claim_files([Path("a/a.stl"), Path("a/b.stl")]):
+        with claim_files([Path("a/c.stl")]):
+            pass
+        with pytest.raises(OutputError, match=r"b\.stl is being written"), claim_files([Path("a/b.stl")]):
+            pass
+    assert names(Path("a")) == ["b"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no fork")
-def test_whoever_waits_gets_the_claim_when_the_other_one_ends_and_a_child_does_not_keep_it() -> None:
+def test_whoever_waits_gets_the_claim_when_the_other_one_ends_and_a_child_does_not_keep_it():
     script = (
         "import sys, time\n"
         "from pathlib import Path\n"
@@ -166,17 +169,7 @@ def test_whoever_waits_gets_the_claim_when_the_other_one_ends_and_a_child_does_n
     assert child.returncode == 0
 
 
-def test_two_exports_do_not_write_one_file_at_once() -> None:
-    Path("o").mkdir()
-    with claim_files([Path("o/a.stl"), Path("o/b.stl")]):
-        with claim_files([Path("o/c.stl")]):
-            pass
-        with pytest.raises(OutputError, match=r"b\.stl is being written"), claim_files([Path("o/b.stl")]):
-            pass
-    assert names(Path("o")) == []
-
-
-def test_a_path_that_leads_out_of_a_folder_is_refused(here: Path) -> None:
+def test_a_path_that_leads_out_of_a_folder_is_refused(here):
     (here / "o" / "runs").mkdir(parents=True)
     (here / "elsewhere").mkdir()
     (here / "o" / "link").symlink_to(here / "elsewhere")
@@ -186,10 +179,7 @@ def test_a_path_that_leads_out_of_a_folder_is_refused(here: Path) -> None:
             resolve_inside(Path("o"), *parts)
 
 
-# Locks, and the processes that hold them
-
-
-def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_away() -> None:
+def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_away():
     gone, since = dead(), find_start(os.getpid())
     left = [f".o.{gone}.part", f".o.{gone}@{find_host()}.part", f".o.{os.getpid()}.part"]
     kept = [
@@ -200,7 +190,6 @@ def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_aw
     ]  # fmt: skip
     for name in left + kept:
         Path("d", name).mkdir(parents=True)
-    assert since is not None
     # Another process has got its number since.
     os.utime(Path("d", left[-1]), (since - 3600.0, since - 3600.0))
     remove_abandoned(Path("d"), "o")
@@ -210,12 +199,11 @@ def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_aw
         assert is_unfinished(name_unfinished(Path("a/b c.stl"), kind))
 
 
-def test_a_process_is_known_by_the_time_it_was_started() -> None:
+def test_a_process_is_known_by_the_time_it_was_started():
     before = time.time()
     process = start("import time; time.sleep(1000)")
     try:
         since = find_start(process.pid)
-        assert since is not None
         # The system counts in hundredths of a second from when it was booted, which it knows to a second.
         assert before - 2.0 <= since <= time.time() + 2.0
         assert may_have_made(process.pid, since + 1.0)
@@ -227,7 +215,7 @@ def test_a_process_is_known_by_the_time_it_was_started() -> None:
     assert not may_have_made(process.pid, time.time())
 
 
-def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None:
+def test_where_a_drive_has_no_locks_a_record_is_held_instead(here):
     record = here / "record"
     hold = partial(hold_record, record, "It is held.")
     with hold(), pytest.raises(OutputError, match=r"^It is held\.$"), hold():
@@ -246,7 +234,7 @@ def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None
         pass
 
 
-def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
+def test_a_lock_taken_away_by_its_owner_is_made_anew():
     # Of hundreds of owners in three processes there is one at a time: a file tells who is inside.
     script = (
         "import os\n"

@@ -1,18 +1,22 @@
-"""Which points of a sweep run together, what is said of it, and that it makes no difference."""
-
-from __future__ import annotations
+"""Points of a sweep that run together, in this process or on a Dask cluster, and the arrays they share."""
 
 import json
+import re
 import sys
+import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.cli import main
+from digiclay.commands import cluster as cluster_module
+from digiclay.commands.cluster import evaluate_on_worker, open_cluster
+from digiclay.commands.evaluator import submit
+from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, count_true
+from digiclay.core.base.errors import OutputError
 from digiclay.core.batch.packing import extend_path
 from digiclay.core.engine.simulation import simulate_period
-from digiclay.core.model.fingertip import Fingertip, compute_reach
-from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.columns import begin, make_batch
 from digiclay.core.scene.scene_source import Setting, find
@@ -25,20 +29,54 @@ from digiclay.core.studies.evaluation import (
     evaluate_bundle,
     make_bundles,
 )
+from digiclay.core.studies.series import finish as finish_series
+from distributed import Client, LocalCluster
 
-SHORT = [Setting("simulation.duration", "0.1")]
-
+from tests.other_process import finish as finish
+from tests.other_process import start
+from tests.scene_files import left
+from tests.timeouts import wait_until
 
 pytestmark = pytest.mark.usefixtures("here")
 
 
+CASES = {
+    "no cell": np.zeros(0, np.bool_),
+    "nowhere": np.zeros(150, np.bool_),
+    "in the last cell": np.arange(150) == 149,
+    "everywhere": np.ones(7, np.bool_),
+    "in a comparison with nan": np.array([np.nan, 1.0, 2.0]) > 1.0,
+    "in every other column of a table": (np.arange(24).reshape(4, 6) % 5 == 0)[:, ::2],
+}
+
+
+@pytest.mark.parametrize("test", CASES.values(), ids=CASES.keys())
+def test_it_holds_somewhere_and_as_often_as_numpy_says(test):
+    assert any_true(test) is bool(test.any())
+    assert count_true(test) == np.count_nonzero(test, axis=0).tolist()
+
+
+def test_constants_of_one_run_are_shared_few_and_read_only_and_of_many_the_numbers_themselves():
+    known, own = Constants((1.0,)), np.array([1.0, 2.0])
+    (one,) = known[5,]
+    assert known[5,][0] is one
+    with pytest.raises(ValueError, match="read-only"):
+        one[0] = 2.0
+    sizes = [known[count,][0].size for count in range(3 * MOST_SHAPES)]
+    assert (sizes, len(known) <= MOST_SHAPES) == (list(range(3 * MOST_SHAPES)), True)
+    assert Constants((3.0, own))[4, 2] == (3.0, own)
+    (code,) = Constants((3,), np.int8)[4, 2]
+    assert type(code) is np.int8
+
+
+SHORT = [Setting("simulation.duration", "0.1")]
+
+
 def some(*varied: str, settings: list[Setting] | None = None) -> list[Point]:
-    """Return the points of a sweep over a tap."""
     return make_points(find("tap"), settings or SHORT, [read_axis(one) for one in varied])
 
 
 def indices(parts: tuple[tuple[Point, ...], ...]) -> list[list[int]]:
-    """Return which points are in which bundle."""
     return [[point.index for point in part] for part in parts]
 
 
@@ -66,7 +104,7 @@ def calls(count: int) -> list[int]:
     return counted
 
 
-def test_a_control_period_of_a_larger_stack_takes_no_more_calls() -> None:
+def test_a_control_period_of_a_larger_stack_takes_no_more_calls():
     # The median: now and then a set of cells is made anew, and not in the same periods.
     assert np.median(calls(16)) == np.median(calls(4))
 
@@ -132,17 +170,6 @@ def test_points_of_one_structure_run_together_and_others_alone(varied, setting, 
     assert said is None or parts.describe() == [said]
 
 
-def test_the_reach_of_many_fingers_is_that_of_each() -> None:
-    poses = np.zeros((3, 2, 7))
-    poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
-    windows = trace_finger(Fingertip(), poses).windows
-    alone = [compute_reach(window, 0.04) for window in windows]
-    together = np.array(compute_reach(np.array(windows).T, np.full(3, 0.04))).T
-    np.testing.assert_allclose(together[:2], alone[:2], rtol=1e-12)
-    assert alone[2] is None  # the last one is far above the bed
-    assert together[2, 2] < 0.0
-
-
 @pytest.mark.parametrize("errors", [False, True])
 def test_a_bundle_comes_to_the_figures_of_its_points_and_can_be_stopped(errors):
     bundle = some("control.force_gain=1,5")
@@ -156,8 +183,6 @@ def test_a_bundle_comes_to_the_figures_of_its_points_and_can_be_stopped(errors):
 
 
 def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
-    """Let stacks fail as a whole."""
-
     def faulty(*given: Any, **known: Any) -> Any:
         raise error
 
@@ -189,3 +214,166 @@ def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_sa
         file.unlink()
         main([*sweep, "--out", "out", "--quiet"])
     assert figures[0] == figures[1]
+
+
+ROOT = Path(__file__).parents[2]
+#: Two batches, and no pictures of three axes.
+AXES = ["control.force_gain=1,2", "control.dead_band=1e-5,2e-5", "layout.rows=3,4"]
+SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis)), "--quiet"]
+VARIED = "--vary control.force_gain=1:2 --vary control.position_gain=100:900 --population 4 --generations 2"
+TUNING = ["tune", "my.toml", *VARIED.split(), "--metric", "rfd,highest", "--quiet"]
+
+
+def cluster_here(workers: int) -> LocalCluster:
+    """Return a scheduler with workers, on threads of this process."""
+    return LocalCluster(
+        n_workers=workers, threads_per_worker=2, processes=False, protocol="tcp://", host="127.0.0.1",
+        dashboard_address=":0",
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def address():
+    """The address of a scheduler with one worker."""
+    with cluster_here(1) as cluster:
+        yield cluster.scheduler_address
+
+
+def hours(count: int) -> list[Point]:
+    long = [Setting("simulation.duration", "1e5"), Setting("recorder.every", "1000")]
+    return make_points(find("slow_press"), long, [read_axis(f"layout.rows=20:{19 + count}:{count}")])
+
+
+def silent(note: str) -> None:
+    """Draw nothing."""
+
+
+def never() -> bool:
+    return False
+
+
+@pytest.mark.parametrize(("words", "tables"), [(SWEEP, 1), (TUNING, 2)], ids=["sweep", "tuning"])
+def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(words, tables, here, address):
+    assert main([*words, "--workers", "1", "--out", "own"]) == 0
+    assert main([*words, "--scheduler", address, "--out", "far"]) == 0
+    own, far = ({path.name: path.read_bytes() for path in (here / at).glob("*.csv")} for at in ("own", "far"))
+    assert (len(own), own) == (tables, far)
+    assert left(here / "far/points") == left(here / "own/points") != []
+
+
+def test_after_a_stop_no_task_is_left_in_the_cluster(address):
+    with Client(address, set_as_default=False) as client:
+
+        def look(dask_worker: Any) -> tuple[int, int]:
+            return len(dask_worker.active_threads), len(dask_worker.state.tasks)
+
+        running: list[int] = []
+
+        def stop() -> bool:
+            if not running and [busy for busy, _ in client.run(look).values()] == [2]:
+                running.append(2)
+            return bool(running)
+
+        with open_cluster(address, lambda: False, silent) as cluster:
+            finish_series(
+                submit(cluster, evaluate_hours, hours(4), stopped=stop), lambda *_: None, lambda *_: None
+            )
+        wait_until(lambda: list(client.run(look).values()) == [(0, 0)])
+
+
+def evaluate_hours(point: Point) -> Any:
+    return evaluate_on_worker([point], errors=False)
+
+
+def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(capsys):
+    notes: list[str] = []
+    with (
+        cluster_here(0) as empty,
+        open_cluster(empty.scheduler_address, lambda: len(notes) > 1, notes.append),
+    ):
+        pass
+    assert notes == [", no workers: waiting"] * 2
+    address = empty.scheduler_address
+    assert capsys.readouterr().err == (
+        f"{address} has no workers yet: start some with 'dask worker {address}'.\n"
+    )
+
+
+def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(address, monkeypatch):
+    done: dict[int, Any] = {}
+    with open_cluster(address, lambda: False, silent) as cluster:
+        finish_series(submit(cluster, invert, [0, 1, 2], stopped=never), done.__setitem__, done.__setitem__)
+        assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}
+        monkeypatch.setattr(cluster_module, "FETCH", 0.3)
+        finish_series(submit(cluster, give_slowly, [0], stopped=never), done.__setitem__, done.__setitem__)
+    assert isinstance(done[0], SlowToSend)
+    assert SlowToSend.sent > 1
+
+
+def invert(number: int) -> float:
+    return 1 / number
+
+
+class SlowToSend:
+    sent = 0
+
+    def __reduce__(self):
+        SlowToSend.sent += 1
+        if SlowToSend.sent == 1:
+            time.sleep(1.5)
+        return SlowToSend, ()
+
+
+def give_slowly(number: int) -> Any:
+    return SlowToSend()
+
+
+def test_a_scheduler_that_is_gone_ends_a_series_in_one_line():
+    with cluster_here(1) as other:
+        address = other.scheduler_address
+        with open_cluster(address, lambda: False, silent) as cluster:
+            other.close()
+            gone = f"^The scheduler {address} is gone. What is done is kept, and the same command goes on"
+            with pytest.raises(OutputError, match=gone):
+                finish_series(submit(cluster, invert, [1], stopped=never), print, print)
+
+
+@pytest.mark.parametrize(
+    ("address", "why"),
+    [
+        ("foo", "missing port number"), ("", "missing port number"),
+        ("http://127.0.0.1:8786", "unknown address scheme 'http'"),
+        ("tls://127.0.0.1:8786", "TLS expects a `ssl_context`"),
+    ],
+)  # fmt: skip
+def test_a_bad_address_is_refused_in_one_line(address, why, refused):
+    rule = "--scheduler must be an address such as tcp://127.0.0.1:8786"
+    refused([*SWEEP, "--scheduler", address, "--out", "out"], f"{rule} (got {address!r}: {why}")
+
+
+@pytest.mark.parametrize(
+    ("address", "host"),
+    [
+        ("tcp://127.0.0.1:8786", ""), ("tcp://localhost:8786", ""), ("tcp://[::1]:8786", ""),
+        ("tls://10.0.0.1:8786", ""), ("10.0.0.1:8786", "10.0.0.1"), ("tcp://[fe80::1]:8786", "fe80::1"),
+        ("tcp://login.example:8786", "login.example"),
+    ],
+)  # fmt: skip
+def test_an_address_without_encryption_beyond_this_machine_is_warned_of(address, host):
+    said = cluster_module._describe_exposure(address)
+    assert said.partition(",")[0] == (f"Other machines can reach {host}" if host else "")
+
+
+def test_the_example_for_slurm_makes_the_script_of_a_job_and_nothing_else_imports_dask():
+    said = (ROOT / "docs" / "cluster.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"    (from dask_jobqueue(?:.*\n)+?)(?=\n\S)", said)
+    lines = [line.removeprefix("    ") for line in example.splitlines()]
+    made = lines.index(next(line for line in lines if line.startswith("cluster.scale")))
+    script = "import sys\nfrom digiclay.commands.parser import parser\nparser()\n"
+    script += "assert not {name.split('.')[0] for name in sys.modules} & {'dask', 'distributed', 'tornado'}\n"
+    script += "\n".join([*lines[:made], "print(cluster.job_script())", "cluster.close()"])
+    code, out, err = finish(start(script, env={"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"}))
+    assert code == 0, err
+    assert out.startswith("#!/")
+    assert re.search(r"^#SBATCH --cpus-per-task=\d+$", out, re.MULTILINE)
+    assert "distributed.cli.dask_worker tcp://" in out or "dask worker tcp://" in out

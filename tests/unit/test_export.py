@@ -1,7 +1,5 @@
 """Meshes of each kind and their files: what was written is what other readers find."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct
@@ -34,7 +32,7 @@ PLAIN = ["stl", "stl_ascii", "obj", "ply"]
 
 
 @pytest.fixture
-def formed() -> Formed:
+def formed():
     """A bed on which every pin has a height, a force and nearly a mode of its own."""
     random = np.random.default_rng(3)
     height, force = random.uniform(0.03, 0.06, 35), random.uniform(0.0, 1.0, 35)
@@ -42,7 +40,7 @@ def formed() -> Formed:
 
 
 @pytest.fixture
-def solid(formed: Formed) -> list[Body]:
+def solid(formed):
     return make_bodies(formed, Model())
 
 
@@ -86,7 +84,12 @@ def test_a_glb_has_a_named_node_for_each_feature(formed, tmp_path):
     assert scene.volume == pytest.approx(sum(mesh(body).volume for body in made), rel=1e-6)
 
 
-def test_a_3mf_names_its_unit_and_has_an_object_for_each_feature(formed, tmp_path):
+def test_a_3mf_names_its_unit_has_an_object_for_each_feature_and_says_what_is_an_open_surface(
+    formed, tmp_path
+):
+    path = mesh_writer.write(make_bodies(formed, Model(kind="surface")), tmp_path / "skin.3mf")
+    with zipfile.ZipFile(path) as archive:
+        assert b'type="surface"' in archive.read("3D/3dmodel.model")
     made = make_bodies(formed, Model(kind="features"), Finding(smallest=1))
     for unit, factor in (("mm", 1e3), ("m", 1.0)):
         path = mesh_writer.write(made, tmp_path / "features.3mf", unit=unit)
@@ -106,12 +109,6 @@ def test_a_3mf_names_its_unit_and_has_an_object_for_each_feature(formed, tmp_pat
             np.testing.assert_allclose(points, body.vertices * factor, rtol=0.0, atol=WRITTEN * factor / 1e3)
             faces = np.array([list(one.Indices) for one in found.GetTriangleIndices()])
             np.testing.assert_array_equal(faces, body.faces)
-
-
-def test_a_3mf_says_of_an_open_skin_that_it_is_a_surface(formed, tmp_path):
-    path = mesh_writer.write(make_bodies(formed, Model(kind="surface")), tmp_path / "skin.3mf")
-    with zipfile.ZipFile(path) as archive:
-        assert b'type="surface"' in archive.read("3D/3dmodel.model")
 
 
 def test_an_obj_has_a_group_for_each_feature(formed, tmp_path):
@@ -171,6 +168,16 @@ def test_a_file_that_cannot_be_replaced_leaves_no_temporary_one(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
+def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("digiclay.core.mesh_io.mesh_writer._triangles", stop)
+    with pytest.raises(KeyboardInterrupt):
+        mesh_writer.write(solid, tmp_path / "surface.stl")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can make a small disk")
 @pytest.mark.parametrize("kind", mesh_writer.FORMATS)
 def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
@@ -190,18 +197,6 @@ def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
     finally:
         subprocess.run(["umount", disk], check=True, timeout=TIMEOUT)
 
-
-def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
-    def stop(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("digiclay.core.mesh_io.mesh_writer._triangles", stop)
-    with pytest.raises(KeyboardInterrupt):
-        mesh_writer.write(solid, tmp_path / "surface.stl")
-    assert not list(tmp_path.iterdir())
-
-
-# Kinds of mesh
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
@@ -295,12 +290,6 @@ def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
         assert np.linalg.norm(mine[:, :2] - (x, 0.0), axis=1).max() < 12e-3
 
 
-def test_features_are_bodies_of_their_own_name_and_groups_only_after_a_search():
-    assert [body.name for body in make_bodies(uneven(), Model(kind="features"))] == ["boss_1", "crease_1"]
-    (body,) = make_bodies(uneven(), Model())
-    assert (body.groups, body.group.size) == ((), 0)
-
-
 def test_a_skin_of_too_many_points_is_refused_before_it_is_made():
     place = make_grid(Layout(rows=400, columns=400)).positions
     bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
@@ -347,9 +336,6 @@ def test_values_that_are_not_finite_are_refused_by_cell(name, bad):
     known[name] = np.where(np.arange(168) == 7, bad, 0.04)
     with pytest.raises(ParameterError, match=rf"^Surface\.{name} must be finite \(got {bad} at cell 7\)"):
         Formed.of(uneven().position, **known)
-
-
-# Large beds: how much memory an export takes is a count of bytes a pin, the same on any machine
 
 
 @pytest.mark.parametrize("file", ["stl", "ply"])

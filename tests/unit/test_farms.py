@@ -1,7 +1,5 @@
 """Files for render farms: each reader of their formats finds the same tasks in them, in the same order."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
@@ -41,7 +39,7 @@ BLENDER = ["--background", "--addons", "bl_ext.user_default.digiclay", "--comman
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path, monkeypatch):
     """Work in a folder that a shell, a template and a script could misread."""
     folder = tmp_path / "schöne 'Tasten' {{Param.Series}} $HOME; #"
     (folder / "below").mkdir(parents=True)
@@ -50,7 +48,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def submit(form: str, said: str = JOBS + FILMS, *options: str) -> int:
-    """Write the files of a farm into the folder ``out``."""
     Path("two.toml").write_text(said, encoding="utf-8")
     out = ["--out", str(Path("below/../out")), "--submit", form, "--chunk", "5", "--quiet"]
     return main(["batch", "two.toml", *out, *options])
@@ -62,7 +59,7 @@ def planned() -> dict[str, tuple[list[str], set[str]]]:
     return {task.name: (task.list_arguments("S"), set(task.needs)) for task in tasks}
 
 
-def test_the_tasks_of_a_job_are_its_run_then_frames_then_films_and_the_page_is_last() -> None:
+def test_the_tasks_of_a_job_are_its_run_then_frames_then_films_and_the_page_is_last():
     assert submit("openjd") == 0
     found = planned()
     assert list(found)[:1] + list(found)[-1:] == ["tap-a: run", "page"]
@@ -119,7 +116,7 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
 
 
 @pytest.mark.parametrize("every", [1, 7])
-def test_a_film_is_planned_with_the_frames_its_run_will_have(every: int) -> None:
+def test_a_film_is_planned_with_the_frames_its_run_will_have(every):
     setting = f"a = {{ simulation.duration = 0.123, recorder.every = {every} }}"
     submit("openjd", f'scenes = ["tap"]\nerrors = false\n[settings]\n{setting}\n[film]\nrate = 100\n')
     (job,) = (series := read_jobs(Path("two.toml"))).jobs
@@ -155,7 +152,7 @@ def compiled(job: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("program", ["", WINDOWS, "/opt/with blank/digiclay", "{digiclay}"])
-def test_the_flamenco_script_makes_these_tasks_with_these_dependencies(program: str, here: Path) -> None:
+def test_the_flamenco_script_makes_these_tasks_with_these_dependencies(program, here):
     assert submit("flamenco", JOBS + FILMS, *(["--program", program] if program else [])) == 0
     text = Path("out/flamenco/job.json").read_text(encoding="utf-8")
     job = json.loads(text)
@@ -176,7 +173,7 @@ def test_the_flamenco_script_makes_these_tasks_with_these_dependencies(program: 
         assert task["type"] == ("blender" if rendered else "misc")
 
 
-def test_the_flamenco_script_has_the_settings_its_jobs_give_and_is_plain_javascript() -> None:
+def test_the_flamenco_script_has_the_settings_its_jobs_give_and_is_plain_javascript():
     submit("flamenco")
     context = quickjs.Context()
     context.eval(SCRIPT.read_text(encoding="utf-8"))
@@ -191,7 +188,7 @@ def test_the_flamenco_script_has_the_settings_its_jobs_give_and_is_plain_javascr
     assert re.findall(rf"{words}|=>|`|\.\.\.|\?\.|\?\?|\*\*", code) == []
 
 
-def test_the_lists_of_cuecmd_hold_these_tasks_stage_by_stage(here: Path) -> None:
+def test_the_lists_of_cuecmd_hold_these_tasks_stage_by_stage(here):
     assert submit("cuecmd") == 0
     lists = sorted(Path("out/cuecmd").iterdir())
     assert [path.name for path in lists] == ["1-runs.txt", "2-frames.txt", "3-films.txt", "4-page.txt"]
@@ -212,7 +209,7 @@ def test_the_lists_of_cuecmd_hold_these_tasks_stage_by_stage(here: Path) -> None
     assert sorted(path.name for path in Path("out/cuecmd").iterdir()) == ["1-runs.txt", "2-page.txt"]
 
 
-def test_a_line_for_windows_protects_what_its_shell_would_read() -> None:
+def test_a_line_for_windows_protects_what_its_shell_would_read():
     words = [WINDOWS, "job", r"Z:\a & b\jobs\x", "--only", "run", "C:\\my folder\\", "^", "|"]
     assert join_words(words, windows=True) == (
         f'"{WINDOWS}" job "Z:\\a & b\\jobs\\x" --only run "C:\\my folder\\\\" "^" "|"'

@@ -1,23 +1,32 @@
-"""Fingers are a tuple in scenes, kept states and takes; few places take the only one out of it."""
-
-from __future__ import annotations
+"""Several fingers in scenes, kept states and takes; a run beyond what a finger is says so."""
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError, SceneError, StateError
 from digiclay.core.engine.simulation import begin
 from digiclay.core.files.tables import parse_tables
+from digiclay.core.model import touch
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.model.touch import MOST_FORCE, MOST_INDENTATION, describe_excess, find_indentations
+from digiclay.core.model.trajectory import Path as FingerPath
+from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
+from digiclay.core.session.live_session import simulate_path
+from digiclay.core.session.recent_trace import exceeds_law
+from digiclay.core.session.run_scene import Result, run
 from digiclay.core.session.snapshot import START
 from digiclay.core.session.take import Take, from_bytes, to_bytes
+from digiclay.overlay.sections import force_message
+
+from tests.assemble import sample, under
 
 BED = "[layout]\nrows = 6\ncolumns = 6\n[control]\nmethod = 'elastic'\n"
 #: A thumb and a finger without relaxation.
@@ -37,32 +46,29 @@ ONE = TWO[: TWO.rindex("[[finger]]")]
 
 
 def scene(words: str) -> Scene:
-    """Return the scene of a text."""
     return resolve(parse_tables(BED + words), "bed")
 
 
-def test_a_scene_may_have_two_fingers_and_lasts_as_long_as_the_longest_path() -> None:
+def test_a_scene_may_have_two_fingers_and_lasts_as_long_as_the_longest_path():
     assert scene(TWO).simulation.duration == 0.7
     thumb, other = scene(TWO).fingers
-    assert thumb.fingertip is not None
     assert (thumb.fingertip.length, thumb.relaxation is None, other.relaxation) == (14e-3, False, None)
     assert (thumb.trajectory.interpolation, other.trajectory.interpolation) == ("smooth", "linear")
 
 
 @pytest.mark.parametrize("text", [BED + TWO, "finger = []\nsimulation.duration = 1.0\n" + BED])
-def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(text: str) -> None:
+def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(text):
     made = resolve(parse_tables(text), "bed")
     assert resolve(parse_tables(format_scene(made))) == made
 
 
-def test_a_setting_names_the_only_finger_of_a_list_as_any_other_and_none_of_two(tmp_path: Path) -> None:
+def test_a_setting_names_the_only_finger_of_a_list_as_any_other_and_none_of_two(tmp_path):
     beside = ONE.replace("[[finger]]", "").replace("[finger.", "[")
     assert scene(ONE) == scene(beside)
     assert "[[finger]]" not in format_scene(scene(ONE))
     file = tmp_path / "one.toml"
     file.write_text(BED + ONE, encoding="utf-8")
     (finger,) = load(file, [Setting("fingertip.length", "0.009"), Setting("relaxation", "absent")]).fingers
-    assert finger.fingertip is not None
     assert (finger.fingertip.length, finger.relaxation) == (9e-3, None)
     file.write_text(BED + TWO, encoding="utf-8")
     with pytest.raises(SceneError, match=r"^--set: fingertip must be left out where there is \[\[finger\]\]"):
@@ -80,18 +86,18 @@ def test_a_setting_names_the_only_finger_of_a_list_as_any_other_and_none_of_two(
         ("[finger]\n", r"finger must be a list of tables, \[\[finger\]\] \(got an empty section\)"),
     ],
 )
-def test_what_is_wrong_with_a_finger_is_told_with_its_number(words: str, said: str) -> None:
+def test_what_is_wrong_with_a_finger_is_told_with_its_number(words, said):
     with pytest.raises(ParameterError, match=f"^{said}"):
         scene(words)
 
 
 @pytest.mark.parametrize("number", [0, 33])
-def test_no_finger_and_33_are_refused_in_one_line(number: int) -> None:
+def test_no_finger_and_33_are_refused_in_one_line(number):
     with pytest.raises(ParameterError, match=rf"^scene\.fingers must be 1 to 32 \(got {number}\)\.$"):
         assemble(replace(scene(ONE), fingers=scene(ONE).fingers * number))
 
 
-def test_a_kept_state_of_two_fingers_is_refused() -> None:
+def test_a_kept_state_of_two_fingers_is_refused():
     system = assemble(scene(ONE))
     data = snapshot.dump(system, begin(system))
     length = int.from_bytes(data[len(START) : len(START) + 4], "little")
@@ -104,10 +110,77 @@ def test_a_kept_state_of_two_fingers_is_refused() -> None:
         snapshot.load(system, two)
 
 
-def test_a_take_keeps_the_path_of_every_finger() -> None:
+def test_a_take_keeps_the_path_of_every_finger():
     poses = np.tile([0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0], (4, 2, 1))
     poses[:, 1, 0] = 1e-3
     take = Take(scene(TWO), b"start", poses, b"end")
     back = from_bytes(to_bytes(take))
     assert np.array_equal(back.poses, poses)
     assert (back.scene, back.start, back.end) == (take.scene, take.start, take.end)
+
+
+def pressed(depth: float, tilt: float = 0.0, x: float = 0.0, **parts: object) -> Result:
+    """Return a run whose finger, tilted, rad, comes down at x to `depth` below the tops within 0.1 s, m."""
+    points = ((0.0, 41e-3), (0.1, 40e-3 - depth), (0.15, 40e-3 - depth))
+    turn = (np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0)
+    way = FingerPath("linear", tuple(Waypoint(time, (x, 0.0, z), turn) for time, z in points))
+    known: Scene = sample("tap", "simulation.duration=0.15")
+    return run(known.with_sections(trajectory=way, **{"control": None, "blister": None, **parts}))
+
+
+@pytest.fixture(scope="module")
+def shallow():
+    """Return a run within what a finger is."""
+    return pressed(1.5e-3)
+
+
+def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line_and_no_other(shallow):
+    assert (shallow.metrics["beyond_a_finger"], "contact law" in shallow.summary()) == ("", False)
+    through = pressed(60e-3)  # all valves are shut
+    said = through.metrics["beyond_a_finger"]
+    assert said.startswith("the contact law does not hold: ")
+    assert said.endswith("e+51 N (fingers were measured up to 2 N), 60 mm deep (up to 3 mm)")
+    assert through.summary().endswith(f"; {said}")
+    # Only what is beyond is named.
+    most = (MOST_FORCE, MOST_INDENTATION)
+    given = (most, (1.001 * MOST_FORCE, most[1]), (most[0], 1.001 * most[1]), (476.0, 4e-3), (None, None))
+    assert [describe_excess(*values).count("up to") for values in given] == [0, 1, 1, 2, 0]
+
+
+@pytest.mark.parametrize(
+    ("depth", "tilt", "x", "stiffness"),
+    [
+        (1.5e-3, 0, 0, 250), (3.5e-3, 0, 0, 250),
+        # By depth alone: above a pin, between pins, and tilted.
+        (3.5e-3, 0, 0, 0.01), (3.2e-3, 0, 1.5e-3, 0.01), (2.9e-3, 0.6, 0, 0.01), (4e-3, 0.6, 0, 0.01),
+    ],
+)  # fmt: skip
+def test_rows_and_live_states_beyond_the_law_are_marked(depth, tilt, x, stiffness, monkeypatch):
+    monkeypatch.setattr(touch, "ROWS", 1)
+    result = pressed(depth, tilt, x, contact=Contact(stiffness=stiffness))
+    history, system = result.history, assemble(result.scene)
+    unders = under(Fingertip().outline(history["fingertip"]), *history["position"].T)
+    depths = (history["height"] - unders).max(axis=1, where=history["force"] > 0.0, initial=0.0)
+    told = result.metrics["max_indentation"], result.metrics["units"]["max_indentation"]
+    assert told == (pytest.approx(depths.max(), rel=1e-12), "m")
+    # No valve is open, and the underside is an ellipse of 10 and 8 mm.
+    assert depths.max() == pytest.approx(depth - 8e-3 * (1.0 - np.sqrt(1.0 - (x / 10e-3) ** 2)), rel=1e-9)
+    wanted = (history["total_force"] > MOST_FORCE) | (depths > MOST_INDENTATION)
+    assert wanted.any() == (depth > MOST_INDENTATION) == ("beyond_a_finger" in history)
+    np.testing.assert_array_equal(history.get("beyond_a_finger", wanted), wanted)
+    states = simulate_path(system, begin(system), history["fingertip"][:, None])
+    live = [exceeds_law(system, *one) for one in zip(states, history["fingertip"][1:], strict=True)]
+    assert live == wanted[1:].tolist()
+
+
+def test_a_pin_that_is_not_felt_does_not_count(shallow):
+    # Beyond the rim of a finger that is lifted: no force, whatever the heights.
+    free = {**shallow.history, "force": np.zeros_like(shallow.history["force"])}
+    assert find_indentations(Fingertip(), free).max() == 0.0
+
+
+def test_the_overlay_says_when_no_finger_presses_so_hard():
+    assert [force_message(force) for force in (0.7, 2.0, 2.5, 476.0, 1e66)] == [
+        "0.70 N", "2.00 N", "2.5 N: beyond 2 N", "476 N: no finger", "1e+66 N: no finger",
+    ]  # fmt: skip
+    assert force_message(0.7, beyond=True) == "0.70 N: beyond 3 mm"

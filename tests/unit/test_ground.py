@@ -1,7 +1,5 @@
 """Blister that rises from each cell's own height: what is formed already is not cut."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np
@@ -33,14 +31,12 @@ def seen(target: Floats, mode: Mode, own: Floats | None = None) -> Measurement:
 
 
 def command(memory: Master, measured: Measurement, ground: str = "cell") -> Commands:
-    """Return what Method I commands."""
     control = VirtualMaster(ground=ground)
     orders: Commands = make_system(Layout(15, 15), control=control).controller.command(memory, measured)[1]
     return orders
 
 
 def at(x: float, y: float) -> int:
-    """Return the cell at a place in mm."""
     return int(np.hypot(BED.x - x * 1e-3, BED.y - y * 1e-3).argmin())
 
 
@@ -65,11 +61,11 @@ def test_a_cell_rises_from_its_own_ground(measured, place, height):
     assert command(master(height=50e-3), seen(RIDGE, Mode.HOLD), "edge").target[at(0, 15)] < 42e-3
 
 
-@pytest.mark.parametrize("mode", [Mode.REST, Mode.HOLD, Mode.EDGE])
-def test_a_cell_that_was_outside_takes_its_commanded_height_for_its_ground(mode: Mode) -> None:
-    measured = seen(RIDGE, mode, own=np.full(BED.count, 90e-3))
-    command(master(height=50e-3), measured)
-    np.testing.assert_array_equal(measured.own[0], RIDGE)
+def test_a_cell_that_was_outside_takes_its_commanded_height_for_its_ground():
+    for mode in (Mode.REST, Mode.HOLD, Mode.EDGE):
+        measured = seen(RIDGE, mode, own=np.full(BED.count, 90e-3))
+        command(master(height=50e-3), measured)
+        np.testing.assert_array_equal(measured.own[0], RIDGE)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +86,7 @@ def test_what_is_left_behind_a_blister_that_travels(target, ground, top, kept):
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
-def test_a_scene_is_read_with_its_ground_and_the_papers_as_older_versions_read_it(ground: str) -> None:
+def test_a_scene_is_read_with_its_ground_and_the_papers_as_older_versions_read_it(ground):
     scene = resolve({"control": {"ground": ground}})
     assert ("ground" in format_scene(scene)) == (ground != "edge")
     assert resolve(tomllib.loads(format_scene(scene))) == scene
@@ -111,7 +107,7 @@ def pressed(x: float, top: float, mode: Mode = Mode.BLISTER, ground: Floats = SL
     return command(master(*EAST, height=top), touch(seen(ground, mode, own=ground), x))
 
 
-def test_a_blister_that_sinks_into_a_slope_raises_no_cell_and_one_that_rises_is_level() -> None:
+def test_a_blister_that_sinks_into_a_slope_raises_no_cell_and_one_that_rises_is_level():
     measured = seen(SLOPE, Mode.BLISTER, own=SLOPE)
     measured.force[at(0.0, 0.0)] = 0.4
     change = command(master(height=36e-3), measured).target - SLOPE
@@ -158,14 +154,14 @@ def test_what_a_blister_has_formed_on_a_slope_stays_frozen(change, x, height, to
     np.testing.assert_array_equal(found.target[there], SLOPE[there] + change)
 
 
-def test_what_a_blister_has_raised_stays_when_it_begins_to_sink() -> None:
+def test_what_a_blister_has_raised_stays_when_it_begins_to_sink():
     # It comes up out of a valley of 4 mm, whose bottom it has raised to its top.
     ground, level = 40e-3 - np.where(BED.x < 0.0, 4e-3, 0.0), np.full(BED.count, 39.3e-3)
     found = command(master(*EAST, height=39.3e-3), touch(seen(level, Mode.BLISTER, own=ground), 1.5, 4.5))
     assert found.target[[at(x, 0) for x in (-3, 0, 3)]] == pytest.approx(39.3e-3, abs=1e-5)
 
 
-def test_the_stacked_runs_of_a_batch_have_profiles_of_their_own() -> None:
+def test_the_stacked_runs_of_a_batch_have_profiles_of_their_own():
     force = np.zeros(BED.count)
     force[[at(-3.0, 0.0), at(0.0, 0.0)]] = 0.2
     inside, tops = np.ones(BED.count, np.bool_), np.array([36e-3, 44e-3])
@@ -180,7 +176,7 @@ def test_the_stacked_runs_of_a_batch_have_profiles_of_their_own() -> None:
         np.testing.assert_allclose(single, found[:, run], rtol=0, atol=1e-15)
 
 
-def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse_the_direction() -> None:
+def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse_the_direction():
     east = Heading(0.0, 0.0, 1.0, 0.0)
     back = [update_heading(east, -way, 0.0, 1.5e-3, 6e-3).toward_x for way in (2e-3, 5.9e-3, 6.1e-3)]
     assert back == [1.0, 1.0, -1.0]

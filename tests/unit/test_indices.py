@@ -1,10 +1,7 @@
 """Sobol indices against the analytic ones of Ishigami's function, and runs without a value."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,7 +54,6 @@ def analyze_ishigami(samples: int, seed: int, *, second: bool) -> Indices:
     x, y, z = np.pi * (2.0 * sample_shares(samples, 3, seed, second=second) - 1.0).T
     values = np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
     indices = compute_indices(values, 3, seed, second=second)
-    assert indices is not None
     return indices
 
 
@@ -67,7 +63,7 @@ def is_within(found: Indices, order: str, wanted: Any, part: Any = slice(None)) 
     return bool(np.all(np.abs(index - wanted) <= interval) and interval.max() < 0.45)
 
 
-def test_the_indices_of_ishigami_are_within_their_intervals() -> None:
+def test_the_indices_of_ishigami_are_within_their_intervals():
     # 95 % intervals: with these seeds each index is within its own.
     found = analyze_ishigami(128, 1, second=True)
     assert is_within(found, "first", FIRST)
@@ -83,7 +79,7 @@ def test_the_indices_of_ishigami_are_within_their_intervals() -> None:
         assert compute_indices(5.0 + noise, 3, 1, second=False) is None
 
 
-def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path) -> None:
+def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path):
     def work(bundle: Sequence[Point]) -> list[Record | None]:
         return [{"figures": {"rfd": 1.0}} for _ in bundle]
 
@@ -103,7 +99,7 @@ def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path)
         assert set(folder.read_records()) == {1, 2, 3, 4}
 
 
-def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone() -> None:
+def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone():
     assert sample_shares(8, 3, 1, second=False).shape == (count_points(8, 3, second=False), 3) == (40, 3)
     assert sample_shares(8, 3, 1, second=True).shape == (count_points(8, 3, second=True), 3) == (64, 3)
     one, same, other = (sample_shares(16, 2, seed, second=False) for seed in (3, 3, 4))
@@ -116,7 +112,6 @@ def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone()
 
 
 def record(rfd: float | None, loss: float | None = 0.0) -> Record:
-    """Return the record of a run."""
     return {"figures": {"rfd": rfd, "contact_loss_share": loss}}
 
 
@@ -134,13 +129,7 @@ RUNS = [record(0.2), record(0.5, 0.04), {"error": "no memory"}, record(None, Non
 )
 def test_runs_without_a_value_or_the_fingertip_have_the_largest_of_the_others(name, usual, values, counts):
     found = make_response(name, RUNS, find_excess_losses(RUNS, record(0.1, usual)))
-    assert found.values.tolist() == values
-    assert (found.absent, found.lost) == counts
-
-
-def test_an_output_that_no_run_has_is_told_with_the_first_error() -> None:
+    assert (found.values.tolist(), (found.absent, found.lost)) == (values, counts)
     runs = [record(None), {"error": "There is not enough memory."}]
-    with pytest.raises(
-        OutputError, match=r"has the metric rfd; the first error: There is not enough memory\."
-    ):
+    with pytest.raises(OutputError, match=r"has the metric rfd; the first error: There is not enough memory"):
         make_response("rfd", runs, find_excess_losses(runs, record(0.1)))

@@ -1,7 +1,5 @@
 """The wall's clock, the finger's way, the trace, the error monitor and the ticks of a live session."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from itertools import cycle, islice, pairwise
@@ -56,19 +54,10 @@ def looked(times: list[float], most: int = 100, clock: Clock | None = None) -> t
     return counts, clock
 
 
-@pytest.mark.parametrize(
-    ("times", "counts"),
-    [
-        pytest.param([1e6], [0], id="nothing at the first look"),
-        pytest.param([0.0, 0.012, 0.024, 0.026], [0, 2, 2, 1], id="the rest is kept for the next look"),
-        pytest.param([5.0, 4.0, 4.01], [0, 0, 2], id="a clock that goes back"),
-    ],
-)
-def test_whole_periods_are_due(times: list[float], counts: list[int]) -> None:
-    assert looked(times)[0] == counts
-
-
-def test_as_much_is_simulated_as_time_goes_by() -> None:
+def test_as_much_is_simulated_as_time_goes_by():
+    # Nothing at the first look, the rest is kept for the next one; a clock that goes back.
+    assert looked([1e6, 1e6 + 0.012, 1e6 + 0.024, 1e6 + 0.026])[0] == [0, 2, 2, 1]
+    assert looked([5.0, 4.0, 4.01])[0] == [0, 0, 2]
     times = np.cumsum(np.random.default_rng(1).uniform(0.0, 0.06, 2000)).tolist()
     counts, clock = looked(times)
     # Less than a period is owed at the end, whatever has been rounded on the way.
@@ -82,7 +71,7 @@ def test_as_much_is_simulated_as_time_goes_by() -> None:
     assert looked([100.0, 100.01], clock=clock.stopped())[0] == [0, 2]
 
 
-def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
+def test_a_machine_too_slow_slows_down_instead_of_stalling():
     clock, now, looks = Clock(), 0.0, []
     for _ in range(200):
         count, clock = periods_due(clock, now, PERIOD, 1000)
@@ -117,7 +106,7 @@ def test_the_periods_of_a_queue_leave_the_window_its_redraws(drawing, spent, bet
     assert clock.factor == pytest.approx(8 * spent / between, rel=0.05)
 
 
-def test_a_queue_that_waits_for_the_hand_does_not_count() -> None:
+def test_a_queue_that_waits_for_the_hand_does_not_count():
     clock = count_queue(Clock(seen=0.0), 0.1, 0.5, 0.05)
     assert clock.factor == pytest.approx(5.0)
     waited = count_queue(clock, 60.0, 0.0, 0.0)
@@ -131,7 +120,7 @@ def pose(x: float = 0.0, z: float = 0.05) -> Floats:
     return np.array([[x, 0.0, z, *LEVEL]])
 
 
-def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
+def test_the_way_begins_where_the_finger_was_and_ends_where_it_is():
     start, end = pose(), np.array([[0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.0]])
     path = interpolate_path(start, end, 7)
     assert path.shape == (8, 1, 7)
@@ -146,19 +135,13 @@ def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
     assert np.array_equal(interpolate_poses(poses, parts), alone)
 
 
-@pytest.mark.parametrize(
-    ("given", "wanted"),
-    [
-        ([0.0, 0.0, -50.0], [0.0, 0.0, 0.0]),
-        ([1e9, -1e9, 1e9], [100.0, -100.0, 100.0]),
-        ([0.01] * 3, [0.01] * 3),
-    ],
-)
-def test_a_finger_stays_where_a_finger_can_be(given, wanted):
-    assert clamp_pose(np.array([*given, *LEVEL]), 0.1)[:3].tolist() == wanted
+def test_a_finger_stays_where_a_finger_can_be():
+    places = ([0.0, 0.0, -50.0], [1e9, -1e9, 1e9], [0.01] * 3)
+    found = [clamp_pose(np.array([*place, *LEVEL]), 0.1)[:3].tolist() for place in places]
+    assert found == [[0.0, 0.0, 0.0], [100.0, -100.0, 100.0], [0.01] * 3]
 
 
-def test_a_recording_keeps_each_surface_once_under_its_own_number_and_drops_what_undo_took_back() -> None:
+def test_a_recording_keeps_each_surface_once_under_its_own_number_and_drops_what_undo_took_back():
     low, high = np.full(9, 30e-3), np.full(9, 45e-3)
     keep = Recording.begin(b"", 0, pose()[None], 1)
     assert keep.orders is None
@@ -167,22 +150,18 @@ def test_a_recording_keeps_each_surface_once_under_its_own_number_and_drops_what
     given.append(Orders(repeat_order(4, Verb.PLACE, 1.0), (low, high)))
     for tick, orders in enumerate(given, 2):
         keep = keep.extend(path, tick, orders)
-    assert keep.orders is not None
     np.testing.assert_array_equal(keep.orders.rows[:, 0], np.repeat([0.0, 0.0, 0.0, 1.0, 3.0], 4))
     np.testing.assert_array_equal(keep.surfaces, (low, high, low, high))
     for period, numbers in ((20, 4), (16, 2), (12, 1), (4, 1)):
         cut = keep.cut_at_period(period)
-        assert cut is not None
         assert len(cut.surfaces) == numbers
     earlier = keep.cut_at_tick(3, 8)
-    assert earlier is not None
     assert (len(earlier.surfaces), earlier.count) == (1, 9)
     again = earlier.extend(path, 9, place(4, high))
-    assert again.orders is not None
     assert (again.orders.rows[-1, 0], len(again.surfaces)) == (1.0, 2)
 
 
-def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it_along() -> None:
+def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it_along():
     trace, line = recent_trace.start(PERIOD), [0.0] * 8
     for time in range(5 * ROWS):
         trace = recent_trace.extend(trace, [[float(time), *line]])
@@ -192,7 +171,7 @@ def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it
     assert recent_trace.extend(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
-def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
+def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays_picked_its_past():
     press = path((0, 0, 0, 42), (0.2, 0, 0, 36))
     system = assemble(resolve({}))
     *_, state = periods(system, [press], begin(system), 60)
@@ -204,9 +183,13 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
     assert trace.force[0] == pytest.approx(state.row(system.rows.force).sum(), rel=1e-12)
     assert trace.force[0] > 0.1
     assert (trace.time[0], trace.set_point[0]) == (60 * PERIOD, 0.4)
+    other = recent_trace.pick(trace, [9, corner, 5000, -1], system.grid.count)
+    assert other.pins == (9, corner)
+    assert np.isnan(other.heights[0, 0])
+    assert other.heights[0, 1] == trace.heights[0, 1]
 
 
-def test_a_set_point_of_each_cell_is_traced_as_their_number_changes() -> None:
+def test_a_set_point_of_each_cell_is_traced_as_their_number_changes():
     press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
     *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
     held, asked = state.active, SetPoint(0.04, per_cell=True)
@@ -217,24 +200,9 @@ def test_a_set_point_of_each_cell_is_traced_as_their_number_changes() -> None:
     assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding
 
 
-def test_a_pin_that_stays_picked_keeps_its_past() -> None:
-    trace = recent_trace.pick(recent_trace.start(PERIOD), [3, 4], 121)
-    trace = recent_trace.extend(
-        trace, [recent_trace.sample(SYSTEM, begin(SYSTEM), SetPoint(0.4), trace.pins)]
-    )
-    other = recent_trace.pick(trace, [9, 4, 500, -1], 121)
-    assert other.pins == (9, 4)
-    assert np.isnan(other.heights[0, 0])
-    assert other.heights[0, 1] == trace.heights[0, 1]
-
-
-# The reference solution beside a session
-
-
 def watched(scene: Scene, finger: Floats) -> tuple[State, list[Errors]]:
     """Follow a path with a monitor; return the last state and the errors it finds."""
     system, monitor, found = assemble(scene), accuracy.start(scene), []
-    assert monitor is not None
     start = begin(system)
     monitor = accuracy.begin_stretch(monitor, start)
     for index, state in enumerate(simulate_path(system, start, finger)):
@@ -245,13 +213,7 @@ def watched(scene: Scene, finger: Floats) -> tuple[State, list[Errors]]:
 
 
 def stepped(step: str) -> Scene:
-    """Return the scene with a physics step."""
     return resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}})
-
-
-def go_on(finger: Floats) -> Floats:
-    """Return a finger's path that moves on, quite differently, while the reference lags behind."""
-    return np.concatenate([finger, interpolate_path(pose(z=0.039), pose(z=0.05), STRETCH * (SPREAD - 1) - 1)])
 
 
 @pytest.mark.parametrize("ticks", [(3, 3, 4), (1,), (2, 1), (9,)])
@@ -265,7 +227,6 @@ def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(ticks, mo
 
     monkeypatch.setattr(accuracy, "repeat_period", counted)
     monitor, start = accuracy.start(SCENE), begin(SYSTEM)
-    assert monitor is not None
     finger = interpolate_path(pose(), pose(z=0.038), STRETCH + PAUSE)
     monitor, counts = accuracy.begin_stretch(monitor, start), cycle(ticks)
     states = enumerate(simulate_path(SYSTEM, start, finger))
@@ -284,11 +245,14 @@ def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(ticks, mo
         assert SPREAD * sum(number <= tick for number in done) <= sum(sizes[: tick + 1])
 
 
-def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_ones() -> None:
+def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_ones():
     # The truth: the same periods at a twentieth of the step. The commands differ by what the errors
     # before them changed, so it is no more than the right size that is asked for.
     finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
-    (_, (found,)), (_, (fine, *_)) = (watched(stepped(step), go_on(finger)) for step in ("1 ms", "0.25 ms"))
+    # It moves on, quite differently, while the reference lags behind.
+    away = interpolate_path(pose(z=0.039), pose(z=0.05), STRETCH * (SPREAD - 1) - 1)
+    whole = np.concatenate([finger, away])
+    (_, (found,)), (_, (fine, *_)) = (watched(stepped(step), whole) for step in ("1 ms", "0.25 ms"))
     ends = []
     for step in ("0.05 ms", "1 ms"):
         system = assemble(stepped(step))
@@ -302,7 +266,7 @@ def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_o
     assert fine.force < found.force / 8
 
 
-def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alone() -> None:
+def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alone():
     count = 2 * (STRETCH + PAUSE) + STRETCH * SPREAD
     finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), count)
     *_, alone = simulate_path(SYSTEM, begin(SYSTEM), finger)
@@ -315,8 +279,6 @@ def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alo
     assert accuracy.start(resolve(table)) is None
 
 
-# An input reaches the commanded pins in the next tick
-
 #: A finger in the pins, mm, and how long it has pressed, ticks.
 PRESSED, TICKS = 37.0, 20
 
@@ -327,28 +289,21 @@ def pressed() -> tuple[Running, hand.Hand]:
     return mover.move(hand.started(), [(0.0, z) for z in np.linspace(46.0, PRESSED, TICKS)]), mover
 
 
-def commands(session: Running) -> np.ndarray:
-    """Return the commanded heights."""
-    return session.state.row(session.system.rows.target)
-
-
 def forked(session: Running) -> Running:
     """Return the same session with a state of its own: a tick uses it up."""
     return replace(session, state=session.state.copy())
 
 
 @pytest.mark.usefixtures("quick_machine")
-def test_a_move_between_two_ticks_changes_the_commands_of_the_next() -> None:
+def test_a_move_between_two_ticks_changes_the_commands_of_the_next():
     session, mover = pressed()
     now = mover.now + hand.TICK
-    still = sculpting.advance(forked(session), hand.pose(0.0, PRESSED), now, 100)
-    moved = sculpting.advance(forked(session), hand.pose(2.0, PRESSED), now, 100)
-    assert still.state.period == moved.state.period > session.state.period
-    assert not np.array_equal(commands(still), commands(moved))
+    both = [sculpting.advance(forked(session), hand.pose(x, PRESSED), now, 100) for x in (0.0, 2.0)]
+    assert both[0].state.period == both[1].state.period > session.state.period
+    assert not np.array_equal(*(one.state.row(one.system.rows.target) for one in both))
 
 
-@pytest.mark.usefixtures("quick_machine")
-def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next() -> None:
+def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next():
     session, number = queue_stroke(hand.started(), 0.0, 0.0, 4e-3)
     now = 0.0
     while session.strokes[0].reached < 5 and now < 3.0:
@@ -360,13 +315,13 @@ def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next() -> N
     ways = []
     for y in (0.0, 4e-3):
         other = change_stroke(forked(session), number, partial(draw, x=0.02 * now, y=y, depth=4e-3))
-        ways.append(sculpting.advance(other, hand.pose(), now, 100))
-    straight, aside = ways
-    assert aside.pose[1] > straight.pose[1] == 0.0
-    assert not np.array_equal(commands(straight), commands(aside))
+        # A tick has as much time as it wants: how far it comes must not depend on the machine's load.
+        ways.append(sculpting.advance(other, hand.pose(), now, 100, interval=1e3))
+    assert ways[1].pose[1] > ways[0].pose[1] == 0.0
+    assert not np.array_equal(*(one.state.row(one.system.rows.target) for one in ways))
 
 
-def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step() -> None:
+def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step():
     session = hand.started()
     for x in (-9e-3, 9e-3):
         session, number = queue_stroke(session, x, 0.0, 4e-3)
@@ -381,7 +336,7 @@ def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step() -> None:
 
 
 @pytest.mark.usefixtures("quick_machine")
-def test_a_tick_packs_the_state_once_however_many_periods_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tick_packs_the_state_once_however_many_periods_it_has(monkeypatch):
     packed: list[int] = []
     dump = snapshot.dump
 

@@ -1,7 +1,5 @@
 """Nominal surface of press strokes: sections by the distance to the path, passes, images, limits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +50,7 @@ def measure_distance(path: Floats) -> Floats:
 
 @pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER])
 @pytest.mark.parametrize("name", PATHS)
-def test_the_height_follows_from_the_distance_to_the_path_alone(name: str, brush: Brush) -> None:
+def test_the_height_follows_from_the_distance_to_the_path_alone(name, brush):
     found = find_nominal(stroke(PATHS[name], brush), DEVICE, FLAT).height - REST
     distance = measure_distance(PATHS[name])
     section = np.where(distance <= 7.5e-3, np.clip((7.5e-3 - distance) / 4.5e-3, 0.0, 1.0), 0.0)
@@ -62,7 +60,7 @@ def test_the_height_follows_from_the_distance_to_the_path_alone(name: str, brush
 
 
 @pytest.mark.parametrize("name", PATHS)
-def test_where_no_blister_is_the_fingertip_leaves_its_underside(name: str) -> None:
+def test_where_no_blister_is_the_fingertip_leaves_its_underside(name):
     path = np.vstack([PATHS[name], PATHS[name][-1:]])
     found = find_nominal(
         stroke(path, Brush.LOWER, 2e-3), replace(PRESSED, finger=Fingertip(4e-3, 4e-3, 4e-3)), FLAT
@@ -73,17 +71,17 @@ def test_where_no_blister_is_the_fingertip_leaves_its_underside(name: str) -> No
 
 
 @pytest.mark.parametrize(("accumulate", "height"), [(False, 4e-3), (True, 8e-3)])
-def test_a_crossing_counts_once_or_twice_where_it_accumulates(accumulate: bool, height: float) -> None:
+def test_a_crossing_counts_once_or_twice_where_it_accumulates(accumulate, height):
     eight = PATHS["a figure eight"]
     found = find_nominal(stroke(eight, accumulate=accumulate), DEVICE, FLAT).height.reshape(60, 60) - REST
+    # At the crossing; elsewhere it is as high as ever.
     assert found[29:31, 29:31].max() == pytest.approx(height, abs=0.8e-3)
-    # Elsewhere it is as high as ever.
     assert found[:, 38:].max() == pytest.approx(4e-3, abs=1e-9)
 
 
 @pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER, Brush.LEVEL])
 @pytest.mark.parametrize("symmetry", ["X", "Y", "XY"])
-def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry: str, brush: Brush) -> None:
+def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry, brush):
     hill = FLAT + 2e-3 * np.cos(90.0 * BED.x) * np.cos(60.0 * BED.y)
     path = np.array([8e-3, 5e-3]) + WAVE
     found = find_nominal(stroke(path, brush, images=make_images(symmetry)), DEVICE, hill).height.reshape(
@@ -96,7 +94,7 @@ def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry: str, brush: B
 
 
 @pytest.mark.parametrize("count", [3, 4, 24])
-def test_images_about_a_center_are_alike_at_every_turn(count: int) -> None:
+def test_images_about_a_center_are_alike_at_every_turn(count):
     images = make_images("RADIAL", count, (2e-3, 1e-3))
     found = find_nominal(stroke(LINE * 0.4 + [9e-3, 0.0], images=images), DEVICE, FLAT).height
     single = [
@@ -107,7 +105,7 @@ def test_images_about_a_center_are_alike_at_every_turn(count: int) -> None:
 
 
 @pytest.mark.parametrize("accumulate", [False, True])
-def test_a_surface_that_is_extended_is_that_of_the_whole_path(accumulate: bool) -> None:
+def test_a_surface_that_is_extended_is_that_of_the_whole_path(accumulate):
     whole = stroke(PATHS["a figure eight"], accumulate=accumulate, images=make_images("X"))
     part: Nominal | None = None
     for count in (1, 2, 50, 51, len(whole.samples)):
@@ -137,7 +135,7 @@ def test_pins_come_to_the_height_of_the_brush(brush, amount, share, lowest, high
     )
 
 
-def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_there_on() -> None:
+def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_there_on():
     low = find_nominal(stroke(LINE, Brush.LOWER, 30e-3), DEVICE, FLAT - 30e-3).height
     assert low.min() == 0.0
     deeper = deepen(start(1, -20e-3, 0.0, 2e-3), 3e-3)
@@ -146,7 +144,7 @@ def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_
     assert found.min() == pytest.approx(REST - 5e-3, abs=1e-12)
 
 
-def test_queued_strokes_count_from_what_those_before_them_leave() -> None:
+def test_queued_strokes_count_from_what_those_before_them_leave():
     level = stroke(np.array([[25e-3, 0.0], [-25e-3, 0.0]]), Brush.LEVEL)
     swept = replace(stroke(LINE), brush=Brush.SMOOTH)
     ridge = stroke(np.array([[0.0, -25e-3], [0.0, 25e-3]]))
@@ -156,7 +154,7 @@ def test_queued_strokes_count_from_what_those_before_them_leave() -> None:
     assert second.height[middle] == pytest.approx(REST, abs=1e-9)
 
 
-def test_a_ghost_that_is_drawn_on_is_that_of_the_whole_path_and_others_stay() -> None:
+def test_a_ghost_that_is_drawn_on_is_that_of_the_whole_path_and_others_stay():
     first, last = stroke(LINE), replace(stroke(WAVE, Brush.LOWER), number=2)
     kept: tuple[Ghost, ...] = ()
     for count in (1, 2, 60, 200):

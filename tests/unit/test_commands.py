@@ -1,0 +1,439 @@
+"""Commands beside run: compare, features, form; what is stopped before its end; scene and run in Python."""
+
+import json
+import shlex
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import digiclay
+import numpy as np
+import pytest
+import trimesh
+from digiclay.cli import main
+from digiclay.commands import form as form_command
+from digiclay.commands import run as run_command
+from digiclay.commands.compare import table
+from digiclay.commands.run import plan_meshes
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.forming import (
+    compute_display_time,
+    find_display,
+    find_summit,
+    find_touch_height,
+    make_forming_scene,
+)
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.toml_table import format_scene, resolve
+from digiclay.core.session.finished_run import find_row
+from digiclay.core.session.run_scene import RUN_METRICS, Result, RunRecording
+from digiclay.core.session.run_scene import run as run_scene
+from digiclay.core.shapes.fitting import fit_shape
+from digiclay.core.shapes.request import Shape
+from digiclay.plots.sweep import PANELS, comparison
+
+from tests.other_process import finish, start
+from tests.scene_files import SMALL_BLISTER, left, scene_text
+
+pytestmark = pytest.mark.usefixtures("here")
+
+
+PRESS = scene_text(11, 11, (0.0, 0.041), (0.3, 0.035), (0.5, 0.035))
+BOTH = ["virtual_master", "cell_states"]
+
+
+def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(here, capsys):
+    (here / "my.toml").write_text(PRESS, encoding="utf-8")
+    methods, setting = ["--methods", "cell_states,virtual_master"], ["--set", "control.force_setpoint=0.03"]
+    assert main(["compare", "my.toml", *methods, *setting]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["metric", "unit", *BOTH[::-1]]
+    printed = {line.split()[0]: line.split()[-2:] for line in lines[2 : 2 + len(RUN_METRICS)]}
+    assert list(printed) == list(RUN_METRICS)
+    assert [name for name, values in printed.items() if len(values) != 2] == []
+    # The finger comes down 5 mm deep: Method I alone presses harder than fingers were measured.
+    said = [line for line in lines if "the contact law does not hold" in line]
+    assert [line.split(":")[0] for line in said] == ["virtual_master"]
+    folder = here / "my_compare"
+    assert sorted(path.name for path in folder.iterdir()) == ["compare.png", "metrics.json"]
+    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    assert list(known) == BOTH[::-1]
+    assert list(known["cell_states"]) == list(RUN_METRICS)
+    assert known["cell_states"]["duration"] == known["virtual_master"]["duration"] == 0.5
+    # Other controllers, other forces: neither was run twice.
+    assert known["cell_states"]["max_total_force"] != known["virtual_master"]["max_total_force"]
+    # The setting reached both, and is asked of each cell that follows: of one at least, of all 121 at most.
+    assert known["virtual_master"]["set_point"] == 0.03
+    assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
+
+
+def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_not_found():
+    found = {name: dict.fromkeys(RUN_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
+    assert len({len(line) for line in table(found)}) == 1
+    rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
+    assert ["lag_max", "mm", "2.5"] in rows
+    assert ["rfd", "N", "–"] in rows
+
+
+def test_every_panel_has_a_bar_for_every_method():
+    found = {name: dict.fromkeys(RUN_METRICS, 1.0) for name in (*BOTH, "third")}
+    forces = {name: ([0.0, 1.0], [0.0, 0.4], [np.nan, 0.4]) for name in found}
+    figure = comparison(found, forces, "scene")
+    panels = {axes.get_label(): axes for axes in figure.axes}
+    assert {key: len(panels[key].patches) for key in PANELS} == dict.fromkeys(PANELS, 3)
+    assert len(panels["force"].get_legend().get_texts()) == 4  # and the set points
+
+
+#: A folder whose name a shell would take for several words.
+OUT = "first run"
+
+
+@pytest.fixture(autouse=True)
+def plain_relief(monkeypatch):
+    """Leave the texts of a relief where they are: to move them apart takes seconds."""
+    monkeypatch.setattr("digiclay.plots.bed.fit_relief", lambda *given: None)
+
+
+def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, number: int = signal.SIGINT) -> None:
+    """Send Ctrl-C, or another signal, when a command comes to a step."""
+    step: Callable[..., Any] = getattr(module, name)
+
+    def interrupted(*given: Any, **known: Any) -> Any:
+        assert signal.getsignal(number) is not signal.SIG_DFL  # it would end the tests
+        signal.raise_signal(number)
+        return step(*given, **known)
+
+    monkeypatch.setattr(module, name, interrupted)
+
+
+@pytest.fixture
+def stopped(monkeypatch, capsys):
+    """Give a way to stop a command before a step; it returns the commands on stderr by their files."""
+
+    def run(module: Any, name: str, *arguments: str, number: int = signal.SIGINT) -> dict[str, list[str]]:
+        with monkeypatch.context() as patched:
+            stop_before(patched, module, name, number)
+            assert main([*arguments, "--out", OUT]) == 130
+        said = capsys.readouterr().err.splitlines()
+        pairs = (line.removeprefix("Stopped before ").split("; to have it: ") for line in said)
+        return {what: shlex.split(command)[1:] for what, command in pairs}
+
+    return run
+
+
+def list_files(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+FEW = ["--set", "layout.rows=13", "--set", "layout.columns=13", "--quiet"]
+
+
+@pytest.mark.parametrize(
+    ("command", "made"),
+    [
+        (
+            ["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots", "--no-errors"],
+            ["surface.stl, surface.obj", "session.png, surface.png"],
+        ),
+        (["form", "dome", *FEW], ["surface.stl", "displayed/surface.stl"]),
+    ],
+    ids=["run", "form"],
+)  # fmt: skip
+def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(command, made, here, stopped):
+    assert main([*command, "--out", "whole"]) == 0
+    commands = stopped(run_command, "save", *command)
+    assert list(commands) == made
+    assert list_files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
+    assert not json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
+    for command in commands.values():
+        assert main(command) == 0
+    assert list_files(here / OUT) == list_files(here / "whole")
+    for name in {*", ".join(made).split(", ")}:
+        assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
+
+
+def test_plot_writes_into_a_folder_prints_its_files_and_says_what_it_cannot(here, capsys, refused):
+    run = ["run", "my.toml", "--quiet", "--no-errors", "--out"]
+    assert main([*run, "o"]) == 0
+    assert main(["plot", "o", "--out", "new/pictures"]) == 0
+    assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
+    assert list_files(here / "new") == {"pictures/session.png", "pictures/surface.png"}
+    refused(["plot", "o", "--out", "my.toml/x"], "my.toml/x cannot be a folder: my.toml is a file.")
+    main([*run, "row", "--set", "layout.rows=1"])
+    refused(["plot", "row"], "plot needs at least 2 x 2 cells")
+    main([*run, "none", "--set", "recorder=absent"])
+    refused(["plot", "none"], "none has no history.npz")
+
+
+def test_a_run_stopped_before_its_errors_are_estimated_says_so(here, stopped):
+    commands = stopped(Result, "estimate_errors", "run", "my.toml")
+    assert list(commands) == ["its errors were estimated"]
+    assert "height_error" not in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
+    assert main(commands["its errors were estimated"]) == 0
+    assert "height_error" in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
+    assert left(here) == [OUT]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "as farms stop"])
+def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says(number, here, stopped):
+    arguments = ("run", "my.toml", "--quiet", "--export", "ply")
+    commands = stopped(RunRecording, "observe", *arguments, number=number)
+    assert list(commands) == ["surface.ply"]
+    assert json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
+    assert main(commands["surface.ply"]) == 0
+    assert (here / OUT / "surface.ply").is_file()
+
+
+@pytest.mark.parametrize("step", ["scene_of", "fit_shape", "make_forming_scene"])
+def test_form_that_is_stopped_before_its_session_writes_nothing(step, here, monkeypatch, capsys):
+    monkeypatch.setattr(run_command, "run", lambda *given, **known: pytest.fail("It went on."))
+    stop_before(monkeypatch, form_command, step)
+    assert main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
+    assert capsys.readouterr().err == "Stopped; no file is half-written.\n"
+    assert left(here) == []
+
+
+def test_the_instant_before_the_finger_is_named_to_the_last_digit(here):
+    times = np.arange(2000) * 0.005
+    for row in (1, 777, 1999):
+        extra = plan_meshes(load(Path("my.toml")), {"time": times}, ["stl"], row, "displayed")
+        later = extra.later(Path("o"))
+        assert find_row({"time": times}, float(later[later.index("--time") + 1]), "--time") == row
+
+
+MIDDLE = scene_text(9, 9, (0.0, 0.041), (0.2, 0.036), (0.3, 0.036), parts=SMALL_BLISTER)
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory):
+    """The folder of a run that pressed the middle in."""
+    folder = tmp_path_factory.mktemp("features")
+    (folder / "my.toml").write_text(MIDDLE, encoding="utf-8")
+    assert main(["run", str(folder / "my.toml"), "--out", str(folder / "run"), "--quiet", "--no-errors"]) == 0
+    return folder / "run"
+
+
+@pytest.fixture
+def run(pressed, tmp_path, monkeypatch):
+    shutil.copytree(pressed, tmp_path / "run")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "run"
+
+
+def listed(capsys: pytest.CaptureFixture[str], *options: str) -> list[dict]:
+    assert main(["features", "run", "--json", *options]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_features_are_listed_in_a_table_and_none_at_the_start(run, capsys):
+    assert main(["features", "run"]) == 0
+    counted, head, _, row = capsys.readouterr().out.splitlines()
+    assert counted == "0 bosses and 1 crease"
+    assert (head.split()[:3], row.split()[0]) == (["feature", "form", "pins"], "crease_1")
+    assert main(["features", "run", "--time", "0"]) == 0
+    assert capsys.readouterr().out == "0 bosses and 0 creases\n"
+
+
+def deepest(run: Path) -> tuple[float, float]:
+    """Return how far the deepest pin has sunk, and how high it is at the end, m."""
+    with np.load(run / "history.npz") as history:
+        return float((history["height"][0] - history["height"][-1]).max()), float(history["height"][-1].min())
+
+
+def test_json_is_in_si_units_from_any_former_surface_and_a_threshold_has_a_unit(run, capsys):
+    (found,), (rest,) = listed(capsys), listed(capsys, "--former", "0.1")
+    assert found["kind"] == "crease"
+    assert found["depth"] == pytest.approx(deepest(run)[0], rel=1e-12)
+    assert 40 in found["pins"]  # the middle of 9 x 9
+    assert rest["depth"] < found["depth"]
+    assert listed(capsys, "--former", "rest")[0]["depth"] == pytest.approx(deepest(run)[0], rel=1e-9)
+    assert listed(capsys, "--threshold", "1") == listed(capsys, "--threshold", "1000 um") != [found]
+    assert listed(capsys, "--smallest", "81") == []
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ([], ["surface.stl"]),
+        (["--kind", "surface"], ["skin.stl"]),
+        (["--kind", "pins", "--format", "stl_ascii,3mf"], ["pins.3mf", "pins.ascii.stl"]),
+        (["--kind", "features"], ["features.stl"]),
+        (["--kind", "features", "--separate"], ["crease_1.stl"]),
+    ],
+)
+def test_each_kind_has_its_file(run, options, names):
+    assert main(["export", "run", "--out", "made", "--quiet", *options]) == 0
+    assert sorted(path.name for path in Path("made").iterdir()) == names
+
+
+def test_a_skin_and_its_resolution_can_be_chosen(run):
+    options = ["--skin", "smooth", "--resolution", "3", "--base-thickness", "5"]
+    assert main(["export", "run", "--quiet", *options]) == 0
+    made = trimesh.load_mesh(run / "surface.stl")
+    assert len(made.faces) == 4 * 24 * 24 + 4 * 2 * 24
+    # The spline goes a little lower.
+    assert made.bounds[0, 2] == pytest.approx(1e3 * deepest(run)[1] - 5.0, abs=0.2)
+
+
+@pytest.mark.parametrize("said", ["0.8", "800um"])
+def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run):
+    assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--up", "z", "--quiet"]) == 0
+    lines = (run / "surface.obj").read_text().splitlines()
+    lowest = min(float(line.split()[3]) for line in lines if line.startswith("v "))
+    assert lowest == pytest.approx(1e3 * deepest(run)[1] - 0.8, abs=1e-5)  # digits of the file
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["export", "run", "--separate"], "--separate needs --kind features."),
+        (["export", "run", "--base-thickness", "0"], "--base-thickness must be above 0 m (got 0 m)."),
+        (["export", "run", "--base-thickness", "thick"], "argument --base-thickness: must be a number"),
+        (["export", "run", "--kind", "features", "--time", "0"], "There is no feature of at least 3 pins"),
+        (["features", "run", "--threshold", "-1"], "--threshold must be at least 1e-06 m (got -0.001 m)."),
+        (["features", "run", "--threshold", "1 furlong"], "--threshold: must have a unit known here"),
+        (["features", "run", "--threshold", "1 N"], "argument --threshold: must be in m or a multiple of it"),
+        (["features", "run", "--smallest", "0"], "--smallest must be at least 1 (got 0)."),
+        (["features", "run", "--former", "99"], "--former must be between 0 s and"),
+        (["features", "run", "--former", "soon"], "--former must be a time or 'rest'"),
+        (["features", "nowhere"], "nowhere is no run's folder"),
+    ],
+)
+def test_a_mistake_is_one_line_and_no_file(run, refused, arguments, said):
+    before = left(run)
+    refused(arguments, said)
+    assert left(run) == before
+
+
+SMALL = ["--set", "layout.rows=13", "--set", "layout.columns=13"]
+BED = make_grid(Layout(13, 13))
+
+
+def form(folder: Path, word: str, *options: str) -> Path:
+    """Form a shape on a bed of 13 x 13 cells; return its folder."""
+    out = folder / "out"
+    assert main(["form", word, "--out", str(out), "--overwrite", *SMALL, *options]) == 0
+    return out
+
+
+def read(out: Path) -> dict[str, np.ndarray]:
+    with np.load(out / "history.npz") as stored:
+        return dict(stored)
+
+
+def test_a_mesh_goes_in_is_formed_and_comes_out(tmp_path, capsys):
+    source = tmp_path / "Größe 1.stl"
+    trimesh.creation.icosphere(subdivisions=3, radius=10.0).export(source)
+    out = form(tmp_path, str(source), "--export", "stl,glb")
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "Größe 1.stl: heights from 40.0 to 52.0 mm, covers 137 of 169 cells, no cell clipped"
+    assert said[1].startswith("displayed to within ")
+    assert said[2].startswith("formed: ")
+    assert said[-1] == f"written to {out}"
+    before, after = (trimesh.load_mesh(out / name) for name in ("displayed/surface.stl", "surface.stl"))
+    assert before.is_watertight
+    assert after.is_watertight
+    assert (out / "surface.glb").is_file()
+    # The finger draws a peak of some mm out of the top: 6 mm above where it touched, less its own give.
+    assert after.bounds[1, 2] - before.bounds[1, 2] > 4.0
+    judged = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    assert judged["display_error"] <= 10.1e-6
+    assert judged["raised_volume"] > 1e-7
+    assert judged["shape_covered"] == 137
+
+
+def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the_run(tmp_path, capsys):
+    source = tmp_path / "shape.npy"
+    np.save(source, np.eye(4))
+    out = form(tmp_path, str(source), "--finger", "press")
+    assert float(capsys.readouterr().out.split("displayed to within ")[1].split(" µm")[0]) <= 10.0
+    assert read(out)["total_force"].max() > 0.1
+    source.unlink()
+    again = run_scene(load(out / "scene.toml")).history
+    assert again
+    assert np.array_equal(again["height"], read(out)["height"])
+
+
+@pytest.mark.parametrize(
+    ("refresh", "preset"), [("one_time", "viscous"), ("gradual", "paper"), ("approximate_gradual", "fast")]
+)
+def test_a_shape_stands_by_the_time_it_is_said_to(refresh, preset):
+    table = {
+        "layout": {"rows": 9, "columns": 9},
+        "control": {"method": "plastic"},
+        "preset": preset,
+        "shape": {"file": "ripple", "rise": 30e-3, "foot": -10e-3, "refresh": refresh, "surfaces": 3},
+    }
+    bare = resolve(table)
+    system = assemble(bare)
+    display = find_display(system)
+    assert display
+    ready = compute_display_time(display)
+    scene = make_forming_scene(bare, system, "away")
+    height = run_scene(scene).history["height"]
+    stands = np.abs(height - display.heights).max(axis=1) <= 10e-6 + 1e-12
+    # Within the time, and not after a small part of it: nobody waits for nothing.
+    assert stands[round(ready / 5e-3)]
+    assert not stands[round(0.2 * ready / 5e-3)]
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (7.3e-3, -2.1e-3)])
+def test_the_finger_touches_the_highest_part_nearest_to_the_middle_at_the_height_it_is_said_to(x, y):
+    top = np.full(169, 40e-3)
+    top[[0, 60, 84]] = 50e-3, 49.9e-3, 41e-3
+    assert find_summit(BED, top) == (float(BED.x[60]), float(BED.y[60]))
+    heights = fit_shape(Shape(file="crater"), BED, Actuator()).heights
+    touch = find_touch_height(BED, heights, Fingertip(), x, y)
+    finger = Fingertip()
+    # The ellipsoid by its own equation, as far out as it reaches.
+    square = ((BED.x - x) / finger.length) ** 2 + ((BED.y - y) / finger.width) ** 2
+    under = touch + finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))
+    near = square < 0.9
+    assert np.min((under - heights)[near]) == pytest.approx(0.0, abs=1e-12)
+
+
+TABLES = {"layout": {"rows": 5, "columns": 5}, "control": "absent", "simulation": {"duration": "50 ms"}}
+
+
+def test_a_scene_is_of_tables_of_a_file_a_name_or_nothing(tmp_path):
+    file = tmp_path / "my.toml"
+    file.write_text(format_scene(resolve(TABLES, "my")), encoding="utf-8")
+    assert digiclay.scene(TABLES) == resolve(TABLES)
+    assert digiclay.scene(file) == digiclay.scene(str(file)) == load(file)
+    assert digiclay.scene("ridge_mound_valley") == load(find("ridge_mound_valley"))
+    assert digiclay.scene() == digiclay.scene({}) == resolve({})
+
+
+def test_a_run_has_heights_metrics_and_a_summary():
+    program = "import sys, digiclay; print({'numpy', 'bpy', 'trimesh', 'digiclay.core'} & {*sys.modules})"
+    assert finish(start(program))[1] == "set()\n"  # importing it imports no part of the simulation
+    periods: list[tuple[int, int]] = []
+    done = digiclay.run(digiclay.scene(TABLES), lambda *counts: periods.append(counts))
+    assert periods == [(count, 10) for count in range(1, 11)]
+    assert done.history["height"].shape == done.history["force"].shape == (11, 25)
+    np.testing.assert_allclose(done.history["time"], np.arange(11) * 5e-3)
+    assert done.metrics["simulated"] == pytest.approx(0.05)
+    assert done.metrics["versions"]["digiclay"] == digiclay.__version__
+    assert done.summary().startswith("0.1 s simulated in ")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"contrl": {}}, "contrl must be a known key (got an empty section). Did you mean control?"),
+        ({"valve": {"orifice_diameter": "3 s"}}, "valve.orifice_diameter must be in m or a multiple"),
+        ("no_such_scene", "no_such_scene is neither a file nor a sample"),
+        (7, "A scene must be tables, a file or a name (got 7)."),
+    ],
+)
+def test_a_wrong_scene_is_refused_in_one_line(content, message):
+    with pytest.raises(DigiclayError) as caught:
+        digiclay.scene(content)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
