@@ -24,7 +24,7 @@ class Whole:
         """Return numbers, or tuples of r numbers, of the fingers such that arrays combine with them."""
         return numbers[0]
 
-    def cut(self, values: Floats) -> list[Floats]:
+    def cut(self, values: Any) -> list[Any]:
         """Return the values of each finger."""
         return [values]
 
@@ -32,22 +32,10 @@ class Whole:
         """Return the sum of values (m,) of each finger."""
         return [float(np.add.reduce(values))]
 
-    def add_rows(self, rows: Floats) -> Sequence[Floats]:
-        """Return the sums (r,) over the cells of each finger, of rows (r, m)."""
-        return [np.add.reduce(rows, axis=1)]
-
-    def count(self, values: Floats) -> list[int]:
-        """Return the number of cells of each finger."""
-        return [values.size]
-
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
         """Return the mean of values where a test holds, or where it holds nowhere what is instead."""
         count = count_true(test)
         return [float(values.dot(test)) / count] if count else instead
-
-    def find_largest(self, values: Floats) -> Any:
-        """Return the largest value of each finger, spread."""
-        return np.maximum.reduce(values)
 
     def multiply(self, forms: Sequence[Any], basis: Floats, out: Floats | None = None) -> Floats:
         """Return forms (k, 6) of each finger over the basis of its cells, (k, m)."""
@@ -67,11 +55,8 @@ class Sections(Whole):
     """Cells of fingers one after the other, (f,) of each, at least one."""
 
     def __init__(self, sizes: Sequence[int]) -> None:
-        edges = [0]
-        for size in sizes:
-            edges.append(edges[-1] + size)
-        self.sizes, self.starts, self.edges = np.array(sizes), np.array(edges[:-1]), np.array(edges)
-        self.parts = [slice(*ends) for ends in pairwise(edges)]
+        self.sizes, self.edges = np.array(sizes), np.cumsum([0, *sizes])
+        self.parts = [slice(*ends) for ends in pairwise(self.edges.tolist())]
 
     def spread(self, numbers: Sequence[Any]) -> Any:
         """See `Whole`; rows of tuples."""
@@ -79,31 +64,18 @@ class Sections(Whole):
             return numbers[0]
         return np.array(numbers).T.repeat(self.sizes, axis=-1)
 
-    def cut(self, values: Floats) -> list[Floats]:
+    def cut(self, values: Any) -> list[Any]:
         """See `Whole`."""
         return [values[..., part] for part in self.parts]
 
     def add(self, values: Floats) -> list[float]:
         """See `Whole`."""
-        sums: list[float] = np.add.reduceat(values, self.starts).tolist()
-        return sums
-
-    def add_rows(self, rows: Floats) -> Sequence[Floats]:
-        """See `Whole`."""
-        return list(np.add.reduceat(rows, self.starts, axis=1).T)
-
-    def count(self, values: Floats) -> list[int]:
-        """See `Whole`."""
-        return [part.stop - part.start for part in self.parts]
+        return [float(np.add.reduce(own)) for own in self.cut(values)]
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
         """See `Whole`."""
-        sums = zip(self.add(values * test), self.add(test.astype(np.float64)), instead, strict=True)
-        return [own / count if count else other for own, count, other in sums]
-
-    def find_largest(self, values: Floats) -> Any:
-        """See `Whole`."""
-        return np.maximum.reduceat(values, self.starts).repeat(self.sizes)
+        fingers = zip(self.cut(values), self.cut(test), instead, strict=True)
+        return [WHOLE.average(own, where, [other])[0] for own, where, other in fingers]
 
     def multiply(self, forms: Sequence[Any], basis: Floats, out: Floats | None = None) -> Floats:
         """See `Whole`."""

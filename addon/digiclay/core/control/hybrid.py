@@ -287,7 +287,7 @@ class HybridControl:
                 found[-1] = top, self.parameters.force_setpoint + memory.trim
         if None in found:
             self._solve_tops(memories, seen, region, coasting, sections, found)
-        counts = sections.count(seen.force)
+        counts = [own.size for own in sections.cut(seen.force)]
         numbers = zip(memories, found, forces, counts, region.edges, region.aims, region.speeds, strict=True)
         return [self._move_blister(*own) for own in numbers]
 

@@ -176,7 +176,8 @@ def find_tops(
     Where none does, it is the end of the range nearest to it. `guesses`: where tops are sought most closely,
     m; `under` (m,), predicted undersides, m; `lost` (m,), from `PulpEstimate.predict_loss`, N.
     """
-    (level,) = (reach.part >= sections.find_largest(reach.part)).nonzero()
+    nearest = sections.spread([own.max() for own in sections.cut(reach.part)])
+    (level,) = (reach.part >= nearest).nonzero()
     lowest, highest = reach.ends.take(level, 1).tolist()
     tried = []
     for guess, ends in zip(guesses, pairwise(sections.find_bounds(level)), strict=True):
@@ -192,8 +193,8 @@ def find_tops(
     np.minimum(depths, most, out=depths)
     depths -= under
     found = []
-    sums = sections.add_rows(pulp.predict_force(depths, lost))
-    for force, tops, forces in zip(wanted, tried, sums, strict=True):
+    for force, tops, own in zip(wanted, tried, sections.cut(pulp.predict_force(depths, lost)), strict=True):
+        forces = np.add.reduce(own, axis=1)
         weakest, *_, strongest = forces.tolist()
         found.append((float(np.interp(force, forces, tops)), min(max(force, weakest), strongest)))
     return found
