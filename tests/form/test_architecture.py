@@ -36,7 +36,7 @@ ROOMS = {
     "mesh_io": "base files surface",
     "shapes": "base files model surface mesh_io",
     "control": "base files model shapes",
-    "metrics": "base model surface",
+    "metrics": "base model",
     "scene": "base files model engine shapes control",
     "session": "base files model engine control metrics scene",
     "batch": "base model steppers engine metrics scene session",

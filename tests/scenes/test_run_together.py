@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,7 +70,7 @@ def assert_estimated_as_alone(found: Any, scene: Scene, alone: Result) -> None:
     """Check the errors of a run against what is estimated of the run alone."""
     errors = estimate_errors(scene, alone.history)
     assert errors.height > 1e-12  # there is something to estimate
-    for name, value in asdict(errors).items():
+    for name, value in errors._asdict().items():
         expected = pytest.approx(value, rel=RELATIVE, abs=NOTHING[name])
         assert found.metrics[f"{name}_error"] == expected, name
 

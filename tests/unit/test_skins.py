@@ -8,13 +8,12 @@ import scipy.sparse
 import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.spline import interpolate_monotone
-from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.model.layout import Layout, find_grid_shape, make_grid
 from digiclay.core.surface import skins
 from digiclay.core.surface.formed import (
     BASE_THICKNESS,
     Formed,
     find_base_level,
-    find_grid_shape,
     make_skin,
     make_solid,
 )

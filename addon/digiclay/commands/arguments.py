@@ -4,9 +4,8 @@ import argparse
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.base.errors import MethodError, OutputError, ParameterError
 from ..core.base.quantity import parse
@@ -141,8 +140,7 @@ def add_command(
 Taken = Options | Callable[[argparse.ArgumentParser], object]
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(NamedTuple):
     """A command that a function carries out; `texts` are help, epilog and description of `add_command`."""
 
     carry_out: Callable[[argparse.Namespace], int]

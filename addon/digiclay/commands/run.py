@@ -9,10 +9,10 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
@@ -167,8 +167,7 @@ def _plan_extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
     return extras
 
 
-@dataclass(frozen=True)
-class Extra:
+class Extra(NamedTuple):
     """Files made of a session."""
 
     #: Seen from the run's folder.

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.base.arrays import Floats
-from ..core.surface.formed import find_grid_shape, take_corners, take_outline
+from ..core.model.layout import find_grid_shape
+from ..core.surface.formed import take_corners, take_outline
 from .instant import Instant
 
 Indices = NDArray[np.int32]

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.base.arrays import Floats
 from ..core.metrics.summary import find_contact_rows, split_fingers
-from ..core.surface.formed import find_grid_shape, make_skin, make_solid
+from ..core.model.layout import find_grid_shape
+from ..core.surface.formed import make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
 
 if TYPE_CHECKING:  # only named in annotations

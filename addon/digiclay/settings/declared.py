@@ -60,7 +60,7 @@ def make_group(name: str, words: str, properties: dict[str, Any]) -> type:
 def whole(field: dataclasses.Field[Any], get: Callable[[Any], float], put: Update) -> Any:
     """Make the property of twice a parameter, computed by `get` and taken by `put`; no keyframes."""
     quantity: Quantity = field.metadata["quantity"]
-    quantity = dataclasses.replace(quantity, doc=quantity.whole, symbol=f"2 {quantity.symbol}")
+    quantity = quantity._replace(doc=quantity.whole, symbol=f"2 {quantity.symbol}")
     default: Any = field.default
     unit, power = unit_of(quantity.unit, default)
     return bpy.props.FloatProperty(

@@ -12,7 +12,7 @@ import math
 import operator
 import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from .errors import DigiclayError, ParameterError
 
@@ -40,8 +40,7 @@ BOUNDS = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "
 WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*(.*)")
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """Declaration of one parameter.
 
     Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive,

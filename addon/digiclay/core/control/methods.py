@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, find_nearest_name
@@ -16,8 +16,7 @@ from ..files.tables import show_value
 from ..model.control_interface import SetPoint
 
 
-@dataclass(frozen=True)
-class Pace:
+class Pace(NamedTuple):
     """How fast a method can be led by a fingertip; the default suits any (``python -m benchmarks pace``)."""
 
     drag: float = 2.0

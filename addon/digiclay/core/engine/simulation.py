@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import DivergenceError
-from ..model.fingers import HandTouch, trace_hands
 from ..model.fingertip import require_one
 from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
@@ -32,11 +31,14 @@ def begin(system: System) -> State:
 
 def trace_fingers(system: System, poses: Floats) -> list[Any]:
     """Return the fingertip path in each of t periods, of poses (t, p, f, 7); None: no touch."""
-    if system.cell.touch is None:
+    touch: Any = system.cell.touch
+    if touch is None:
         return [None] * len(poses)
-    if isinstance(system.cell.touch, HandTouch):
-        return list(trace_hands(system.cell.touch, poses))
-    path = trace_finger(system.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3))))
+    if system.fingers > 1:
+        from ..model.fingers import trace_hands
+
+        return list(trace_hands(touch, poses))
+    path = trace_finger(touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3))))
     return [path.at(period) for period in range(len(poses))]
 
 

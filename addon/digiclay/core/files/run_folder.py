@@ -8,9 +8,8 @@ import shutil
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from ..base.errors import OutputError, SceneError, explain_os_error
 from ..base.quantity import find_nearest_name
@@ -139,8 +138,7 @@ def format_json(value: object) -> bytes:
 MARK = "metrics.json"
 
 
-@dataclass(frozen=True)
-class Content:
+class Content(NamedTuple):
     """What a folder holds that may be replaced: its name, and patterns of files by which it is known."""
 
     name: str
@@ -206,8 +204,7 @@ def describe_claim(path: Path, how: str) -> str:
     return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(NamedTuple):
     """Lock of a folder for writing, for the block of `claim_folder`."""
 
     out: Path

@@ -8,8 +8,7 @@ exerts is exactly zero.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +17,7 @@ from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..model.control_interface import SetPoint, find_set_point
-from ..surface.formed import find_grid_shape
+from ..model.layout import find_grid_shape
 
 #: How far the fingertip must have gone on from a cell for it to count as left behind, m.
 AWAY = 12e-3
@@ -32,8 +31,7 @@ def find_contact_rows(total_force: ArrayLike) -> Flags:
     return np.asarray(np.asarray(total_force, dtype=np.float64) > 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class CellSums:
+class CellSums(NamedTuple):
     """Sums over the cells of t rows of n cells, (t,), and the first and last heights, (n,)."""
 
     total: Floats

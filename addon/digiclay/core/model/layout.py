@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.arrays import Cells, Flags, Floats
 from ..base.errors import ParameterError
@@ -179,6 +180,35 @@ def make_grid(layout: Layout) -> Grid:
     x = column - width / 2 + (row[:, None] % 2) * layout.shift
     y = np.broadcast_to(((row - (layout.rows - 1) / 2) * layout.row_spacing)[:, None], x.shape)
     return Grid(layout, x.ravel(), y.ravel())
+
+
+def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
+    """Return the rows and columns of pins at positions (n, 2), m, in order, or raise ParameterError."""
+    place = read_places(position)
+    if not len(place):
+        raise ParameterError("Surface", "position", "must hold at least one pin", "none")
+    spacing = float(np.hypot(*(place[1] - place[0]))) if len(place) > 1 else 1.0
+    other_row = np.flatnonzero(np.abs(place[:, 1] - place[0, 1]) > 0.1 * spacing)
+    columns = int(other_row[0]) if len(other_row) else len(place)
+    if len(place) % columns:
+        raise ParameterError("Surface", "position", f"must fill rows of {columns} pins", f"{len(place)} pins")
+    return len(place) // columns, columns
+
+
+def read_places(position: ArrayLike) -> Floats:
+    """Return `position` as an array, or refuse its shape or a number in it."""
+    place = np.asarray(position, dtype=np.float64)
+    if place.ndim != 2 or place.shape[1] != 2:
+        raise ParameterError("Surface", "position", "must have two coordinates a pin", f"shape {place.shape}")
+    if not np.all(np.isfinite(place)):
+        raise ParameterError("Surface", "position", "must be finite", name_first_bad(place.sum(axis=1)))
+    return place
+
+
+def name_first_bad(values: Floats) -> str:
+    """Name the first value that is not finite."""
+    cell = int(np.flatnonzero(~np.isfinite(values))[0])
+    return f"{values[cell]} at cell {cell}"
 
 
 def list_steps(shift: float) -> Cells:

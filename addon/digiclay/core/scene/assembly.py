@@ -5,8 +5,8 @@ Modules of parts that a scene may leave out are imported where the part is put i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 TOGETHER = ("steppers.press_together", "plan_together")
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """Part of a system that depends neither on the bed, the control nor the sensors: how a cell moves."""
 
     cell: Cell

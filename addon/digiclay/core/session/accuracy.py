@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,7 @@ STRETCH, PAUSE, SPREAD = 20, 180, 4
 PARTS, BLOCK = 16, 4096
 
 
-@dataclass(frozen=True)
-class Errors:
+class Errors(NamedTuple):
     """Largest errors of height, m, force of a cell, N, and total, N: of a run, or at a live stretch's end."""
 
     height: float
@@ -56,8 +55,7 @@ class Errors:
         return cls(*(SHARE * largest).tolist())
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorMonitor:
+class ErrorMonitor(NamedTuple):
     """Reference solution of a live session, over a stretch at intervals; it lags behind the session."""
 
     system: System
@@ -194,7 +192,7 @@ def begin_stretch(monitor: ErrorMonitor, state: State, pause: int = PAUSE) -> Er
 
 def note(monitor: ErrorMonitor, after: State, path: Floats, pause: int = PAUSE) -> ErrorMonitor:
     """Return the monitor with the period that a session has just done; `path` (2, f, 7): its fingertips."""
-    monitor = replace(monitor, age=monitor.age + 1)
+    monitor = monitor._replace(age=monitor.age + 1)
     if monitor.state is None:
         return begin_stretch(monitor, after, pause)
     if monitor.age > STRETCH:
@@ -202,13 +200,13 @@ def note(monitor: ErrorMonitor, after: State, path: Floats, pause: int = PAUSE) 
     kept = after._replace(active=replace(after.active, block=after.active.block.copy()))
     ended = monitor.age == STRETCH
     reached = np.stack([after.row(0), after.row(monitor.system.rows.force)]) if ended else None
-    return replace(monitor, waiting=(*monitor.waiting, (kept, path)), reached=reached)
+    return monitor._replace(waiting=(*monitor.waiting, (kept, path)), reached=reached)
 
 
 def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMonitor, Errors | None]:
     """Integrate noted periods after a tick of `count`; return the errors where a stretch has ended."""
     # Ticks of more periods than the one before take the longest already.
-    longer, monitor = count > monitor.before, replace(monitor, before=count)
+    longer, monitor = count > monitor.before, monitor._replace(before=count)
     due = 0 if longer else min(monitor.age // SPREAD - monitor.done, max(1, count // SPREAD))
     state, system = monitor.state, monitor.system
     while state is not None and due > 0:
@@ -221,6 +219,6 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
             return begin_stretch(reset(monitor), after), None
         if not waiting and monitor.reached is not None:
             apart = compare(state.row(0), state.row(system.rows.force), *monitor.reached)
-            return replace(monitor, state=None, waiting=(), reached=None), Errors.estimate(apart)
-        monitor = replace(monitor, state=state, waiting=tuple(waiting), done=monitor.done + 1)
+            return monitor._replace(state=None, waiting=(), reached=None), Errors.estimate(apart)
+        monitor = monitor._replace(state=state, waiting=tuple(waiting), done=monitor.done + 1)
     return monitor, None

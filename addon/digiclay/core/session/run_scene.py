@@ -6,7 +6,7 @@ import json
 import platform
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -96,7 +96,7 @@ class Result:
 
     def with_errors(self, errors: Errors) -> Result:
         """Return the result with its estimated errors among the metrics."""
-        added = {f"{name}_error": value for name, value in asdict(errors).items()}
+        added = {f"{name}_error": value for name, value in errors._asdict().items()}
         units = {name: ERRORS[name].unit for name in added}
         return replace(self, metrics={**self.metrics, **added, "units": {**self.metrics["units"], **units}})
 

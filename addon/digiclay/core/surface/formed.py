@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Faces, Flags, Floats, Indices
 from ..base.errors import OutputError, ParameterError
-from ..model.layout import find_neighbors
+from ..model.layout import find_grid_shape, find_neighbors, name_first_bad, read_places
 
 #: Material left under the lowest pin top unless a base is asked for, m. Enough for a
 #: printed part to hold together, without 40 mm of plastic down to the bed's floor.
@@ -36,19 +36,6 @@ BASE_THICKNESS = 3e-3
 SAME_LENGTH = 1e-6
 #: Pins whose triangles are worked out at once, so that a large bed takes little more memory than its result.
 BAND = 1 << 16
-
-
-def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
-    """Return the rows and columns of pins at positions (n, 2), m, in order, or raise ParameterError."""
-    place = _pins(position)
-    if not len(place):
-        raise ParameterError("Surface", "position", "must hold at least one pin", "none")
-    spacing = float(np.hypot(*(place[1] - place[0]))) if len(place) > 1 else 1.0
-    other_row = np.flatnonzero(np.abs(place[:, 1] - place[0, 1]) > 0.1 * spacing)
-    columns = int(other_row[0]) if len(other_row) else len(place)
-    if len(place) % columns:
-        raise ParameterError("Surface", "position", f"must fill rows of {columns} pins", f"{len(place)} pins")
-    return len(place) // columns, columns
 
 
 def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Faces:
@@ -105,16 +92,6 @@ def find_base_level(height: ArrayLike, base_thickness: float = BASE_THICKNESS) -
     return float(np.min(height)) - base_thickness
 
 
-def _pins(position: ArrayLike) -> Floats:
-    """Return `position` as an array, or refuse its shape or a number in it."""
-    place = np.asarray(position, dtype=np.float64)
-    if place.ndim != 2 or place.shape[1] != 2:
-        raise ParameterError("Surface", "position", "must have two coordinates a pin", f"shape {place.shape}")
-    if not np.all(np.isfinite(place)):
-        raise ParameterError("Surface", "position", "must be finite", _first_bad(place.sum(axis=1)))
-    return place
-
-
 def check_heights(
     position: ArrayLike, height: ArrayLike, rows: int, columns: int, name: str = "height"
 ) -> tuple[Floats, Floats]:
@@ -122,19 +99,13 @@ def check_heights(
     if rows < 2 or columns < 2:
         rule = "must have 2 x 2 pins at least to carry a skin"
         raise ParameterError("Surface", "", rule, f"{rows} x {columns}")
-    place, top = _pins(position), np.asarray(height, dtype=np.float64)
+    place, top = read_places(position), np.asarray(height, dtype=np.float64)
     if top.shape != (rows * columns,) or len(place) != rows * columns:
         rule = f"must have one value for each of the {rows} x {columns} pins"
         raise ParameterError("Surface", name, rule, f"{top.size} values at {len(place)} positions")
     if not np.all(np.isfinite(top)):
-        raise ParameterError("Surface", name, "must be finite", _first_bad(top))
+        raise ParameterError("Surface", name, "must be finite", name_first_bad(top))
     return place, top
-
-
-def _first_bad(values: Floats) -> str:
-    """Name the first value that is not finite."""
-    cell = int(np.flatnonzero(~np.isfinite(values))[0])
-    return f"{values[cell]} at cell {cell}"
 
 
 def _cut_along_ac(place: Floats, top: Floats, *corners: Faces) -> Flags:
