@@ -1,7 +1,5 @@
 """What `benchmark stiff` takes for wrong, and what its reference is worth."""
 
-from __future__ import annotations
-
 import math
 import warnings
 

@@ -1,7 +1,5 @@
 """What a scene does without within a budget: the budget holds against the full model, and is used."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable
@@ -31,20 +29,17 @@ BUDGET = 20e-6
 
 
 def cut(name: str) -> Scene:
-    """Return the beginning of a sample session."""
     scene = sample(name)
     lasts = min(CUT, scene.simulation.duration)
     return replace(scene, simulation=replace(scene.simulation, duration=lasts))
 
 
 def heights(scene: Scene) -> NDArray[np.float64]:
-    """Return all heights of a run, (t, n), m."""
     return record(assemble(scene), scene.section("trajectory").trajectory(), scene.periods).height
 
 
 @cache
 def found(name: str, budget: float) -> Fitted:
-    """Fit a sample session into a budget."""
     return find_omissions(cut(name), budget)
 
 
@@ -96,7 +91,6 @@ def test_a_budget_below_the_integrations_own_error_is_refused_with_the_remedy() 
 
 
 def told(capsys: pytest.CaptureFixture[str]) -> Callable[[str], bool]:
-    """Return a function that tells whether something was printed."""
     text = capsys.readouterr().out
     return lambda said: said in text
 

@@ -1,7 +1,5 @@
 """The errors a run reports are honest, and the adaptive stepper keeps within its tolerance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -7,8 +7,6 @@ command is on its way to, whose valve is not shut, or that the finger may touch.
 stand still, and the pulp over them relaxes exponentially.
 """
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace as Numbers
 
@@ -29,7 +27,6 @@ MARGIN = 1e-3
 
 
 def numbers() -> Numbers:
-    """Work the constants out again, from the printed formulas, with the documented defaults."""
     density, viscosity, orifice, stroke = 855.0, 1.6e-6, 0.5e-3, 30e-6
     laminar = math.pi**2 * orifice**4 / (8.0 * 200.0**2 / 0.18**2 * viscosity * stroke * density)
     turbulent = 0.18 * math.pi * orifice**2 / 4.0 * math.sqrt(2.0 / density)
@@ -71,7 +68,6 @@ def underside(p: Numbers, position: Floats, x: Floats, y: Floats) -> Floats:
 
 
 def tension(p: Numbers, depth: Floats) -> Floats:
-    """Return T of equation 11."""
     return p.b / p.m * (np.exp(p.m * np.maximum(depth, 0.0)) - 1.0)
 
 
@@ -136,7 +132,6 @@ def advance(
 
 
 def unpack(flat: Floats, count: int, near: int) -> tuple[Floats, Floats, Floats]:
-    """Return views of heights and openings of all cells, and of the filters of the near ones."""
     return flat[:count], flat[count : 2 * count], flat[2 * count :].reshape(3, near)
 
 

@@ -5,8 +5,6 @@ one problem. The reference is SciPy's, over the core's own rates: it judges the 
 the physics, which tests/scenes does.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 
@@ -64,13 +62,11 @@ def bed(stepper: str, steps: int, commands: list[float], parts: dict[str, object
 
 
 def away(finger: Motion | None) -> Motion:
-    """Return the finger, or one that nobody meets."""
     return finger or Motion(lambda t: np.full(t.shape, 1.0))
 
 
 @cache
 def reference(problem: str) -> Floats:
-    """Return a problem's height at the end of each period, to 1e-12, by SciPy."""
     finger, commands, parts = PROBLEMS[problem]
     system, motion = bed("bernoulli", 1, commands, parts), away(finger)
     y, heights = begin(system).rows[: system.rows.physics, :1].copy(), [40e-3]
@@ -100,7 +96,6 @@ def errors(stepper: str, problem: str) -> Floats:
 
 
 def order(found: Floats) -> float:
-    """Return the slope of log error over log step, by least squares."""
     return float(-np.polyfit(np.arange(found.size), np.log2(found), 1)[0])
 
 

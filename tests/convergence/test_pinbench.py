@@ -1,7 +1,5 @@
 """PinBench: every adapter answers the small problems, a stranger's file works, a broken one is refused."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 

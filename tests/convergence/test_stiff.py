@@ -1,7 +1,5 @@
 """Over all stiff and extreme cases the default stepper does not blow up, and is right where it can be."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise

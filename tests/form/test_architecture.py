@@ -1,7 +1,5 @@
 """Rules of the layout: packages and their imports, file sizes, no hosts, no machine's paths."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import re
@@ -86,7 +84,6 @@ def core_modules() -> dict[str, Path]:
 
 @functools.cache
 def parse(path: Path) -> ast.Module:
-    """Return the syntax tree of a file."""
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
@@ -110,7 +107,6 @@ def imports(path: Path, *, inside_functions: bool = True) -> list[tuple[int, str
 
 
 def package_imports(package: Path) -> dict[str, set[str]]:
-    """Return what each module of a package imports of it, also inside functions."""
     parts = {path: path.relative_to(package).with_suffix("").parts for path in package.rglob("*.py")}
     names = {".".join(own).removesuffix(".__init__"): path for path, own in parts.items()}
     found: dict[str, set[str]] = {}
@@ -126,7 +122,6 @@ def package_imports(package: Path) -> dict[str, set[str]]:
 
 
 def tracked(*patterns: str) -> list[Path]:
-    """Return the files git tracks, and new ones it would not ignore."""
     listed = subprocess.run(
         ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard", "-z", "--", *patterns],
         cwd=ROOT, capture_output=True, text=True, check=True, timeout=TIMEOUT,

@@ -1,7 +1,5 @@
 """The pages: headings, measurements, links, names, commands and navigation."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import re
@@ -55,7 +53,6 @@ MADE = {"benchmarks.md", "changes.md", "contributing.md"}
 
 
 def _lines(text: str) -> Iterator[tuple[str, bool]]:
-    """Yield the lines of a page, and whether each is code."""
     fenced = False
     for line in text.splitlines():
         fence = line.lstrip().startswith("```")
@@ -68,7 +65,6 @@ def _headings(text: str) -> list[str]:
 
 
 def _anchors(text: str) -> set[str]:
-    """Return the anchors of a page's headings, as the usual renderers make them."""
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in _headings(text)}
 
 
@@ -83,7 +79,6 @@ def find_commands(text: str) -> list[tuple[str, str]]:
 
 
 def is_refused(program: str, arguments: str) -> bool:
-    """Return whether a program refuses a command line."""
     words = shlex.split(arguments)
     try:
         PARSERS[program]().parse_args(words if len(words) > 1 else [*words, "--help"])
@@ -94,7 +89,6 @@ def is_refused(program: str, arguments: str) -> bool:
 
 @functools.cache
 def _definitions() -> dict[str, set[str]]:
-    """Return the names that each module defines, by the module's own name; those of equal names together."""
     defined: dict[str, set[str]] = {}
     for path in (path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")):
         names = defined.setdefault(path.stem, set())
@@ -108,7 +102,6 @@ def _definitions() -> dict[str, set[str]]:
 
 @functools.cache
 def _parameters() -> dict[tuple[str, str], Quantity]:
-    """Return the parameters of all scenes, by section and name."""
     return {
         (section, name): quantity
         for section in SECTIONS
@@ -118,12 +111,10 @@ def _parameters() -> dict[tuple[str, str], Quantity]:
 
 
 def find_sentences(page: Path, text: str) -> list[str]:
-    """Return the headings that are no noun phrases."""
     return [heading for heading in _headings(text) if SENTENCE.search(heading)]
 
 
 def find_undated(page: Path, text: str) -> list[str]:
-    """Return the rows without a date and a commit in tables with a column *commit*."""
     rows, measured = [], False
     for line, code in _lines(text):
         if code or not line.startswith("|"):
@@ -147,7 +138,6 @@ def find_dead_links(page: Path, text: str) -> list[str]:
 
 
 def find_absent_modules(page: Path, text: str) -> list[str]:
-    """Return the Python files that a page names and that do not exist."""
     given = {*USERS, *re.findall(r'title="([^"]+)"', text)}
     named = re.findall(r"(?<![\w./])((?:\w+/)*\w+\.py)\b", text)
     return [
@@ -170,7 +160,6 @@ def find_absent_names(page: Path, text: str) -> list[str]:
 
 
 def find_refused_commands(page: Path, text: str) -> list[str]:
-    """Return the commands that their programs refuse."""
     return [" ".join(command) for command in find_commands(text) if is_refused(*command)]
 
 
@@ -226,7 +215,6 @@ def test_the_page_of_the_package_lists_every_extra_that_is_for_its_users() -> No
 
 
 def _targets(entry: Any) -> Iterator[str]:
-    """Yield the pages of an entry of the navigation, in order."""
     if isinstance(entry, str):
         yield entry
     for inner in entry.values() if isinstance(entry, dict) else entry if isinstance(entry, list) else ():

@@ -3,8 +3,6 @@
 What only the built zip shows is in tests/release and tests/blender.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import re
@@ -39,7 +37,6 @@ FORBIDDEN = re.compile(
 
 
 def modules() -> Iterator[tuple[str, str]]:
-    """Yield path within the package and text of every module of the zip."""
     left_out = set(MANIFEST["build"]["paths_exclude_pattern"])
     for path in sorted(PACKAGE.rglob("*.py")):
         name = path.relative_to(PACKAGE).as_posix()
@@ -61,7 +58,6 @@ def imported(text: str) -> frozenset[str]:
 
 
 def is_short(text: str) -> bool:
-    """Return whether a tagline or reason is one that Blender's tool and the platform take."""
     return 0 < len(text) <= LONGEST and text == text.strip() and text[-1].isalnum() and text.isprintable()
 
 

@@ -1,7 +1,5 @@
 """Words: American spelling in code, texts and pages; names of modules that lead to one file."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """Texts with values and messages are translated: found by reading the source of what the user sees."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator
@@ -22,20 +20,17 @@ NAMES = (
 
 
 def source() -> Iterator[tuple[str, ast.Module]]:
-    """Yield what users see, file by file."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).glob("*.py")):
             yield f"{folder}/{path.name}", ast.parse(path.read_text(encoding="utf-8"))
 
 
 def inner(tree: ast.AST, *kinds: type[ast.AST]) -> set[int]:
-    """Return the identities of all nodes inside nodes of some kinds."""
     found = (node for node in ast.walk(tree) if isinstance(node, kinds))
     return {id(one) for node in found for one in ast.walk(node)}
 
 
 def join(node: ast.JoinedStr) -> str:
-    """Return an f-string with its values left out."""
     return "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)
 
 

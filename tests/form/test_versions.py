@@ -1,7 +1,5 @@
 """Bounds of the libraries: pyproject.toml, and the pins that `tests/release` installs and runs with."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path
@@ -19,7 +17,6 @@ BOUNDS = {
 
 
 def numbers(version: str) -> list[int]:
-    """Return the three numbers of a version."""
     return [int(part) for part in f"{version}.0.0".split(".")[:3]]
 
 

@@ -1,7 +1,5 @@
 """Common parts of the proofs by other programs: meshes of the paper's final surface, the programs."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path
@@ -27,7 +25,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the paper's session, run once."""
     folder = tmp_path_factory.mktemp("proof") / "paper"
     assert main(["run", "ridge_mound_valley", "--out", str(folder), "--quiet", "--no-errors"]) == 0
     return folder
@@ -35,7 +32,6 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def meshes(paper: Path) -> Path:
-    """All kinds of mesh in all formats, the solid with every skin, and each feature by itself."""
     out = paper.parent
     every = ["--format", "stl,stl_ascii,obj,ply,glb,3mf", "--quiet"]
     for kind in ("solid", "surface", "pins", "features"):
@@ -48,7 +44,6 @@ def meshes(paper: Path) -> Path:
 
 
 def told(*command: str | Path) -> str:
-    """Run a program and return all it says; it must end well."""
     done = subprocess.run(
         [str(part) for part in command],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,

@@ -1,7 +1,5 @@
 """Sweeps whose processes die: those of this machine, a cluster's worker, its scheduler; other versions."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -41,7 +39,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def start(here: Path) -> Iterator[Start]:
-    """Start processes of Python that end with the test."""
     running: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str, addon: Path = ADDON, bare: bool = False, **settings: str) -> Any:
@@ -60,7 +57,6 @@ def start(here: Path) -> Iterator[Start]:
 
 
 def start_scheduler(start: Start, folder: Path, port: str = "0", **settings: Any) -> tuple[Any, str]:
-    """Start a scheduler; return its process and its address."""
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
     arguments = ["--host", "127.0.0.1", "--port", port, "--no-dashboard", "--scheduler-file", str(file)]
@@ -70,14 +66,12 @@ def start_scheduler(start: Start, folder: Path, port: str = "0", **settings: Any
 
 
 def start_worker(start: Start, address: str, *arguments: str, **settings: Any) -> Any:
-    """Start a worker of one thread."""
     return start(
         "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard", *arguments, **settings
     )
 
 
 def points(folder: Path) -> list[Path]:
-    """Return the files of the points of a sweep that are done."""
     return list(folder.glob("points/*.json"))
 
 

@@ -1,7 +1,5 @@
 """Farms' files are executed: a template with a film by openjd, lists of commands by a shell."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess
@@ -30,7 +28,6 @@ COMMAND = str(Path(sys.executable).with_name("digiclay"))
 
 
 def openjd(*arguments: str | Path) -> str:
-    """Run openjd and return all it says; it must end well."""
     return told(sys.executable, "-m", "openjd", *arguments)
 
 
@@ -92,7 +89,6 @@ def test_the_program_of_a_template_is_named_by_its_kind(program: str, name: str,
 
 
 def test_a_shell_executes_each_line_of_the_lists_of_cuecmd(tmp_path: Path) -> None:
-    """As a frame of cuecmd does."""
     jobs, out = tmp_path / "two.toml", tmp_path / "schöne 'Tasten' $HOME; #"
     jobs.write_text(QUICK, encoding="utf-8")
     assert main(["batch", str(jobs), "--out", str(out), "--submit", "cuecmd", "--quiet"]) == 0

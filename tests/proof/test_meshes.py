@@ -1,7 +1,5 @@
 """The paper's final surface in other programs: admesh and PrusaSlicer repair nothing, assimp reads all."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -35,14 +33,12 @@ COMPLAINTS = re.compile(
 
 
 def faults(path: Path) -> dict[str, int]:
-    """Return what admesh found wrong in a file."""
     said = told("admesh", path)
     found = {name: int(re.search(rf"{name}\s*:\s*(\d+)", said)[1]) for name in FAULTS}
     return {name: count for name, count in found.items() if count}
 
 
 def read(path: Path) -> dict[str, str]:
-    """Return what assimp says of a file, as it stands in it."""
     said = told("assimp", "info", path, "--raw")
     lines = re.findall(r"^(\w[\w ]*?):?\s{2,}(\S.*)$", said, re.MULTILINE)
     return dict(reversed(lines))  # a word that comes again further down heads a list there

@@ -1,7 +1,5 @@
 """`digiclay paper --quick`: every file its page names is there, and no claim is left open."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -19,7 +17,6 @@ from digiclay_paper.scenes import COMPARED
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a quick run."""
     out = tmp_path_factory.mktemp("paper") / "quick"
     assert main(["paper", "--quick", "--quiet", "--out", str(out)]) == 0
     return out
@@ -27,18 +24,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def text(folder: Path) -> str:
-    """Return the page."""
     return (folder / "paper.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def numbers(folder: Path) -> dict[str, Any]:
-    """Return the measured numbers."""
     return json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
 
 
 def claims(text: str) -> list[list[str]]:
-    """Return the cells of the rows of claims."""
     table = text.split("## Claims")[1].split("## Figures")[0]
     rows = [line for line in table.splitlines() if line.startswith("| ")][2:]
     return [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]

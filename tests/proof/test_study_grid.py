@@ -1,7 +1,5 @@
 """Indices and fronts of a real scene, against its runs on a grid of two parameters."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +41,6 @@ COUNT = 12
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The scene's file."""
     path = tmp_path_factory.mktemp("grid") / "my.toml"
     path.write_text(SCENE, encoding="utf-8")
     return path
@@ -62,14 +59,12 @@ def grid(scene: Path) -> Floats:
 
 
 def run_command(command: str, scene: Path, out: Path, *options: str) -> None:
-    """Run a command of the studies on both parameters."""
     varied = [word for said in VARIED for word in ("--vary", said)]
     words = [command, str(scene), *varied, "--metric", ",".join(NAMES), "--workers", "1", "--quiet"]
     assert main([*words, "--out", str(out), *options]) == 0
 
 
 def read_values(path: Path) -> Floats:
-    """Return both metrics of a table, shape (rows, 2)."""
     return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
 
 

@@ -1,7 +1,5 @@
 """The fingertip's underside beside the ellipsoid itself, its reach; where cells are, which are in a disc."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,7 +20,6 @@ AROUND = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 
 
 def random_poses(count: int) -> Floats:
-    """Return poses in all orientations, (k, 7)."""
     turns = RANDOM.normal(size=(count, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
     return np.column_stack([RANDOM.uniform(-20e-3, 20e-3, (count, 2)), RANDOM.uniform(0, 0.1, count), turns])
@@ -89,7 +86,6 @@ peaks = st.floats(0.0, 0.1)
 
 
 def pose(spot: tuple[float, ...], turn: tuple[float, ...]) -> Floats:
-    """Return a pose (7,)."""
     return np.array([*spot, *(np.array(turn) / np.linalg.norm(turn))])
 
 

@@ -1,7 +1,5 @@
 """A finger that jumps: no warning, nothing moves that is shut, and no pin goes where none can come to."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -66,29 +64,24 @@ def waypoints(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> tuple[Waypo
 
 
 def way(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> Trajectory:
-    """Return the straight way of a finger from place to place."""
     return Path("linear", waypoints(spots, turn)).trajectory()
 
 
 def taken(scene: Scene, points: tuple[Waypoint, ...]) -> Scene:
-    """Return a scene whose finger takes this straight way, and that lasts as long."""
     lasting = replace(scene.simulation, duration=points[-1].time)
     return scene.with_sections(trajectory=Path("linear", points), simulation=lasting)
 
 
 def half_shut(t: float, x: Floats, y: Floats) -> Floats:
-    """Shut the left half, and swing the valves of the other through all openings."""
     return np.where(x < 0.0, 0.0, np.sin(300.0 * t + 1e3 * y))
 
 
 def jumped(system: System, finger: Trajectory) -> Record:
-    """Play a way, with every warning an error."""
     with strict():
         return record(system, finger, min(150, round(finger.times[-1] / system.period) + 2))
 
 
 def stacked(scenes: Sequence[Scene], row: str) -> list[Floats]:
-    """Return a row of the histories of scenes run in a stack, with every warning an error."""
     with strict():
         found = {number: result.history[row].copy() for number, result in run_together(scenes)}
     return [found[number] for number in range(len(scenes))]

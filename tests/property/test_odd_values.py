@@ -1,7 +1,5 @@
 """Odd scenes, states, takes, runs and bytes are taken or refused; `tools/fuzz.py` tries many more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError, SceneError, StateError

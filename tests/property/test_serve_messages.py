@@ -1,7 +1,5 @@
 """Messages of the server are read as they were written, and anything else is refused in one line."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable
@@ -26,13 +24,11 @@ heights = st.lists(st.floats(0.0, 0.09375, width=32), min_size=1, max_size=30)
 
 
 def frame_of(pose: list[float], values: list[float], flags: int, who: list[int]) -> protocol.Frame:
-    """Return a frame of some pins and fingers."""
     pins, fingers = np.array(values, np.float32), tuple((one, 0.25, tuple(pose)) for one in who)
     return protocol.Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags, fingers)
 
 
 def refusal(read: Callable[[Any], Any], data: Any) -> str:
-    """Return the words by which something is refused; none where it is read."""
     try:
         read(data)
     except DigiclayError as error:
@@ -98,7 +94,6 @@ def test_any_bytes_text_or_address_is_a_request_or_refused_in_one_line(data: byt
 
 
 def check_rate(address: str) -> None:
-    """Check the rate that an address asks for."""
     assert 0.0 <= read_wishes(address).rate <= 1000.0
 
 

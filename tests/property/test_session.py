@@ -1,7 +1,5 @@
 """What holds in any session: small beds, random fingers, a second or less; cells left out; symmetry."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -43,7 +41,6 @@ def finger(spots: list[tuple[float, float, float]]) -> Trajectory:
 
 
 def tilted(path: Trajectory, turn: tuple[float, ...]) -> Trajectory:
-    """Return the path with a tilted finger."""
     return Trajectory(path.times, path.positions, np.tile([1.0, *turn], (path.times.size, 1)))
 
 
@@ -146,15 +143,12 @@ class Everywhere:
     rows = 0
 
     def begin(self) -> Any:
-        """Return the inner memory."""
         return self.inner.begin()
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float]]:
-        """Attend as the inner one does, but ask for all cells."""
         return self.inner.locate(memory, touched)[0], (0.0, 0.0, 1.0)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Command as the inner one does."""
         return self.inner.command(memory, seen)
 
 
@@ -236,7 +230,6 @@ CASES: dict[str, tuple[str, tuple[int, int], Callable[[Floats], Floats], Callabl
 
 
 def formed(arrangement: str, shape: tuple[int, int], points: Floats, profile: str) -> tuple[Floats, Floats]:
-    """Return heights and forces, shape (t, rows, columns)."""
     system = make_system(
         Layout(*shape, 3e-3, arrangement), control=VirtualMaster(), blister=Blister(profile=profile)
     )

@@ -1,7 +1,5 @@
 """The solid under any heights, on any bed: closed, turned outward, and of the volume of its prisms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -31,19 +29,16 @@ def beds(draw):
 
 
 def bed(rows: int, columns: int, arrangement: str):
-    """The smallest and the largest bed, rough."""
     height = np.random.default_rng(rows).uniform(0.0, 0.1, rows * columns)
     return Layout(rows=rows, columns=columns, arrangement=arrangement), height
 
 
 def made(layout: Layout, height: np.ndarray, mirror: float = 1.0) -> trimesh.Trimesh:
-    """The solid as trimesh sees it, vertices and faces untouched."""
     place = make_grid(layout).positions * (mirror, 1.0)
     return trimesh.Trimesh(*make_solid(place, height, layout.rows, layout.columns), process=False)
 
 
 def volume(layout: Layout, height: np.ndarray) -> float:
-    """The sum of the prisms."""
     return prism_volume(make_grid(layout).positions, height, layout.rows, layout.columns)
 
 

@@ -1,7 +1,5 @@
 """What one control period of smoothing makes of any relief, under any disc."""
 
-from __future__ import annotations
-
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.control.exchange import make_exchange
@@ -34,7 +32,6 @@ orders = st.tuples(
 
 
 def measure_steps(grid: Grid, height: Floats) -> float:
-    """Return the sum of the squared differences of neighbors, weighted by what they exchange."""
     pairs = make_exchange(grid, 1e-6, 1e-3).find_pairs(np.arange(grid.count))
     return float(sum(share * ((height[one] - height[other]) ** 2).sum() for one, other, share in pairs))
 

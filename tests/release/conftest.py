@@ -1,7 +1,5 @@
 """What the tests of the release share: a copy of this checkout, a release made in it, its files."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -30,7 +28,6 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 
 
 def git(folder: Path, *words: str) -> str:
-    """Run git in a checkout; return what it printed."""
     command = ["git", "-c", "safe.directory=*", *words]
     done = subprocess.run(
         command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=TIMEOUT, check=True
@@ -39,7 +36,6 @@ def git(folder: Path, *words: str) -> str:
 
 
 def commit(folder: Path) -> None:
-    """Commit all that a checkout has."""
     git(folder, "add", "--all")
     git(folder, "commit", "-q", "--allow-empty", "-m", "tests: a copy")
 
@@ -55,7 +51,6 @@ def clone(source: Path, folder: Path) -> Path:
 
 
 def copy_checkout(folder: Path) -> Path:
-    """Return a clone of this checkout, with all that is not committed here committed there."""
     clone(ROOT, folder)
     listed = git(ROOT, "ls-files", "-co", "--exclude-standard", "-z").split("\0")
     for name in filter(None, listed):
@@ -69,14 +64,12 @@ def copy_checkout(folder: Path) -> Path:
 
 
 def release_command(folder: Path, version: str = __version__) -> list[str]:
-    """Return the command that makes a release in a checkout."""
     return [sys.executable, str(folder / "tools" / "make_release.py"), version]
 
 
 def run_release(
     folder: Path, version: str = __version__, umask: int = 0o022, **added: str
 ) -> subprocess.CompletedProcess[str]:
-    """Make a release in a checkout, or try to."""
     return subprocess.run(
         release_command(folder, version), cwd=folder.parent, env=ENVIRONMENT | added, umask=umask,
         capture_output=True, text=True, timeout=TIMEOUT,
@@ -84,14 +77,12 @@ def run_release(
 
 
 def leftovers(folder: Path) -> list[str]:
-    """Return what a release that was refused must not leave in a checkout."""
     places = ("dist/*", "build/release-*", "build/lib", "addon/*.egg-info")
     found = [str(path.relative_to(folder)) for place in places for path in folder.glob(place)]
     return [*found, *git(folder, "tag").split(), *git(folder, "status", "--porcelain").splitlines()]
 
 
 def edit(name: str, old: str, new: str) -> Callable[[Path], None]:
-    """Return a change of a file, which is committed."""
 
     def change(folder: Path) -> None:
         text = (folder / name).read_text(encoding="utf-8")
@@ -110,13 +101,11 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def checkout(original: Path, tmp_path: Path) -> Path:
-    """A clone of the copy, for one test to change."""
     return clone(original, tmp_path / "checkout")
 
 
 @pytest.fixture(scope="session")
 def released(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The checkout of a release, made in a clone."""
     folder = clone(original, tmp_path_factory.mktemp("release") / "released")
     done = run_release(folder)
     assert done.returncode == 0, done.stderr
@@ -125,11 +114,9 @@ def released(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def wheel(released: Path) -> Path:
-    """The wheel of the release."""
     return released / FOLDER / f"digiclay-{__version__}-py3-none-any.whl"
 
 
 @pytest.fixture(scope="session")
 def extension_zip(released: Path) -> Path:
-    """The extension's zip of the release."""
     return released / FOLDER / f"digiclay-{__version__}.zip"

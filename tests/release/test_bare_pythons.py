@@ -1,7 +1,5 @@
 """The wheel in Pythons that have nothing else: lowest, usual and highest versions of its libraries."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import json
@@ -70,7 +68,6 @@ def read_pins(name: str) -> dict[str, str]:
 
 
 def _carry_out(*command: str | Path) -> str:
-    """Run a command, which must succeed; return what it printed."""
     environment = {**os.environ, "GOAL": "test-release", "PYTHONPATH": ""}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=TIMEOUT)
     assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
@@ -78,7 +75,6 @@ def _carry_out(*command: str | Path) -> str:
 
 
 def _install(environment: Path, *words: str | Path) -> None:
-    """Install by the pip of an environment."""
     pip = (environment / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
     _carry_out(*pip, "--retries", "5", *words)
 
@@ -94,14 +90,12 @@ def make_bare(folder: Path, version: str, wheel: Path, pins: str) -> BarePython:
 
 
 def install_pytest(bare: BarePython, folder: Path) -> None:
-    """Install what runs tests beside an environment, which stays as it is."""
     pins = read_pins("test")
     _install(bare.folder, "--target", folder, *(f"{name}=={pins[name]}" for name in ("pytest", "hypothesis")))
 
 
 @functools.cache
 def _needed(path: Path) -> frozenset[str]:
-    """Return the modules that a test needs, through the helpers of the tests too."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         names: list[str] = []
@@ -133,14 +127,12 @@ def find_core_tests() -> list[str]:
 
 @pytest.fixture(scope="module", params=KINDS)
 def bare(request: pytest.FixtureRequest, wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> BarePython:
-    """A Python with the wheel alone."""
     folder = tmp_path_factory.mktemp("bare") / request.param
     return make_bare(folder, request.param, wheel, KINDS[request.param])
 
 
 @pytest.fixture(scope="module")
 def tap(bare: BarePython, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run of the sample `tap`."""
     folder = tmp_path_factory.mktemp("runs")
     done = bare.run("digiclay", "run", "tap", "--out", "tap", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
@@ -150,7 +142,6 @@ def tap(bare: BarePython, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tap_here(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same run with the versions of the tests."""
     folder = tmp_path_factory.mktemp("here") / "tap"
     assert main(["run", "tap", "--out", str(folder), "--quiet"]) == 0
     return folder

@@ -1,7 +1,5 @@
 """Files of a release: the zip is small and has nothing that is not needed; the wheel has no benchmark."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -28,7 +26,6 @@ KINDS = re.compile(
 
 @pytest.fixture(scope="module")
 def contents(extension_zip: Path) -> dict[str, bytes]:
-    """The files of the zip by name."""
     with zipfile.ZipFile(extension_zip) as archive:
         return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
 

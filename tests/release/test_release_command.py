@@ -1,7 +1,5 @@
 """The release command: what it leaves, what it refuses, and that a failure leaves nothing."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -33,12 +31,10 @@ Change = Callable[[Path], None]
 
 
 def tag(name: str) -> Change:
-    """Return the making of a tag."""
     return lambda folder: print(git(folder, "tag", name))
 
 
 def write(name: str, text: str) -> Change:
-    """Return the writing of a file, which is not committed."""
 
     def change(folder: Path) -> None:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -48,7 +44,6 @@ def write(name: str, text: str) -> Change:
 
 
 def remove(name: str) -> Change:
-    """Return the removal of a file, which is committed."""
 
     def change(folder: Path) -> None:
         (folder / name).unlink()
@@ -58,7 +53,6 @@ def remove(name: str) -> Change:
 
 
 def empty_the_section(folder: Path) -> None:
-    """Leave nothing in the newest section of the changelog."""
     text = (folder / CHANGELOG).read_text(encoding="utf-8")
     heading = next(line for line in text.splitlines() if line.startswith("## "))
     (folder / CHANGELOG).write_text(f"# Changelog\n\n{heading}\n\n## 0.0.1 - 2026-01-01\n\n- First.\n")
@@ -66,7 +60,6 @@ def empty_the_section(folder: Path) -> None:
 
 
 def have_no_name(folder: Path) -> None:
-    """Take the name away that git would sign the tag with."""
     git(folder, "config", "--unset", "user.email")
     git(folder, "config", "user.useConfigOnly", "true")
 
@@ -139,13 +132,11 @@ def test_reports_of_other_commits_do_not_count(checkout: Path, monkeypatch: pyte
 
 
 def put_chance_into_the_zip(folder: Path) -> None:
-    """Make every build of the zip another one."""
     line = '    shutil.copyfile(ROOT / "LICENSE", folder / "LICENSE")\n'
     edit("tools/extension.py", line, f'{line}    (folder / "chance.md").write_bytes(os.urandom(9))\n')(folder)
 
 
 def make_the_zip_large(folder: Path) -> None:
-    """Add a sample that cannot be compressed."""
     (folder / "addon/digiclay/sample_shapes/shapes/large.png").write_bytes(os.urandom(1_200_000))
     commit(folder)
 

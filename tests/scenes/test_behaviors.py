@@ -1,7 +1,5 @@
 """The behaviors under a finger: what each claims, over whole sessions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -32,17 +30,14 @@ def scene(method: str, way: tuple[tuple[float, ...], ...] = PRESS, side: int = 1
 
 @cache
 def pressed(method: str) -> Result:
-    """Return a press under a behavior."""
     return run(scene(method))
 
 
 def heights(result: Result) -> np.ndarray:
-    """Return the heights, (t, n)."""
     return result.history["height"]
 
 
 def at(result: Result, time: float) -> int:
-    """Return the row of an instant."""
     return int(np.argmin(np.abs(result.history["time"] - time)))
 
 
@@ -103,7 +98,6 @@ def test_what_spreads_in_a_viscous_bed_is_not_lost() -> None:
 
 
 def _system(made: Scene) -> tuple[System, Any]:
-    """Return a scene's system and the finger's way."""
     return assemble(made), made.section("trajectory").trajectory()
 
 
@@ -176,7 +170,6 @@ AWAY = ((0.0, 0, 0, 90), (12.0, 0, 0, 90))
 
 @cache
 def displayed(refresh: str, shape: str = "crater", **known: Any) -> tuple[Result, np.ndarray]:
-    """Return a display of a shape without a fingertip, and the heights that it is to reach."""
     result = run(scene("shape_display", AWAY, 9, shape=shape, refresh=refresh, surfaces=3, **known))
     return result, assemble(result.scene).controller.heights
 

@@ -1,7 +1,5 @@
 """Who is followed over whole sessions: a finger that lifts, leaves, comes back, and noise that is none."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
@@ -23,7 +21,6 @@ Way = list[tuple[float, ...]]
 
 
 def lasting(scene: Scene) -> State:
-    """Run a scene to its end and return the last state."""
     system = assemble(scene)
     state = begin(system)
     *_, last = periods(system, scene.trajectories(), state, scene.periods)
@@ -101,7 +98,6 @@ PRESS = [(0.0, 0, 0, 43), (0.4, 0, 0, 38.5), (0.6, 0, 0, 38.5), (0.8, 0, 0, 46),
 
 @cache
 def session(method: str, noise: float, seed: int = 0) -> Result:
-    """Run the session under so many millinewtons of noise."""
     return run(followed(method, WAY, sensors={"force_noise": noise * 1e-3, "seed": seed}))
 
 

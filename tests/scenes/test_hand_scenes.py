@@ -1,7 +1,5 @@
 """Scenes of several fingers: what the samples form, and every command that takes such a scene or its run."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path
@@ -41,7 +39,6 @@ GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=3,4,5,6", "--metric",
 
 @cache
 def sample(name: str) -> Result:
-    """Return the run of a sample scene."""
     return run(load(find(name)))
 
 

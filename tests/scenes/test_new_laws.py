@@ -1,7 +1,5 @@
 """A new law or behavior is one file and one line: it runs alone and in batches, and is found everywhere."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -160,12 +158,10 @@ print(json.dumps(["law =" in format_scene(plain), run(plain.with_sections(contac
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """Return a copy of the package."""
     return copy_package(tmp_path)
 
 
 def add_part(copy: Path, table: str, line: str, row: str, name: str, text: str) -> None:
-    """Write a part's file, and its row behind a line of a table of parts."""
     core = copy / "addon" / "digiclay" / "core"
     (core / table).with_name(name).write_text(text.lstrip(), encoding="utf-8")
     head, found, tail = (core / table).read_text(encoding="utf-8").partition(line)

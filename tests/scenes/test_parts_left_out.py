@@ -1,7 +1,5 @@
 """What a scene leaves out is not even imported, and the rest works without it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import cache

@@ -1,7 +1,5 @@
 """The paper's session forms what its name says, never loses the finger, and its features are found."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.scene.scene_source import find as sample
@@ -17,7 +15,6 @@ MM = 1e-3
 
 @pytest.fixture(scope="module")
 def session() -> Result:
-    """Return the session, run once."""
     return run(load(sample("ridge_mound_valley")))
 
 

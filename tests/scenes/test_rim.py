@@ -1,7 +1,5 @@
 """Under a fingertip that slides off the bed no pin rises; one that is lifted at the rim is followed."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 
@@ -38,7 +36,6 @@ IMAGES = {
 
 @cache
 def add(name: str, method: str) -> Scene:
-    """Return a bed of the Add menu."""
     bed = BEDS[name]
     return make_scene("paper", Layout(bed.rows, bed.columns, bed.pitch), method, bed.share)
 

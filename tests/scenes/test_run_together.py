@@ -1,7 +1,5 @@
 """Runs in a stack come to what they come to alone, and what befalls one of them is its own affair."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -31,7 +29,6 @@ NOTHING = {"height": 1e-15, "force": 1e-12, "total_force": 1e-12}
 
 
 def together(scenes: Sequence[Scene]) -> list[Any]:
-    """Run scenes in a stack; return what each came to."""
     assert len({describe_structure(one) for one in scenes}) == 1
     done: dict[int, Any] = {}
     for number, result in run_together(scenes):
@@ -43,13 +40,11 @@ def together(scenes: Sequence[Scene]) -> list[Any]:
 
 
 def judged(scenes: Sequence[Scene], *, errors: bool = False) -> list[Any]:
-    """Judge scenes in a stack, with their errors or without; return what each came to."""
     done = dict(measure_together(scenes, errors=errors))
     return [done[number] for number in range(len(scenes))]
 
 
 def assert_figures(found: Any, alone: Result) -> None:
-    """Check every figure that a run is judged by against the run alone."""
     for name in (*METRICS, "losses", "control_periods", "incomplete"):
         value, unit = alone.metrics[name], alone.metrics["units"].get(name, "1")
         assert found.metrics["units"].get(name, "1") == unit
@@ -58,7 +53,6 @@ def assert_figures(found: Any, alone: Result) -> None:
 
 
 def assert_as_alone(found: Any, alone: Result) -> None:
-    """Check history and figures of a run against the run alone."""
     assert found.history.keys() == alone.history.keys()
     for name, values in alone.history.items():
         tolerance = HEIGHT if name == "height" else FORCE
@@ -67,7 +61,6 @@ def assert_as_alone(found: Any, alone: Result) -> None:
 
 
 def assert_estimated_as_alone(found: Any, scene: Scene, alone: Result) -> None:
-    """Check the errors of a run against what is estimated of the run alone."""
     errors = estimate_errors(scene, alone.history)
     assert errors.height > 1e-12  # there is something to estimate
     for name, value in errors._asdict().items():
@@ -76,7 +69,6 @@ def assert_estimated_as_alone(found: Any, scene: Scene, alone: Result) -> None:
 
 
 def assert_all_as_alone(scenes: Sequence[Scene], *, judge: bool = False, errors: bool = False) -> list[Any]:
-    """Check every run of a stack, and what is judged and estimated of it without its history."""
     results = together(scenes)
     evaluated = judged(scenes, errors=errors) if judge or errors else results
     if errors:
@@ -260,7 +252,6 @@ NOISES = (("1e-3", "5e-6", "1"), ("2e-3", "2e-6", "2"), ("0.5e-3", "20e-6", str(
 
 
 def noisy(name: str, *settings: str) -> list[Scene]:
-    """Return scenes with noise of their own."""
     keys = ("force_noise", "height_noise", "seed")
     noises = ([f"sensors.{key}={value}" for key, value in zip(keys, noise, strict=True)] for noise in NOISES)
     return [sample(name, *settings, *noise) for noise in noises]

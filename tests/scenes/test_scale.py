@@ -1,7 +1,5 @@
 """A control period takes the same work on a bed of any size."""
 
-from __future__ import annotations
-
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 

@@ -1,7 +1,5 @@
 """A server that runs: WebSocket and OSC, a take, clients that mean no good, an example of a pin display."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty
@@ -51,7 +49,6 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 def frames(client: ClientConnection) -> Iterator[Frame]:
-    """Yield the frames that a client receives in binary."""
     while True:
         message = client.recv(TIMEOUT)
         if isinstance(message, bytes):
@@ -59,7 +56,6 @@ def frames(client: ClientConnection) -> Iterator[Frame]:
 
 
 def frame_after(client: ClientConnection, number: int) -> Frame:
-    """Return the first frame after a pose has been reached."""
     return next(one for one in frames(client) if one.number == number and not one.flags & Flag.POSE_LIMITED)
 
 
@@ -75,7 +71,6 @@ def is_well(server: Server, number: int) -> None:
 
 
 def refused(server: Server, *, token: str = "", wishes: str = "") -> int:
-    """Return the HTTP status by which a client is refused."""
     with pytest.raises(InvalidStatus) as caught:
         server.connect(wishes, token)
     return caught.value.response.status_code
@@ -246,7 +241,6 @@ def test_a_signal_ends_a_server_whose_doors_hang_and_finishes_its_take(tmp_path:
 
 
 def fingers_after(client: ClientConnection, *identities: int) -> dict[int, dict[str, Any]]:
-    """Return the fingers of the first frame that has those with some identities."""
     while True:
         said = json.loads(client.recv(TIMEOUT))
         found = {one["id"]: one for one in said["fingers"]} if said["type"] == "state" else {-1: {}}
@@ -324,7 +318,6 @@ PLACE = (0.0, 0.0, 0.038)
 
 @pytest.fixture
 def door(server: Server) -> Iterator[socket.socket]:
-    """A client's socket."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         client.connect(("127.0.0.1", server.osc_port))
         client.settimeout(0.2)
@@ -332,7 +325,6 @@ def door(server: Server) -> Iterator[socket.socket]:
 
 
 def message(address: str, *values: Any) -> bytes:
-    """Return an OSC message as another program would write it."""
     builder = OscMessageBuilder(address)
     for value in values:
         builder.add_arg(value)
@@ -352,7 +344,6 @@ def received(door: socket.socket, address: str, *requests: bytes) -> list[Any]:
 
 
 def state_after(door: socket.socket, number: int, part: str = "state") -> list[Any]:
-    """Subscribe, and return the state that names a pose."""
     subscribe = message("/digiclay/subscribe", TOKEN, part, 200.0)
     while True:
         state = received(door, "/digiclay/state", subscribe)
@@ -361,7 +352,6 @@ def state_after(door: socket.socket, number: int, part: str = "state") -> list[A
 
 
 def is_well_by_osc(door: socket.socket, number: int) -> None:
-    """Check that a client with good intentions is served as ever."""
     subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
     pose = message("/digiclay/pose", TOKEN, *PLACE, number)
     state: list[Any] = [0, 0]
@@ -487,6 +477,5 @@ def test_the_example_shows_the_heights_on_a_pin_display(server: Server, door: so
 
 
 def acknowledgement(body: bytes) -> bytes:
-    """Return the acknowledgement of a frame of heights."""
     sequence = pin_display.HEAD.unpack_from(body)[2]
     return pin_display.pack(pin_display.HEAD.pack(1, 2, sequence))

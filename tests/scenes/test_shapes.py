@@ -1,7 +1,5 @@
 """Shapes through the physics: displayed by driving the pins, then formed by the finger, by every method."""
 
-from __future__ import annotations
-
 from collections import deque
 from functools import cache
 from typing import Any
@@ -28,20 +26,17 @@ SHAPE = {"file": "dome", "rise": 10e-3}
 
 
 def scene(method: str | None, **sections: Any) -> Any:
-    """Return a scene on a bed of 15 x 15 cells that displays a dome, and a finger presses it."""
     control = {"method": method} if method else "absent"
     return followed("", WAY, **{"control": control, "shape": SHAPE, **sections})
 
 
 @cache
 def formed(method: str) -> Result:
-    """Return the session of a method."""
     return run(scene(method))
 
 
 @cache
 def wanted() -> np.ndarray:
-    """Return the heights of the dome."""
     return assemble(scene("elastic")).controller.display.heights
 
 

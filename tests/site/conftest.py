@@ -1,7 +1,5 @@
 """The built site, and a browser without network."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +21,6 @@ def site() -> Path:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    """A headless Chromium that reaches no machine, and keeps a list of all that it requests."""
     webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: run 'make docs'")
     program, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if not program or not driver:

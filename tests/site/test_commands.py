@@ -1,7 +1,5 @@
 """Commands of all pages: executed in the order of their page, or listed with what shows them instead."""
 
-from __future__ import annotations
-
 import functools
 import os
 import re
@@ -43,7 +41,6 @@ class Command(NamedTuple):
 
 
 def _complete(text: str) -> str:
-    """Return a command without the remark beside it, which begins at two blanks or a #."""
     return re.split(r"\s{2,}|\s#\s", text.strip())[0].strip()
 
 
@@ -74,7 +71,6 @@ def find_files(text: str) -> dict[str, str]:
 
 @functools.cache
 def _listed() -> dict[str, Any]:
-    """Return the list of commands that are not executed."""
     return tomllib.loads(LIST.read_text(encoding="utf-8"))
 
 
@@ -83,7 +79,6 @@ def _excused() -> set[str]:
 
 
 def execute(command: str, folder: Path) -> str:
-    """Carry out a command in a folder; return why it failed, or ""."""
     program, *words = shlex.split(command)
     beside = Path(sys.executable).parent / Path(program).name
     found = str(beside) if beside.exists() else shutil.which(program)

@@ -1,7 +1,5 @@
 """The built pages: links, anchors and pictures lead to something; nothing is loaded from elsewhere."""
 
-from __future__ import annotations
-
 import functools
 import json
 import re
@@ -28,7 +26,6 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Collect what a tag has."""
         for name, value in attrs:
             if name == "id" or (tag == "a" and name == "name"):
                 self.anchors.add(value or "")
@@ -40,7 +37,6 @@ class Page(HTMLParser):
 
 @functools.cache
 def read_page(path: Path) -> Page:
-    """Return a page of the site."""
     return Page(path.read_text(encoding="utf-8"))
 
 

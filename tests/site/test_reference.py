@@ -1,7 +1,5 @@
 """The pages made at the build have every command, parameter and module."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 import html
@@ -25,7 +23,6 @@ PACKAGES = {
 
 
 def commands() -> Iterator[argparse.ArgumentParser]:
-    """Yield the parser of every command."""
     for top in (parser(), benchmarks_parser()):
         for action in top._actions:
             if isinstance(action, argparse._SubParsersAction):
@@ -33,7 +30,6 @@ def commands() -> Iterator[argparse.ArgumentParser]:
 
 
 def text_of(page: Path) -> str:
-    """Return the text of a page without its tags."""
     return html.unescape(re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8")))
 
 

@@ -1,7 +1,5 @@
 """The site in a browser, opened from its folder with the network cut."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,6 @@ PAGES = ("index.html", "reference/python/digiclay.core.engine.html")
 
 
 def open_page(browser: Any, page: Path) -> None:
-    """Open a page from its file, and forget what was requested before."""
     browser.get("about:blank")
     browser.get_log("performance")
     browser.get_log("browser")
@@ -23,14 +20,12 @@ def open_page(browser: Any, page: Path) -> None:
 
 
 def requested(browser: Any) -> list[str]:
-    """Return the addresses of all that the page has requested."""
     events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
     return [one["request"]["url"] for one in sent]
 
 
 def search(browser: Any, word: str, place: str) -> list[str]:
-    """Type a word into the search field, wait for a result at a place, and return all links."""
     from selenium.webdriver.support.ui import WebDriverWait
 
     field = browser.find_element("css selector", "input.md-search__input")
@@ -75,7 +70,6 @@ def test_the_check_notices_a_request_to_another_machine(browser: Any, tmp_path: 
 @pytest.mark.parametrize("width", [390, 1400])
 @pytest.mark.parametrize("page", ["index.html", "guide.html", "reference/commands.html", "paper.html"])
 def test_no_page_is_wider_than_the_window(site: Path, browser: Any, page: str, width: int) -> None:
-    """Tables and code scroll by themselves."""
     size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 700}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:

@@ -1,7 +1,5 @@
 """Pins in a disc are driven to smoothed heights: the bed gets even, keeps its volume, and stays elsewhere."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
@@ -39,7 +37,6 @@ def bed(
     arrangement: str = "aligned", method: str = "virtual_master", size: int = 13, period: float = 5e-3,
     *, shape: bool = False,
 ) -> System:  # fmt: skip
-    """Return a small bed, whose display shows a shape first if it has one."""
     layout = {"rows": size, "columns": size, "arrangement": arrangement}
     control: object = "absent" if method == "absent" else {"method": method}
     simulation = {"control_period": period}
@@ -273,7 +270,6 @@ def test_erased_pins_go_back_to_rest_in_the_middle_and_partly_towards_the_rim() 
 
 
 def lock(verb: Verb, x: float = 0.0, radius: float = 7e-3) -> Orders:
-    """Return the order of one control period that locks or unlocks a disc, m."""
     return Orders(repeat_order(1, verb, x, 0.0, radius))
 
 
@@ -349,7 +345,6 @@ def test_a_pin_locked_on_its_way_stops_there_and_stays_there_when_it_is_unlocked
 
 
 def lock_for(periods: int) -> Orders:
-    """Return the orders that lock a disc for so long."""
     return Orders(repeat_order(periods, Verb.LOCK, radius=7e-3))
 
 

@@ -1,7 +1,5 @@
 """The overlay's picture: what it says, where its curves go, and that it can be read on any theme."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -43,7 +41,6 @@ def session(**changes: object) -> Readings:
 
 
 def said(picture: Picture) -> str:
-    """Return all words of a picture."""
     return " | ".join(words.text for words in picture.words)
 
 
@@ -57,7 +54,6 @@ def test_letters_and_curves_stand_out_from_any_theme(back: Color, ink: Color | N
 
 
 def draw(told: Readings) -> Picture:
-    """Lay out in ordinary room on a dark theme."""
     return lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0)
 
 

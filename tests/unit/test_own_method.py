@@ -1,7 +1,5 @@
 """Control methods of one's own: command line, scenes, processes, job series, template; their mistakes."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import re
@@ -173,14 +171,12 @@ RUN = Path("jobs", "runs", "tap-soft_pad-small")
 
 @pytest.fixture
 def jobs(here: Path) -> Path:
-    """Work in a folder with a JOBS file and a method."""
     (here / "jobs.toml").write_text(JOBS, encoding="utf-8")
     write_method(here)
     return here
 
 
 def prepare() -> int:
-    """Write the files of the jobs, and forget the method as another process would not know it."""
     code = main(["batch", "jobs.toml", "--method", "pad.py:SoftPad", "--prepare", "--quiet"])
     remove_method("soft_pad")
     return code
@@ -279,7 +275,6 @@ def test_the_code_of_the_page_runs(here: Path, code: str) -> None:
 
 
 def refusal(text: str, attribute: str = "Bad") -> str:
-    """Return the line that refuses the code of a method, when it is loaded or while it runs."""
     write_method(Path(), text, "bad.py")
     with pytest.raises(MethodError) as caught:
         run(small(load_method(f"bad.py:{attribute}")))
@@ -290,28 +285,23 @@ def refusal(text: str, attribute: str = "Bad") -> str:
 
 
 def bad(body: str, fields: str = "") -> str:
-    """Return the code of a method with fields, and with functions."""
     inner = "\n".join(f"    {line}" for line in (*fields.splitlines(), *body.splitlines()))
     return f"{HEAD}\n@dataclass(frozen=True)\nclass Bad(OwnMethod):\n{inner}\n"
 
 
 def commanding(line: str) -> str:
-    """Return the code of a method whose command is a line."""
     return bad(f"def command(self, memory, cells, device):\n    {line}")
 
 
 def ordering(orders: str) -> str:
-    """Return the code of a method with certain orders."""
     return commanding(f"return memory, {orders}")
 
 
 def building(line: str) -> str:
-    """Return the code of a method whose build is a line."""
     return bad(f"def build(self, device):\n    {line}")
 
 
 def keeping(first: str, later: str) -> str:
-    """Return the code of a method with a memory at first and later."""
     return bad(
         f"def begin(self, device):\n    return {first}\n"
         f"def command(self, memory, cells, device):\n    return {later}, Orders()"
@@ -439,7 +429,6 @@ SLOW = bad(
 
 
 def run_quickly(*more: str) -> int:
-    """Return what the command says to bad.py with a control period of 0.2 ms."""
     period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
     return main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet", *more])
 

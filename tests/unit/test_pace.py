@@ -1,7 +1,5 @@
 """Pace of the methods: what they state is not above what pins follow, and a faster one is seen to fail."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

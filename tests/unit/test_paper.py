@@ -1,7 +1,5 @@
 """The paper's claims on results made by hand; the page and its data; sections through known surfaces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -45,7 +43,6 @@ GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
 
 def results(*swings: Swing, **bad: Follows) -> Results:
-    """Return results that follow everything but what is bad, by method."""
     simple = {(method, name): bad.get(method, GOOD) for method in scenes.METHODS for name in WAYS}
     session = Session(resolve({}), {}, {}, {}, [], 0.0, {})
     return Results(simple=simple, swings=list(swings), printed={scenes.METHODS[0]: session})
@@ -130,7 +127,6 @@ waypoints = [
 
 @pytest.fixture(scope="module")
 def lost(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    """A session Method II loses the finger in, and what was made of it."""
     path = tmp_path_factory.mktemp("lost") / "lifted.toml"
     path.write_text(LIFTED, encoding="utf-8")
     found = Results(lifting={"virtual_master": 20e-3, "cell_states": 6e-3})
@@ -230,7 +226,6 @@ def test_a_claim_has_the_verdict_of_its_evidence(claim: Any, found: Any, verdict
 
 
 def escaped(point: Swing) -> Results:
-    """Return results of a sweep of Method II's gain with two points."""
     known = {method: resolve({"control": {"method": method}}) for method in scenes.METHODS}
     printed = {method: Session(scene, {}, {}, {}, [], 0.0, {}) for method, scene in known.items()}
     return Results(cell_swings=[swing(15.0, 0.001, None), point], printed=printed)
@@ -316,13 +311,11 @@ def session(method: str, followers: int) -> Session:
 
 
 def formed(bare: Session, over: Floats) -> Session:
-    """Return the session with another final surface, heights over the bed at rest."""
     return bare._replace(history={**bare.history, "height": (REST + over)[None]})
 
 
 @pytest.fixture(scope="module", params=[(METHODS[0], 8), (METHODS[1], 16)], ids=METHODS)
 def bare(request: pytest.FixtureRequest) -> Session:
-    """A session of each method, its bed at rest."""
     return session(*request.param)
 
 
@@ -348,7 +341,6 @@ def test_the_flank_asked_for_is_that_of_the_method_s_own_profile() -> None:
 
 
 def missed(bare: Session, over: Floats) -> list[str]:
-    """Return the names of the sections that do not meet the limits."""
     return [one.name for one in sections(formed(bare, over)) if not one.meets(LIMITS)]
 
 
@@ -391,7 +383,6 @@ def test_a_raised_rim_is_no_mound_and_a_crease_with_a_hump_no_valley(bare: Sessi
 
 
 def blister(method: str, rim: float, sign: float) -> Result:
-    """Return a blister 15 mm high or deep under the finger, cells on its flat top `rim` beyond it."""
     scene = resolve({"control": {"method": method}, "layout": {"rows": 17, "columns": 17}})
     place = assemble(scene).grid.positions
     away = np.hypot(*place.T)

@@ -1,7 +1,5 @@
 """Pictures of runs and sweeps: what they show is read from the figures, not from pixels."""
 
-from __future__ import annotations
-
 import struct
 from functools import cache
 
@@ -23,7 +21,6 @@ from tests.other_process import finish, start
 
 @cache
 def _drag(rows: int, columns: int, arrangement: str) -> dict[str, np.ndarray]:
-    """Return the arrays of a drag."""
     time = np.linspace(0.0, 10.0, 201)
     place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     reach = place[:, 0].max()
@@ -44,12 +41,10 @@ def drag(rows: int = 12, columns: int = 14, arrangement: str = "aligned") -> dic
 
 
 def axes(figure, label):
-    """The axes of a figure that carry a label."""
     return next(part for part in figure.axes if part.get_label() == label)
 
 
 def png_size(path) -> tuple[int, int]:
-    """Width and height in a PNG's header."""
     content = path.read_bytes()
     assert content[:8] == b"\x89PNG\r\n\x1a\n"
     return struct.unpack(">II", content[16:24])
@@ -57,13 +52,11 @@ def png_size(path) -> tuple[int, int]:
 
 @pytest.fixture(scope="module")
 def session():
-    """The picture of the session, drawn once."""
     return plots.session_figure(drag(), SetPoint(0.37))
 
 
 @pytest.fixture(scope="module")
 def surface():
-    """The picture of the final surface, drawn once."""
     return plots.surface_figure(drag())
 
 
@@ -243,7 +236,6 @@ def test_a_sweep_over_two_axes_leaves_pictures_and_over_three_a_table_only(here,
 
 
 def two_fingers(fingers: int = 2) -> dict[str, np.ndarray]:
-    """The drag by several fingertips side by side, which lift one after the other."""
     case, share = drag(), 1.0 / fingers
     last = 3.0 + np.arange(fingers)
     touching = (case["time"][:, None] > 1.0) & (case["time"][:, None] < last)

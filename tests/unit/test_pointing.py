@@ -1,7 +1,5 @@
 """Rays onto pins, the patch that the fingertip touches, and lines over pins without spikes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside, make_matrices
@@ -20,7 +18,6 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def bed(arrangement: str = "aligned", rows: int = 12, columns: int = 15) -> tuple[Grid, np.ndarray]:
-    """Return a bed whose heights all differ."""
     cells = make_grid(Layout(rows, columns, arrangement=arrangement))
     return cells, 0.04 + 0.01 * np.sin(7.0 * np.arange(cells.count))
 

@@ -1,7 +1,5 @@
 """Progress on a terminal: one line that tells how much is done, and is gone afterwards."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 
@@ -19,10 +17,7 @@ KINDS: dict[str, Callable[[io.StringIO], Line]] = {
 
 
 class Terminal(io.StringIO):
-    """A stream that says it is a terminal."""
-
     def isatty(self) -> bool:
-        """Be one."""
         return True
 
 
@@ -35,7 +30,6 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def told(bar: Line) -> None:
-    """Tell one step of three."""
     bar() if isinstance(bar, Steps) else bar(1, 3)  # type: ignore[operator]
 
 

@@ -1,7 +1,5 @@
 """The observer of the pulp finds tension and indentation from forces; from a force to heights."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.control.blister import Blister, BlisterRule
@@ -34,7 +32,6 @@ def history(depth: object, count: int) -> tuple[Floats, Floats]:
 
 
 def observe(forces: Floats, expected: Floats) -> Floats:
-    """Return the tensions found, one a period, N."""
     pulp, found = np.zeros((4, 1)), []
     for force, guess in zip(forces[1:], expected[1:], strict=True):
         PULP.observe(pulp, np.array([force]), np.array([guess]))

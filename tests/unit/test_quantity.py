@@ -1,7 +1,5 @@
 """Parameters: defaults, types, bounds, and the one line when a rule is broken, also by parts together."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
@@ -19,8 +17,6 @@ from digiclay.core.model.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Lever(Parameters):
-    """A part that has every kind of field."""
-
     length: float = quantity(0.1, "length", unit="m", symbol="l", source="P", above=0.0, below=10.0)
     teeth: int = quantity(12, "teeth", at_least=3, at_most=99)
     metal: str = quantity("brass", "what it is made of", choices=("brass", "steel"))

@@ -1,7 +1,5 @@
 """Queue of press strokes: the same heights in whatever ticks, and the ghost that is shown of it at once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 
@@ -30,7 +28,6 @@ PARTS = {
 
 
 def begin(name: str) -> Running:
-    """Return a session on a part of a bed."""
     count, bed, arrangement, method = PARTS[name]
     layout = Layout(count, count, BEDS[bed].pitch, arrangement=arrangement)
     above = np.array([0.0, 0.0, 46e-3, *LEVEL])

@@ -1,7 +1,5 @@
 """Recorded strokes of the Press tool: their file, and that a replay forms what a hand's strokes form."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,13 +23,11 @@ STROKE = "[[stroke]]\nmoves = [[0, 0, 0], [0.1, 0.01, 0]]\n"
 
 
 def begin(**control: object) -> Running:
-    """Return a session of a small bed."""
     scene = resolve({"layout": {"rows": 11, "columns": 15}, "control": control})
     return begin_session(1, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))[0]
 
 
 def play(*strokes: PointerStroke) -> Running:
-    """Play strokes on a small bed."""
     *_, session = play_strokes(begin(), strokes)
     return session
 

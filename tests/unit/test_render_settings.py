@@ -1,7 +1,5 @@
 """Which recorded rows a film shows, and when."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError

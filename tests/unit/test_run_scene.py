@@ -1,7 +1,5 @@
 """A session from scene to results, their folder; the recorder's rows, and the memory they need."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile
@@ -37,13 +35,11 @@ TABLE: dict[str, Any] = {
 
 
 def scene(**sections: Any) -> Scene:
-    """Return a short press on a small bed."""
     return resolve({**TABLE, **sections}, "press")
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    """Return a session run once."""
     return run(scene())
 
 
@@ -87,7 +83,6 @@ def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
 
 
 def stopped_after(count: int) -> Result:
-    """Run a session that is asked to stop after some periods."""
     asked = iter(range(1, 1000))
     return run(scene(), stopped=lambda: next(asked) == count)
 
@@ -114,7 +109,6 @@ def test_a_saved_run_has_scene_metrics_and_history(result: Result, tmp_path: Pat
 
 
 def fill(folder: Path, word: str) -> None:
-    """Make a folder look like a run's."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / MARK).write_text(word, encoding="utf-8")
 
@@ -249,7 +243,6 @@ def test_a_written_history_is_read_back_bit_for_bit_and_smaller_than_its_arrays(
 
 
 def fits(recorder: Recorder, cells: int, periods: int, free: int) -> bool:
-    """Tell whether a history is accepted."""
     try:
         refuse_what_cannot_fit(recorder, ROWS, cells, periods, free)
     except ParameterError:

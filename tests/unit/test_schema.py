@@ -1,7 +1,5 @@
 """Scenes: defaults, presets, what goes together, text and back; files found, read, overridden, refused."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from dataclasses import replace
@@ -81,7 +79,6 @@ def test_periods_cover_the_duration_and_steps_the_period_without_one_more_by_rou
 
 
 def refused(table: dict[str, Any]) -> str:
-    """Return what is said of a table that is no scene."""
     with pytest.raises(ParameterError) as caught:
         resolve(table)
     return str(caught.value)
@@ -184,7 +181,6 @@ def scene(folder: Path, text: str, **settings: str) -> Scene:
 
 
 def refused_file(folder: Path, text: str, **settings: str) -> str:
-    """Return what is said of a scene file that is wrong, without its folder."""
     with pytest.raises(SceneError) as caught:
         scene(folder, text, **settings)
     return str(caught.value).replace(f"{folder}/", "")

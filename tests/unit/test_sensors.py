@@ -1,7 +1,5 @@
 """Sensor models: noise, quantization and delay, what a session makes of them; the observer of the force."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -34,12 +32,10 @@ SURE = 5.0
 
 
 def heights(*settings: str) -> Floats:
-    """Run a sample scene; return the history of its heights, m."""
     return np.asarray(run(sample("slow_press", *settings)).history["height"])
 
 
 def show(force: Sequence[float], height: Sequence[float] | Floats) -> Measurement:
-    """Return what there is of cells 0, 1, ..., of which the sensors remember nothing."""
     cells, nothing = np.arange(len(force)), np.zeros(len(force))
     return Measurement(
         quadratic_basis=np.empty(0),
@@ -55,14 +51,12 @@ def show(force: Sequence[float], height: Sequence[float] | Floats) -> Measuremen
 
 
 def draw_normals(seed: Any, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Return both kinds of noise of standard deviation 1."""
     radius, angle = draw_polar(seed, period, cells)
     return radius * np.cos(angle), radius * np.sin(angle)
 
 
 @cache
 def field(seed: int = 3) -> tuple[Floats, Floats]:
-    """Return both kinds of noise, (PERIODS, CELLS) each."""
     both = np.array([draw_normals(seed, period, np.arange(CELLS)) for period in range(PERIODS)])
     return both[:, 0], both[:, 1]
 
@@ -192,7 +186,6 @@ AWAY = [{"time": 0.0, "position": [0, 0, 0.09]}, {"time": 0.6, "position": [0, 0
 
 
 def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
-    """Return a bed of one pin, its force observed."""
     table: dict[str, Any] = {
         "layout": {"rows": 1, "columns": 1},
         "control": "absent",
@@ -223,22 +216,18 @@ def sensed(system: System, state: State) -> float:
 
 
 def pulled_down(period: int) -> float:
-    """Let the pin sink through a valve that is wide open."""
     return -0.8
 
 
 def down_and_up(period: int) -> float:
-    """Let the pin sink slowly, then rise, always well open."""
     return 0.6 * math.cos(2.0 * math.pi * period / 80.0 + math.pi / 2) + (0.25 if period > 60 else 0.15)
 
 
 def half_way(force: Floats) -> Floats:
-    """Return the mean force of each period from those at its ends."""
     return np.concatenate([[0.0], 0.5 * (force[1:] + force[:-1])])
 
 
 def well_open(command_in: Callable[[int], float], count: int = 120, least: float = 0.2) -> NDArray[np.bool_]:
-    """Return after which periods the valve was well open from end to end."""
     command = np.array([0.0, *(command_in(period) for period in range(count))])
     open_now = (np.abs(command) > least) & (np.abs(np.roll(command, 1)) > least)
     return open_now & (command * np.roll(command, 1) > 0.0)

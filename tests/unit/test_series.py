@@ -1,7 +1,5 @@
 """Folders of series: safe names of jobs, inside the folder; a full disk, and what was left half-made."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -117,7 +115,6 @@ def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsy
 
 
 def jobs_file(said: str) -> Path:
-    """Write the JOBS file."""
     path = Path("jobs.toml")
     path.write_text(said.replace("'", '"'), encoding="utf-8")
     return path

@@ -1,7 +1,5 @@
 """What was formed, written as a mesh and read back as a shape: the same heights, cell by cell."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +30,6 @@ def bed(pitch: float, arrangement: str) -> tuple[Grid, Formed]:
 
 
 def read_back(cells: Grid, formed: Formed, model: Model, path: Path, format: str, unit: str = "mm") -> Fitted:
-    """Write a surface, and lay the file onto the bed it came from."""
     write(make_bodies(formed, model), path, unit, format)
     shape = Shape(file=str(path), fit="placed", unit="auto" if format in ("glb", "3mf") else unit)
     return fit_relief(shape, read(shape), cells, Actuator())

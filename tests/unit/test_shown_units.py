@@ -1,7 +1,5 @@
 """Units a person reads: numbers of up to six digits survive 32 bits, messages are reworded whole."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

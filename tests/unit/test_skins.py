@@ -1,7 +1,5 @@
 """Skin, solid and stepped bed on small beds; skins between the pins beside SciPy's; the live skin."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse
@@ -34,7 +32,6 @@ ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 
 def pins(rows: int, columns: int, arrangement: str = "aligned") -> np.ndarray:
-    """Positions of a bed with the default pitch of 3 mm."""
     return make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
 
 
@@ -130,7 +127,6 @@ def formed(heights_mm, rows: int, columns: int, arrangement: str = "aligned") ->
 
 @st.composite
 def beds(draw):
-    """Beds with steps of all kinds, many of them of equal height."""
     layout = Layout(
         rows=draw(st.integers(2, 9)),
         columns=draw(st.integers(2, 9)),
@@ -200,7 +196,6 @@ ROUNDING = 1e-15
 
 
 def bed(arrangement: str = "aligned", rows: int = 7, columns: int = 9, seed: int = 1) -> Formed:
-    """A bed with pins anywhere between 20 and 80 mm."""
     place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     return Formed.of(place, np.random.default_rng(seed).uniform(0.02, 0.08, len(place)), 0.04, 0.0, 0)
 
@@ -317,7 +312,6 @@ def test_force_is_straight_between_pins_and_a_mode_that_of_the_nearest():
 
 
 def at_rest(rows: int, columns: int, arrangement: str = "aligned") -> Instant:
-    """Return a at_rest at rest."""
     return Instant.at_rest(Layout(rows=rows, columns=columns, arrangement=arrangement))
 
 

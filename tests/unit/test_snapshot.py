@@ -1,7 +1,5 @@
 """A state, a controller's memory in it, is kept as bytes and taken up bit for bit, or refused in one line."""
 
-from __future__ import annotations
-
 import math
 from enum import IntEnum
 from functools import cache
@@ -28,23 +26,19 @@ PRESS = path((0.0, -6, 0, 42), (0.2, -6, 0, 36), (0.6, 6, 2, 36), (0.8, 6, 2, 46
 
 
 def system_of(method: str = "virtual_master", **tables: Any) -> System:
-    """Return a small bed under a method."""
     return assemble(resolve({"layout": SIZES, "control": {"method": method}, **tables}))
 
 
 def run(system: System, state: State, count: int) -> State:
-    """Return the state some periods later."""
     *_, last = periods(system, [PRESS], state, count)
     return last
 
 
 def same(first: State, second: State) -> bool:
-    """Tell whether two states are equal bit for bit, what is gathered included."""
     return packed_parts(first) == packed_parts(second)
 
 
 def packed_parts(state: State) -> list[Any]:
-    """Return all of a state as things that compare exactly."""
     held = state.active
     arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.quadratic_basis)
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
@@ -74,7 +68,6 @@ def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str, tables: di
 
 @cache
 def kept() -> tuple[System, bytes]:
-    """Return a small bed and its state in the middle of a press."""
     system = system_of()
     return system, snapshot.dump(system, run(system, begin(system), 70))
 
@@ -104,7 +97,6 @@ def test_bytes_that_are_no_state_are_refused(data: Any) -> None:
 
 
 def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
-    """Return the bytes with something else in their header."""
     first = len(START) + 4
     length = int.from_bytes(data[len(START) : first], "little")
     text = data[first : first + length]
@@ -199,22 +191,16 @@ def test_heights_are_carried_over_to_other_parts_within_the_stroke() -> None:
 
 
 class Color(IntEnum):
-    """Something a controller might remember."""
-
     RED = 1
     BLUE = 2
 
 
 class Inner(NamedTuple):
-    """A part of a memory."""
-
     edge: float = 0.0
     felt: bool = False
 
 
 class Outer(NamedTuple):
-    """A memory with everything in it."""
-
     color: Color
     inner: Inner
     table: NDArray[np.float64]

@@ -1,7 +1,5 @@
 """Shapes from files: samples by name, every kind of file, and every way a file can be wrong."""
 
-from __future__ import annotations
-
 import importlib.util
 import io
 import re
@@ -28,7 +26,6 @@ BED = make_grid(Layout(13, 13, 3e-3))
 
 @pytest.fixture(scope="module")
 def maker() -> ModuleType:
-    """The program that makes the sample shapes."""
     spec = importlib.util.spec_from_file_location("sample_shapes", ROOT / "tools" / "sample_shapes.py")
     assert spec
     assert spec.loader
@@ -39,7 +36,6 @@ def maker() -> ModuleType:
 
 
 def heights(file: Path | str, **known: object) -> np.ndarray:
-    """Return the heights a file makes on a bed of 13 x 13 cells."""
     return fit_shape(Shape(file=str(file), **known), BED, Actuator()).heights
 
 

@@ -1,7 +1,5 @@
 """The bisection on the finger's speed, on made-up limits and on the real thing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +22,6 @@ from digiclay.core.studies.speed_limits import (
 
 
 def device(method: str = "virtual_master", **layout: object) -> Scene:
-    """Return the default device with a method."""
     return resolve({"control": {"method": method}, "layout": layout})
 
 
@@ -93,7 +90,6 @@ def test_a_finger_that_is_lost_is_counted_with_its_time() -> None:
 
 @pytest.fixture(scope="module")
 def press() -> Result:
-    """A press in the middle of a small bed."""
     return run(device(rows=11, columns=11))
 
 

@@ -1,7 +1,5 @@
 """The rows of a state, states as values, stored modes, and how long a set of active cells serves."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Steppers: the closed form solves its equation, others keep to what a cell can be."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -52,7 +50,6 @@ def integrated(e: float, bow: float, slip: float, decay: float, pulp: float) -> 
 
 
 def solved(e: float, bow: float, slip: float, decay: float, pulp: float) -> tuple[float, float]:
-    """Return what `crossed` says of one cell."""
     push, mean = solve_crossing(*(np.array([value]) for value in (e, bow, slip, decay, pulp)))
     return float(push[0]), float(mean[0])
 
@@ -121,8 +118,6 @@ def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper
 
 @dataclass(frozen=True)
 class Setter(Explicit):
-    """Moves each cell by its way in a step, or puts it at a height, whatever the rates."""
-
     height: float | None
     ways: tuple[float, ...] = ()
 

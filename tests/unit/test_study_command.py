@@ -1,7 +1,5 @@
 """digiclay study: files, continuation, mistakes; on a bed of a few pins. Ranges of varied parameters."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from pathlib import Path
@@ -28,7 +26,6 @@ pytestmark = pytest.mark.usefixtures("here")
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a study that nobody stopped."""
     folder = tmp_path_factory.mktemp("study")
     (folder / "my.toml").write_text(SCENE, encoding="utf-8")
     study = [str(folder / "my.toml") if word == "my.toml" else word for word in STUDY]
@@ -37,7 +34,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the content of all files but those that name the run time."""
     texts = ("points.csv", "indices.csv", "study.json")
     return {name: (folder / name).read_bytes() for name in texts}
 
@@ -195,7 +191,6 @@ def test_shares_of_a_range_are_values(said: str, words: tuple[str, ...]) -> None
 
 
 def fit(*said: str, settings: tuple[Setting, ...] = ()) -> list[Range]:
-    """Return ranges as the parameters of a sample have them."""
     return fit_ranges([read_range(one) for one in said], find("slow_press"), settings)
 
 

@@ -1,7 +1,5 @@
 """Benchmark of methods: trials with repeated noise, their league, resumption, mistakes."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -42,7 +40,6 @@ BOTH_METHODS = [*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet
 
 
 def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
-    """Return the comments and the rows of a table."""
     lines = path.read_text(encoding="utf-8").splitlines()
     comments = [line for line in lines if line.startswith("#")]
     return comments, list(csv.DictReader(line for line in lines if not line.startswith("#")))
@@ -50,7 +47,6 @@ def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
 
 @pytest.fixture(scope="module")
 def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A suite of two methods and two seeds over a short session, run once."""
     folder = tmp_path_factory.mktemp("suite")
     with pytest.MonkeyPatch.context() as monkeypatch:
         folder_with(SCENE, folder, monkeypatch)
@@ -209,7 +205,6 @@ def test_a_trial_of_several_fingers_is_judged_by_the_worst() -> None:
 
 
 def placed_lift(method: str) -> tuple[Scene, Any]:
-    """Return the league's lift on a small bed, and what measures it."""
     scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": method}})
     return place_trial(scene, "lift")
 

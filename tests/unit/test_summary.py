@@ -1,7 +1,5 @@
 """Metrics on signals whose answer is known without a computer; units of touch."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any
@@ -368,7 +366,6 @@ ALL = np.ones(201, dtype=bool)
 
 
 def errors(final: np.ndarray, rows: np.ndarray = ALL, tip: np.ndarray = TIP) -> np.ndarray:
-    """The ridge errors in mm."""
     return measure_ridge_errors(PLACE, final, tip, rows, 11e-3) * 1e3
 
 

@@ -1,7 +1,5 @@
 """Sweeps: what varies, what points have in common, what is kept; stops, points or workers that go wrong."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import os
@@ -42,12 +40,10 @@ pytestmark = pytest.mark.usefixtures("here")
 
 
 def rows(folder: str) -> list[dict[str, str]]:
-    """Return the lines of a sweep's table."""
     return read_table(Path(folder) / "sweep.csv")
 
 
 def kept(folder: str) -> dict[str, Any]:
-    """Return the files of the finished points, by name."""
     found = sorted(Path(folder).glob("points/*"))
     return {path.name: json.loads(path.read_text(encoding="utf-8")) for path in found}
 
@@ -227,7 +223,6 @@ QUICK = [*MANY, "--set", "simulation.duration=0.5"]
 
 
 def some(count: int = 3) -> list[Point]:
-    """Return the points of a small sweep."""
     return make_points(find("slow_press"), SHORT, [read_axis(f"valve_lag.time_constant=1 ms:2 ms:{count}")])
 
 
@@ -273,7 +268,6 @@ def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_wor
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """The table of a sweep that nobody stopped."""
     out = tmp_path_factory.mktemp("sweep") / "whole"
     assert main([*QUICK, "--workers", "1", "--out", str(out)]) == 0
     return (out / "sweep.csv").read_bytes()
@@ -308,7 +302,6 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
 
 
 def idle() -> Processes[Evaluator]:
-    """Return the processes of a series that nobody stops."""
     return Processes[Evaluator](lambda: False, lambda: None)
 
 

@@ -1,7 +1,5 @@
 """A take, also of smooth strokes: replayed bit for bit, simulated more finely, written as scene and bytes."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from functools import cache
@@ -35,7 +33,6 @@ COUNT = 160
 
 
 def scene() -> Scene:
-    """Return a bed of 12 x 12 pins under Method I."""
     return replace(sample("slow_press"), layout=Layout(rows=12, columns=12))
 
 
@@ -138,7 +135,6 @@ SURFACE = np.where(np.arange(121) % 3 == 0, np.nan, 42e-3)
 
 
 def every_order() -> Orders:
-    """Return orders of every verb, one after the other."""
     smooth, average = (make_orders(12, -6e-3, 6e-3, 0.0, 10e-3, 0, verb).rows for verb in Verb if verb < 2)
     others = [repeat_order(4, verb, 3e-3, 0.0, 5e-3, 2.0) for verb in (Verb.LOCK, Verb.ERASE, Verb.INVERT)]
     free = repeat_order(1, Verb.UNLOCK, radius=1.0)
@@ -150,7 +146,6 @@ ORDERS = every_order()
 
 @cache
 def ordered_take() -> Take:
-    """Return the take of orders of every verb over a relief."""
     system = assemble(SCENE)
     state = heighten(system, make_spike_and_ridge(system.grid))
     start, poses = snapshot.dump(system, state), stay_away(len(ORDERS))
@@ -187,7 +182,6 @@ def test_a_take_of_version_3_whose_orders_have_no_verb_is_replayed_bit_for_bit()
 
 
 def rows_with(at: int, **columns: float) -> Floats:
-    """Return the rows of orders, one of them changed."""
     rows = ORDERS.rows.copy()
     for name, value in columns.items():
         rows[at, ("x", "y", "radius", "strength", "verb").index(name)] = value

@@ -1,7 +1,5 @@
 """From the finger's pose to forces: which cells may be touched, and how hard."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.engine.simulation import begin, step

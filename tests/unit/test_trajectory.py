@@ -1,7 +1,5 @@
 """The finger's path: through its waypoints, without overshoot, without a jump in speed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.model.trajectory import Trajectory, interpolate_poses, make_level

@@ -1,7 +1,5 @@
 """digiclay tune: fronts and knees, generations, chosen scene, continuation bit for bit, mistakes."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path
@@ -45,7 +43,6 @@ pytestmark = pytest.mark.usefixtures("here")
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a tuning that nobody stopped."""
     folder = tmp_path_factory.mktemp("tune")
     (folder / "my.toml").write_text(SCENE, encoding="utf-8")
     command = ["tune", str(folder / "my.toml"), *VARIED, *SMALL, "--generations", "4"]
@@ -54,12 +51,10 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def values(path: Path) -> Any:
-    """Return both metrics of a table."""
     return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the content of tables and scene."""
     names = ("points.csv", "front.csv", "chosen.toml", "tuning.json")
     return {name: (folder / name).read_bytes() for name in names}
 
@@ -177,7 +172,6 @@ def evolve(count: int, seed: int = 1) -> NDArray[np.float64]:
 
 
 def find_gap(values: NDArray[np.float64]) -> float:
-    """Return how far the front is above the known one at most, between outputs of 0.1 and 0.6."""
     front = values[find_front(values)]
     x = np.linspace(0.1, 0.6, 50)
     best = np.array([front[front[:, 0] <= one, 1].min() for one in x])

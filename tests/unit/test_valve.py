@@ -1,7 +1,5 @@
 """Flow (equations 3 to 8): the valve's two branches, a conduit in series, and the reservoirs."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -63,7 +61,6 @@ def test_with_the_opening_as_gap_all_openings_turn_turbulent_at_one_drop() -> No
 
 
 def series(gap: str = "stroke") -> OrificeAndConduit:
-    """Return a wide valve, a thin fluid and a narrow conduit."""
     conduit = Conduit(length=10e-3, diameter=0.3e-3)
     return OrificeAndConduit(
         make_orifice(Valve(orifice_diameter=0.8e-3, gap=gap), THIN), conduit.resistance(THIN)

@@ -1,7 +1,5 @@
 """Strokes that the valves form: erased, locked, stamped; in takes, undone, and under every other brush."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -30,19 +28,16 @@ CLICK, LINE, DRAG = ((0.0, 0.0),), ((-18e-3, 0.0), (18e-3, 0.0)), ((0.0, 0.0), (
 
 
 def begin(**tables: Any) -> Running:
-    """Return a session of a bed of 21 x 21 pins."""
     scene = resolve({"layout": {"rows": 21, "columns": 21}, "control": {"method": "hybrid"}, **tables})
     return sculpting.begin_session(1, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))[0]
 
 
 def stroke(brush: str, places: tuple[tuple[float, float], ...] = LINE, **keys: Any) -> PointerStroke:
-    """Return a stroke through places, m."""
     moves = tuple((0.1 * number, x, y) for number, (x, y) in enumerate(places))
     return PointerStroke(brush=brush, moves=moves, **keys)
 
 
 def play(session: Running, *strokes: PointerStroke) -> Running:
-    """Play strokes in a session."""
     *_, done = play_strokes(session, strokes)
     return done
 
@@ -53,7 +48,6 @@ def relief(session: Running) -> Floats:
 
 
 def locked(session: Running) -> Floats:
-    """Return which pins are locked, (21, 21)."""
     return (session.state.mode() == Mode.LOCKED).reshape(21, 21)
 
 

@@ -1,7 +1,5 @@
 """WebSocket door in this process: what takes too long with the real times."""
 
-from __future__ import annotations
-
 import asyncio
 import sys
 from contextlib import suppress
@@ -30,7 +28,6 @@ UNANSWERED = (1011).to_bytes(2, "big")
 
 
 def make_link() -> DoorLink:
-    """Return a link without a session."""
     slot, file = make_slot(LAYOUT.size)
     file.unlink()
     return DoorLink(Bed("bed", 1, 1, 3e-3, 0.1, 5e-3, ()), slot, slot, TOKEN)
@@ -48,7 +45,6 @@ async def connect(link: DoorLink, sent: bytes = b"") -> bytes:
 
 
 async def press_elsewhere(link: DoorLink) -> None:
-    """Send a pose as another client, as soon as it may."""
     while True:
         try:
             link.order(POSE, "another client")

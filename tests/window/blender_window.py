@@ -1,7 +1,5 @@
 """Plays a script in a real Blender window, and returns what it saw."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex

@@ -1,7 +1,5 @@
 """Fixture of all window tests."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.window.blender_window import Seen, played

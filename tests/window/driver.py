@@ -6,8 +6,6 @@ stepped from a timer, so that Blender handles each batch of events before the ne
 yield how long to wait, s. The pins have few vertices, unless the script has ``FINE_PINS = True``.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import importlib
 import importlib.util
@@ -35,28 +33,23 @@ SEEN: dict[str, Any] = {}
 
 
 def part(name: str) -> Any:
-    """Return a module of the extension."""
     return importlib.import_module(f"{EXTENSION}.{name}")
 
 
 def window() -> Any:
-    """Return the first window."""
     return bpy.context.window_manager.windows[0]
 
 
 def event(kind: str, value: str = "PRESS", at: tuple[int, int] = (0, 0), **modifiers: Any) -> None:
-    """Simulate one event in the first window."""
     window().event_simulate(kind, value, x=at[0], y=at[1], **modifiers)
 
 
 def key(kind: str, at: tuple[int, int], **modifiers: Any) -> None:
-    """Press and release a key."""
     event(kind, "PRESS", at, **modifiers)
     event(kind, "RELEASE", at, **{name: held for name, held in modifiers.items() if name != "unicode"})
 
 
 def click(at: tuple[int, int]) -> Iterator[float | None]:
-    """Click at a place of the window."""
     event("MOUSEMOVE", "NOTHING", at)
     yield 0.2
     key("LEFTMOUSE", at)
@@ -64,7 +57,6 @@ def click(at: tuple[int, int]) -> Iterator[float | None]:
 
 
 def view() -> tuple[Any, Any]:
-    """Return the first 3D view's area and its main region."""
     area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
     return area, next(r for r in area.regions if r.type == "WINDOW")
 
@@ -100,7 +92,6 @@ def on_the_bed(x: float, y: float, z: float = 40.0) -> tuple[int, int]:
 
 
 def call(operator: Any, *how: str | bool, **properties: Any) -> set[str]:
-    """Call an operator as the 3D view would."""
     area, region = view()
     with bpy.context.temp_override(window=window(), area=area, region=region):
         done: set[str] = operator(*how, **properties)
@@ -108,7 +99,6 @@ def call(operator: Any, *how: str | bool, **properties: Any) -> set[str]:
 
 
 def open_sidebar(tab: str = "Digital Clay") -> Iterator[float | None]:
-    """Show a tab of the sidebar."""
     area, _ = view()
     area.spaces.active.show_region_ui = True
     yield None
@@ -119,7 +109,6 @@ def open_sidebar(tab: str = "Digital Clay") -> Iterator[float | None]:
 
 
 def empty_scene() -> Iterator[float | None]:
-    """Take Blender's cube, camera and lamp away."""
     call(bpy.ops.object.select_all, action="SELECT")
     call(bpy.ops.object.delete)
     bpy.ops.ed.undo_push(message="Empty scene")
@@ -128,14 +117,12 @@ def empty_scene() -> Iterator[float | None]:
 
 
 def add_paper_bed() -> Iterator[float | None]:
-    """Add the bed of the paper, 25 x 25 pins, and look at all of it."""
     call(bpy.ops.mesh.digital_clay_add, bed="paper")
     key("HOME", middle())
     yield None
 
 
 def scene_with_bed(**chosen: Any) -> Iterator[float | None]:
-    """Have a bed alone in the scene, in full view."""
     yield from empty_scene()
     call(bpy.ops.mesh.digital_clay_add, **chosen)
     bpy.ops.ed.undo_push(message="Add")
@@ -144,23 +131,19 @@ def scene_with_bed(**chosen: Any) -> Iterator[float | None]:
 
 
 def beds() -> list[Any]:
-    """Return the beds of the scene shown."""
     return [thing for thing in window().scene.objects if part("roles").is_bed(thing)]
 
 
 def fingertip(number: int = 0) -> Any:
-    """Return the fingertip of a bed."""
     return part("roles").fingertip_of(beds()[number])
 
 
 def sessions() -> list[Any]:
-    """Return the sessions that run."""
     running: list[Any] = part("sessions.running").list_sessions()
     return running
 
 
 def stopped() -> Iterator[float | None]:
-    """Wait until no session runs."""
     yield from until(lambda: not sessions())
 
 
@@ -206,7 +189,6 @@ def unfolded(name: str, root: str, *sections: str) -> Iterator[str]:
 
 
 def select(thing: Any) -> None:
-    """Select one object alone, as one undo step."""
     call(bpy.ops.object.select_all, action="DESELECT")
     thing.select_set(True)
     window().view_layer.objects.active = thing
@@ -246,7 +228,6 @@ def grab(
 
 
 def start(thing: Any = None) -> Iterator[float | None]:
-    """Start a session on the active bed, or on that of a thing, which is selected."""
     if thing is not None:
         select(thing)
     call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
@@ -262,7 +243,6 @@ def after(name: str, *keys: str, **modifiers: bool) -> Iterator[float | None]:
 
 
 def undo(name: str, redo: bool = False) -> Iterator[float | None]:
-    """Undo, or redo, by its key; look."""
     yield from after(name, "Z", ctrl=True, shift=redo)
 
 
@@ -282,7 +262,6 @@ def rounds(count: int = 3) -> Iterator[float | None]:
 
 
 def settle(ticks: int = 3) -> Iterator[float | None]:
-    """Wait until the sessions have ticked some times, and so taken up whatever has happened."""
     running = part("sessions.running")
     start = max((session.tick for session in running.list_sessions()), default=0)
     for _ in range(100):
@@ -333,7 +312,6 @@ def look(name: str) -> None:
 
 
 def shot(name: str) -> None:
-    """Leave a picture of the screen, and note how many colors it has."""
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
     # Blender's own screenshot reads a buffer that software GL leaves black.
     file = OUT / f"{name}.png"
@@ -346,7 +324,6 @@ def shot(name: str) -> None:
 
 
 def hand_over() -> None:
-    """Write down what was seen."""
     (OUT / "seen.json").write_text(json.dumps(SEEN))
 
 
@@ -358,7 +335,6 @@ def finish() -> None:
 
 
 def main() -> None:
-    """Enable the extension under the name Blender gives it, and play the script."""
     faulthandler.enable()  # Blender that crashes says at which line of Python it did
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.smooth_view = 0  # the mouse is sent by where things are seen

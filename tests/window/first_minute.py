@@ -1,7 +1,5 @@
 """Follows the first page of the guide by real events, step by step, and takes its pictures."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterator
@@ -23,27 +21,23 @@ HALF = 24.0
 
 
 def in_the_sidebar(blender: Any, place: tuple[int, int]) -> tuple[int, int]:
-    """Return where a place in the sidebar is on the screen."""
     area, _ = blender.view()
     bar = next(region for region in area.regions if region.type == "UI")
     return bar.x + bar.width + place[0], blender.window().height - (bar.y + bar.height) + place[1]
 
 
 def middle(blender: Any) -> tuple[int, int]:
-    """Return the middle of the 3D view on the screen."""
     x, y = blender.middle()
     return x, blender.window().height - 1 - y
 
 
 def done(blender: Any, *words: str) -> Iterator[float | None]:
-    """Have a hand do something, and wait until Blender has drawn it."""
     process = hand(*words)
     yield from blender.until(lambda: process.poll() is not None)
     yield 1.0
 
 
 def add(blender: Any) -> Iterator[float | None]:
-    """Add a bed from the menu, by typing the beginning of its name."""
     typed = " ".join(f"key {letter} sleep 0.05" for letter in "dig")
     yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")
     blender.SEEN["added"] = len(blender.beds())
@@ -53,7 +47,6 @@ def add(blender: Any) -> Iterator[float | None]:
 
 
 def open_tab(blender: Any) -> Iterator[float | None]:
-    """Open the sidebar at its tab."""
     yield from done(blender, "key n")
     yield from done(blender, to(in_the_sidebar(blender, TAB)), "click 1")
     bar = next(region for region in blender.view()[0].regions if region.type == "UI")
@@ -61,7 +54,6 @@ def open_tab(blender: Any) -> Iterator[float | None]:
 
 
 def start(blender: Any) -> Iterator[float | None]:
-    """Press the panel's first button."""
     yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
     blender.SEEN["started"] = len(blender.sessions())
     blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
@@ -79,7 +71,6 @@ def draw(blender: Any) -> Iterator[float | None]:
 
 
 def stop(blender: Any) -> Iterator[float | None]:
-    """End the session."""
     yield from done(blender, "key Escape")
     blender.SEEN["left"] = len(blender.sessions())
 
@@ -130,7 +121,6 @@ def point(blender: Any) -> Iterator[float | None]:
 
 
 def ball(blender: Any) -> Iterator[float | None]:
-    """Click on the ball with a selecting tool, and move it with G."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
     tip = blender.fingertip()
     before = list(tip.matrix_world.translation)

@@ -1,7 +1,5 @@
 """Raises, levels and smooths clay with the Press tool as a hand does: X events from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -30,12 +28,10 @@ SPIKE, SPIKES = 12e-3, ((0.0, 0.0), (0.0, 18.0))
 
 
 def find_session(blender: Any) -> Any:
-    """Return the session of the bed."""
     return blender.part("sessions.running").find(blender.beds()[0])
 
 
 def put_spikes(blender: Any) -> None:
-    """Let single pins of the session's bed stand out."""
     session = find_session(blender)
     system = session.system
     state = blender.part("core.engine.simulation").begin(system)
@@ -53,7 +49,6 @@ def put_spikes(blender: Any) -> None:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do both on the same bed."""
     yield from prepare(blender)
     yield from raise_and_level(blender)
     yield from reset(blender)

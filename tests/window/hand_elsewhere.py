@@ -1,7 +1,5 @@
 """Draws while a 3D mouse turns the view, in a quad view and a second window; leaves sculpt mode."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterator
 from typing import Any
@@ -34,7 +32,6 @@ TURN = (0, 0, 0, 0, 15, 0)
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what a hand does."""
     yield from prepare(blender)
     yield from turned(blender)
     yield from reset(blender)
@@ -45,18 +42,15 @@ def script(blender: Any) -> Iterator[float | None]:
 
 
 def held_stroke(blender: Any) -> Any:
-    """Return the stroke that the hand draws."""
     (session,) = blender.sessions()
     return session.strokes[-1] if session.strokes and session.strokes[-1].held else None
 
 
 def followed(blender: Any) -> Iterator[float | None]:
-    """Wait until the fingertip follows the stroke that is held."""
     yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
 
 
 def let_go(blender: Any, name: str) -> Iterator[float | None]:
-    """Note the path of the stroke that is held once the fingertip follows it, and let go."""
     yield from followed(blender)
     path = [[1e3 * sample.x, 1e3 * sample.y] for sample in held_stroke(blender).samples]
     yield from act(blender, "mouseup 1")
@@ -65,7 +59,6 @@ def let_go(blender: Any, name: str) -> Iterator[float | None]:
 
 
 def turned(blender: Any) -> Iterator[float | None]:
-    """Turn the view by the 3D mouse while the hand draws, then turn the wheels, and draw on."""
     looking = blender.view()[0].spaces.active.region_3d
     start, end = ends(blender)
     before, distance = np.array(looking.view_rotation), looking.view_distance
@@ -94,7 +87,6 @@ def turned(blender: Any) -> Iterator[float | None]:
 
 
 def quarter(blender: Any) -> Iterator[float | None]:
-    """Draw in the top view of a quad view."""
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter(blender) is not None)
     yield from draw_in(blender, "quarter", blender.window(), top_quarter(blender), (0, 0))
@@ -112,7 +104,6 @@ def draw_in(blender: Any, name: str, window: Any, region: Any, corner: Pixel) ->
 
 
 def windows_on_screen() -> dict[str, dict[str, int]]:
-    """Return place and size of Blender's windows on the screen, by their number."""
 
     def told(*words: str) -> list[str]:
         return subprocess.run(["xdotool", *words], check=True, capture_output=True, text=True).stdout.split()
@@ -125,7 +116,6 @@ def windows_on_screen() -> dict[str, dict[str, int]]:
 
 
 def second_window(blender: Any) -> Iterator[float | None]:
-    """Draw in a second window, while the first one drives the session."""
     first = set(windows_on_screen())
     bpy.ops.wm.window_new()
     yield from blender.until(lambda: len(windows_on_screen()) > len(first))
@@ -147,7 +137,6 @@ def second_window(blender: Any) -> Iterator[float | None]:
 
 
 def sculpting(blender: Any) -> Iterator[float | None]:
-    """Leave Blender's sculpt mode by one click into the header, and draw."""
     blender.select(blender.beds()[0])
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Sculpting"]

@@ -1,7 +1,5 @@
 """Draws faster than strokes are formed, from outside Blender: a queue, its end at once, Esc, undo, load."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -33,12 +31,10 @@ LOADS = {"alone": (30, 0.0), "few redraws": (4, 0.0), "a load": (30, 0.15)}
 
 
 def session(blender: Any) -> Any:
-    """Return the session of the only bed."""
     return blender.part("sessions.running").find(blender.beds()[0])
 
 
 def draw(blender: Any, *paths: tuple[tuple[float, float], ...]) -> Any:
-    """Start a hand that draws paths one after the other, without a pause."""
     words = []
     for path in paths:
         places = [on_the_screen(blender, *place) for place in path]
@@ -49,12 +45,10 @@ def draw(blender: Any, *paths: tuple[tuple[float, float], ...]) -> Any:
 
 
 def drawn(blender: Any, *paths: Any) -> Iterator[float | None]:
-    """Draw paths, and wait until the hand is done."""
     yield from done(blender, draw(blender, *paths))
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what an impatient hand does."""
     yield from prepare(blender, "TOP", bed="paper")
     yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "click 1")  # the session begins
     yield from reset(blender)
@@ -111,7 +105,6 @@ def haste(blender: Any) -> Iterator[float | None]:
 
 
 def taken_back(blender: Any) -> Iterator[float | None]:
-    """Take back the last stroke in the midst of the queue."""
     process = hand("sleep 0.01")
     yield from drawn(blender, *LINES)
     yield from act(blender, "key Escape")
@@ -121,7 +114,6 @@ def taken_back(blender: Any) -> Iterator[float | None]:
 
 
 def under_load(blender: Any, name: str, rate: int, load: float) -> Iterator[float | None]:
-    """Draw the same path while Blender redraws at a rate, and something else keeps it busy."""
     preferences = blender.preferences()
     preferences.redraw_rate = rate
 

@@ -1,7 +1,5 @@
 """Draws with the Press tool as a hand does: X events from outside Blender, in continuous motion."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +29,6 @@ def on_the_screen(blender: Any, x: float, y: float) -> Pixel:
 
 
 def hand(*words: str) -> subprocess.Popen[bytes]:
-    """Start a hand that carries out words of xdotool, whatever Blender is about."""
     return subprocess.Popen(["xdotool", *" ".join(words).split()])
 
 
@@ -41,7 +38,6 @@ def to(at: Pixel, pause: float = 0.05) -> str:
 
 
 def drag(start: Pixel, end: Pixel, duration: float, rate: float) -> str:
-    """Return what moves the hand evenly from pixel to pixel."""
     count = max(2, round(duration * rate))
     way = np.linspace(start, end, count + 1)[1:].round().astype(int)
     return " ".join(to((int(x), int(y)), duration / count) for x, y in way)
@@ -58,7 +54,6 @@ def line(
 
 
 def done(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
-    """Wait until the hand is done, and Blender has worked off what it has sent."""
     yield from blender.until(lambda: process.poll() is not None)
     yield from blender.rounds()
 
@@ -77,7 +72,6 @@ def rest(blender: Any) -> Iterator[float | None]:
 
 
 def act(blender: Any, *words: str) -> Iterator[float | None]:
-    """Let the hand do something, and finish it."""
     yield from finish(blender, hand(*words))
 
 
@@ -107,19 +101,16 @@ def note(blender: Any, name: str) -> None:
 
 
 def ends(blender: Any, y: float = 0.0) -> tuple[Pixel, Pixel]:
-    """Return the ends of a stroke along a row."""
     return on_the_screen(blender, -HALF, y), on_the_screen(blender, HALF, y)
 
 
 def reset(blender: Any) -> Iterator[float | None]:
-    """Bring the bed back to rest."""
     if blender.call(bpy.ops.digiclay.session_reset.poll):
         blender.call(bpy.ops.digiclay.session_reset)
     yield from blender.settle()
 
 
 def add_bed(blender: Any, **chosen: Any) -> None:
-    """Have a bed alone in the scene, in full view."""
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
     blender.call(bpy.ops.mesh.digital_clay_add, **chosen)
@@ -133,7 +124,6 @@ def catch_up(blender: Any) -> None:
 
 
 def take_tool(blender: Any) -> None:
-    """Take the Press tool in hand, with nothing selected."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     blender.call(bpy.ops.object.select_all, action="DESELECT")
 
@@ -146,7 +136,6 @@ def focus_window() -> Iterator[float | None]:
 
 
 def prepare(blender: Any, view: str = "", **chosen: Any) -> Iterator[float | None]:
-    """Have a bed alone in the scene, seen from a side, and the Press tool in hand."""
     add_bed(blender, **chosen)
     if view:
         blender.call(bpy.ops.view3d.view_axis, type=view)
@@ -155,12 +144,10 @@ def prepare(blender: Any, view: str = "", **chosen: Any) -> Iterator[float | Non
 
 
 def brush(blender: Any) -> Any:
-    """Return the settings of the Press tool."""
     return blender.part("press.brush").tool_settings(bpy.context)
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what a hand does."""
     yield from prepare(blender)
     for duration, rate in STROKES:
         how, picture = (duration, rate), f"hand_{duration:g}"
@@ -200,7 +187,6 @@ def taps(blender: Any) -> Iterator[float | None]:
 
 
 def navigation(blender: Any) -> Iterator[float | None]:
-    """Turn the view and zoom in the middle of a stroke, and draw on."""
     start, end = ends(blender)
     middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
     note(blender, "before orbit")
@@ -239,7 +225,6 @@ def pie_menu(blender: Any) -> Iterator[float | None]:
 
 
 def taken_back(blender: Any) -> Iterator[float | None]:
-    """Take a stroke back that the fingertip has not finished, by Ctrl-Z and by Esc."""
     for name, key in (("undone", "ctrl+z"), ("escaped", "Escape")):
         process = line(blender, (-HALF, 0.0), (HALF, 0.0), last="sleep 2")
         yield from blender.until(lambda: any(s.strokes and s.strokes[0].reached for s in blender.sessions()))
@@ -250,7 +235,6 @@ def taken_back(blender: Any) -> Iterator[float | None]:
 
 
 def follow(blender: Any, recorded_stroke: Any) -> str:
-    """Return what moves the hand as the pointer moved, with the button held down."""
     start, *moves = recorded_stroke.moves
     words, before = [to(on_the_screen(blender, 1e3 * start[1], 1e3 * start[2])), "mousedown 1"], 0.0
     for time, x, y in moves:
@@ -284,7 +268,6 @@ def things(blender: Any) -> Iterator[float | None]:
 
 
 def choose(blender: Any, stroke: Any) -> None:
-    """Set the header of the tool for a recorded stroke."""
     settings = brush(blender)
     settings.brush, settings.strength = stroke.kind.value, stroke.strength
     settings.path, settings.symmetry = stroke.path.upper(), stroke.symmetry.upper()

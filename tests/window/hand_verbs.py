@@ -1,7 +1,5 @@
 """Erases, locks and stamps with the Press tool, about a placed center: X events from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -30,7 +28,6 @@ LONG, CENTER = 21.0, (6.0, -3.0)
 
 
 def keep(blender: Any, name: str) -> None:
-    """Write down heights and locked pins, and take a picture."""
     note(blender, name)
     session = blender.part("sessions.running").find(blender.beds()[0])
     locked = blender.part("core.base.modes").Mode.LOCKED
@@ -39,7 +36,6 @@ def keep(blender: Any, name: str) -> None:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do all of it on one bed."""
     yield from prepare(blender)
     settings = brush(blender)
     yield from stroke(blender, "groove", (-LONG, 0.0), (LONG, 0.0), *HOW)

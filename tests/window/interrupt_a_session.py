@@ -1,7 +1,5 @@
 """Deletes, edits and switches what a session needs while it runs; disables the extension; loads a file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,7 +8,6 @@ import bpy
 
 
 def press(blender: Any) -> Iterator[float | None]:
-    """Form a hollow, as one undo step that ends with the fingertip lifted."""
     tip = blender.fingertip()
     for z in (46.0, 43.0, 40.0, 38.0, 37.0, 37.0, 40.0, 46.0):
         tip.location.z = (z + 8.0) * 1e-3 * blender.part("bridge").SCALE
@@ -42,7 +39,6 @@ def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do to a session what can be done to it."""
     after = blender.after
     yield from blender.scene_with_bed()
     yield from blender.open_sidebar()

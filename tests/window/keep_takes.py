@@ -1,7 +1,5 @@
 """Records takes, keeps, exports, replays, bakes and plays them; leaves files in mid-recording."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator
@@ -65,7 +63,6 @@ def to_height(blender: Any, height: float, steps: int, periods: int = 0) -> Iter
 
 
 def ridge(blender: Any) -> Iterator[float | None]:
-    """Press, lift slowly, and draw a ridge along."""
     yield from blender.grab((-16, 0, 0), "X", steps=2)
     yield from to_height(blender, 35.0, steps=4)
     # Lifted while its pins still sink, a fingertip is lost.
@@ -83,7 +80,6 @@ def ridge(blender: Any) -> Iterator[float | None]:
 
 
 def autosave() -> Path:
-    """Return the file Blender saves by itself."""
     return Path(bpy.app.tempdir).parent / f"{os.getpid()}_autosave.blend"
 
 
@@ -157,12 +153,10 @@ def baked(blender: Any) -> Iterator[float | None]:
 
 
 def fingertip(blender: Any) -> float:
-    """Return how high the fingertip's object is."""
     return float(blender.fingertip().matrix_world.translation.z)
 
 
 def note(blender: Any, name: str) -> None:
-    """Write down what stands in the scene, and what there is to tell of takes."""
     blender.look(name)
     bed = blender.beds()[0]
     blender.SEEN[name] |= {
@@ -211,5 +205,4 @@ def recording(blender: Any) -> Iterator[float | None]:
 
 
 def names(blender: Any) -> list[str]:
-    """Return the names of the bed's takes."""
     return [entry.name for entry in blender.part("recorded.takes").list_takes(blender.beds()[0])]

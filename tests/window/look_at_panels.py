@@ -1,7 +1,5 @@
 """Played by `driver`: opens the tab with every panel unfolded, looks at each, and exports a form."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -76,7 +74,6 @@ def own_methods(blender: Any) -> Iterator[float | None]:
 
 
 def refused(blender: Any) -> str:
-    """Return what Rebuild says of settings that do not go together."""
     try:
         blender.call(bpy.ops.digiclay.rebuild)
     except RuntimeError as error:
@@ -137,7 +134,6 @@ def browser(blender: Any) -> Iterator[float | None]:
 
 
 def form(blender: Any, bed: Any) -> None:
-    """Show a ridge and a pit on the pins of a bed."""
     instant = blender.part("device.instant").Instant
     cells = blender.part("bridge").read_cells(bed.data)
     x, y = cells["position"].T * 1e3

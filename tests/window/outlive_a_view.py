@@ -1,7 +1,5 @@
 """Picks pins in another workspace, presses Esc while a session steps aside, copies and deletes beds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,12 +7,10 @@ import bpy
 
 
 def modal() -> list[str]:
-    """Return the modal operators of the window."""
     return [one.bl_idname for one in bpy.context.window_manager.windows[0].modal_operators]
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do all three."""
     yield from blender.scene_with_bed(rows=9, columns=9)
     yield from pick(blender)
     yield from escape(blender)
@@ -90,7 +86,6 @@ def looked(blender: Any, name: str) -> Iterator[float | None]:
 
 
 def pressed(blender: Any, name: str, kind: str, **held: bool) -> Iterator[float | None]:
-    """Press a key over the 3D view, and count what there is then."""
     blender.key(kind, blender.middle(), **held)
     yield from looked(blender, name)
 

@@ -1,7 +1,5 @@
 """Drives a session by playback and by the gizmo, from second windows, during a render, in other views."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -14,7 +12,6 @@ ARROW = 65
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do one after the other, each on a bed that is at rest."""
     yield from blender.scene_with_bed()
     yield from gizmo(blender)
     yield from playback(blender)
@@ -24,7 +21,6 @@ def script(blender: Any) -> Iterator[float | None]:
 
 
 def gizmo(blender: Any) -> Iterator[float | None]:
-    """Press the bed by dragging the gizmo's blue arrow."""
     yield from blender.start(blender.beds()[0])
     blender.select(blender.fingertip())
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.move")
@@ -82,7 +78,6 @@ def playback(blender: Any) -> Iterator[float | None]:
 
 
 def lowest(blender: Any) -> float:
-    """Return the lowest pin drawn, mm."""
     return float(blender.heights().min())
 
 
@@ -113,7 +108,6 @@ def windows(blender: Any) -> Iterator[float | None]:
 
 
 def closed(blender: Any, name: str, then: Callable[[], bool] = lambda: True) -> Iterator[float | None]:
-    """Close the last window, and wait until what is to follow has come."""
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
         bpy.ops.wm.window_close()
     yield 1.5
@@ -123,7 +117,6 @@ def closed(blender: Any, name: str, then: Callable[[], bool] = lambda: True) -> 
 
 
 def render(blender: Any) -> Iterator[float | None]:
-    """Render a picture in mid-session."""
     scene = blender.window().scene
     scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(scene.camera)
@@ -191,7 +184,6 @@ def top_quarter(blender: Any) -> Any:
 
 @contextmanager
 def drawn(blender: Any) -> Iterator[dict[int, bool]]:
-    """Write down of every region in which the overlay marks pins whether it writes words too."""
     module = blender.part("overlay.draw")
     draw, seen = module.draw, {}
 
@@ -209,7 +201,6 @@ def drawn(blender: Any) -> Iterator[dict[int, bool]]:
 
 
 def tapped(blender: Any, at: tuple[int, int], name: str) -> Iterator[float | None]:
-    """Press at a pixel, and write down where the fingertip went down."""
     blender.event("MOUSEMOVE", "NOTHING", at)
     yield 0.3
     blender.event("LEFTMOUSE", "PRESS", at)
@@ -222,12 +213,10 @@ def tapped(blender: Any, at: tuple[int, int], name: str) -> Iterator[float | Non
 
 
 def held(blender: Any) -> bool:
-    """Tell whether a gesture of the Press tool is under way."""
     return "DIGICLAY_OT_press" in [operator.bl_idname for operator in blender.window().modal_operators]
 
 
 def at_rest(blender: Any) -> None:
-    """Bring the bed back to rest, the fingertip above it."""
     blender.select(blender.beds()[0])
     blender.call(bpy.ops.digiclay.session_reset)
     blender.fingertip().location = 0.0, 0.0, 0.54

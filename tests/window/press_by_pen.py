@@ -1,7 +1,5 @@
 """Draws with a pen that has pressure and tilt: upright, with half the pressure, and leaning to the right."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -24,7 +22,6 @@ HALF = 12.0
 
 
 def draw(blender: Any, row: float, pressure: float, right: float, near: float) -> subprocess.Popen[bytes]:
-    """Start a pen that draws along a row of the bed for a second."""
     places = (on_the_screen(blender, float(x), row) for x in np.linspace(-HALF, HALF, 31))
     (x, y), *later = places
     words = [f"to {x} {y} 0 {right} {near}", "sleep 0.1", f"to {x} {y} {pressure} {right} {near}", "down"]
@@ -44,7 +41,6 @@ def pressed(blender: Any, since: int) -> dict[str, Any]:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Draw the strokes while a take is recorded."""
     yield from prepare(blender, "TOP")
     yield from blender.start()
     blender.call(bpy.ops.digiclay.take_record)

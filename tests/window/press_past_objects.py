@@ -1,7 +1,5 @@
 """Clicks and drags with the Press tool on a bed with a cube in front of it, in all kinds of views."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -18,7 +16,6 @@ DISTANCE = 0.25
 
 
 def put(blender: Any) -> None:
-    """Put the cube between the eye of the view and the covered place."""
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)  # a view that has changed knows so when drawn
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
@@ -45,7 +42,6 @@ def try_both(blender: Any, name: str) -> Iterator[float | None]:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what a user does."""
     yield from prepare(blender)
     area, _ = blender.view()
     space = area.spaces.active
@@ -75,7 +71,6 @@ def script(blender: Any) -> Iterator[float | None]:
 
 
 def prepare(blender: Any) -> Iterator[float | None]:
-    """Have a bed with a session and a cube, and the Press tool in hand."""
     add_bed(blender)
     blender.call(bpy.ops.mesh.primitive_cube_add, size=0.12)
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
@@ -86,7 +81,6 @@ def prepare(blender: Any) -> Iterator[float | None]:
 
 
 def drawn_under(blender: Any) -> Iterator[float | None]:
-    """Press beside the cube and drag on behind it."""
     put(blender)
     yield 0.5
     yield from finish(blender, line(blender, (-24.0, COVERED[1]), (24.0, COVERED[1])))
@@ -116,7 +110,6 @@ def quarters(blender: Any) -> Iterator[float | None]:
 
 
 def read_reports(blender: Any) -> str:
-    """Return all that Blender has reported."""
     area = next(area for area in blender.window().screen.areas if area.type == "PROPERTIES")
     area.type = "INFO"
     with bpy.context.temp_override(window=blender.window(), area=area, region=area.regions[-1]):

@@ -1,7 +1,5 @@
 """Sets sizes with F, draws symmetric strokes, lines and rings, by X events from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -32,7 +30,6 @@ WIDER = 4.0
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what a hand does."""
     yield from prepare(blender, "TOP")
     blender.call(bpy.ops.view3d.view_all)
     # The first press starts the session.
@@ -69,12 +66,10 @@ def done(blender: Any, *words: str, name: str = "") -> Iterator[float | None]:
 
 
 def keys(names: str) -> str:
-    """Return what types keys, one after the other."""
     return " ".join(f"key {name} sleep 0.15" for name in names.split())
 
 
 def sizes(blender: Any) -> Iterator[float | None]:
-    """Use F, Shift F, Ctrl F, the brackets, Esc and Ctrl-Z."""
     start, end = on_the_screen(blender, 0.0, 0.0), on_the_screen(blender, WIDER, 0.0)
     write_down(blender, "begun")
     yield from done(blender, to(start), keys("f"), drag(start, end, 0.4, 60))
@@ -95,7 +90,6 @@ def sizes(blender: Any) -> Iterator[float | None]:
 
 
 def symmetric(blender: Any) -> Iterator[float | None]:
-    """Draw a stroke in one quarter of the bed, with both symmetries."""
     brush(blender).symmetry = "XY"
     yield from stroke(blender, "symmetric", *MIRRORED, 0.8, picture="symmetric")
     yield from act(blender, keys("ctrl+z"))

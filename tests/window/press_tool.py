@@ -1,7 +1,5 @@
 """Draws a valley with the Press tool, undoes, taps, changes the depth; turns what is shown on and off."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from typing import Any
@@ -48,7 +46,6 @@ def come(blender: Any) -> Iterator[float | None]:
 
 
 def let_go(blender: Any, x: float, y: float) -> Iterator[float | None]:
-    """Let the mouse button go, and wait until the finger is off the bed."""
     blender.event("LEFTMOUSE", "RELEASE", blender.on_the_bed(x, y))
     yield from come(blender)
 
@@ -67,7 +64,6 @@ def note(blender: Any, name: str) -> None:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what a user does; every yield lets Blender work off the events."""
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     # Software GL draws a frame or two a second; in between the session is to catch up.
@@ -100,7 +96,6 @@ def script(blender: Any) -> Iterator[float | None]:
 
 
 def depths(blender: Any) -> Iterator[float | None]:
-    """Change the depth by the wheel, draw on with Ctrl held, and take a gesture back with Esc."""
     yield from drag(blender, [(-20.0, -20.0)])
     note(blender, "before the wheel")
     at = blender.on_the_bed(-20, -20)
@@ -141,7 +136,6 @@ def disabled(blender: Any) -> Iterator[float | None]:
 
 
 def shown(blender: Any) -> Iterator[float | None]:
-    """Pick pins, color by force, show arrows, in the light theme and at another scale."""
     blender.window().view_layer.objects.active = blender.beds()[0]
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None

@@ -1,7 +1,5 @@
 """Random events at a running session: moves, undos, mode switches, deletes, and all keys."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator
 from typing import Any
@@ -27,20 +25,16 @@ KEYS: dict[str, tuple[str, dict[str, bool]]] = {
 
 
 class Events:
-    """The events: a key, or a method that does one thing a user can do."""
-
     def __init__(self, blender: Any, source: random.Random) -> None:
         self.blender, self.source = blender, source
 
     @property
     def tip(self) -> Any:
-        """Some fingertip, or None."""
         found = [self.blender.fingertip(number) for number in range(len(self.blender.beds()))]
         tips = [tip for tip in found if tip is not None]
         return self.source.choice(tips) if tips else None
 
     def happen(self, name: str) -> None:
-        """Press the key of an event, or do what it is."""
         if name in KEYS:
             kind, modifiers = KEYS[name]
             self.blender.key(kind, self.somewhere(), **modifiers)
@@ -48,7 +42,6 @@ class Events:
             getattr(self, name)()
 
     def somewhere(self) -> tuple[int, int]:
-        """Return a place in the 3D view."""
         _, region = self.blender.view()
         pick = self.source.random
         x = region.x + int(region.width * (0.2 + 0.5 * pick()))
@@ -81,7 +74,6 @@ class Events:
             self.operator(bpy.ops.mesh.digital_clay_add, rows=11, columns=11)
 
     def operator(self, operator: Any, *how: str, **properties: Any) -> None:
-        """Call an operator if it is willing."""
         area, region = self.blender.view()
         with bpy.context.temp_override(window=self.blender.window(), area=area, region=region):
             willing = operator.poll()
@@ -94,7 +86,6 @@ class Events:
                     raise
 
     def start(self) -> None:
-        """Start a session, on a bed that is selected for it where that can be done."""
         beds = self.blender.beds()
         if beds and bpy.context.mode == "OBJECT":
             self.blender.select(self.source.choice(beds))
@@ -150,7 +141,6 @@ class Events:
 
 
 def check(blender: Any) -> None:
-    """Check that every session is a state that can be kept, and every bed shows finite pins."""
     for session in blender.sessions():
         state = blender.part("core.session.snapshot").load(session.system, session.snapshot)
         height = state.row(0)

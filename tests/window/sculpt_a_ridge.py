@@ -1,7 +1,5 @@
 """Starts a session, forms a valley with G, undoes, redoes, pauses, rewinds, saves and loads, stops."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,7 +7,6 @@ import bpy
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what a user does; every yield lets Blender work off the events."""
     after, undo = blender.after, blender.undo
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()

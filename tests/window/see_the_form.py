@@ -1,7 +1,5 @@
 """Looks at a bed as a designer does: pins and skin, from near and far, at rest and pressed by a hand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,7 +17,6 @@ def count_orange(name: str, blender: Any) -> int:
 
 
 def read_shot(name: str, blender: Any) -> np.ndarray:
-    """Return the 3D view in a picture, rows from below by columns by sRGB."""
     _, region = blender.view()
     image = bpy.data.images.load(str(blender.OUT / f"{name}.png"))
     width, height = image.size
@@ -83,7 +80,6 @@ def draw_lines(blender: Any, count: int, depth: float) -> None:
 
 
 def lines_at(count: int) -> np.ndarray:
-    """Return where lines run, mm."""
     return 12.0 * (np.arange(count) - (count - 1) / 2)
 
 
@@ -108,7 +104,6 @@ def rectangle_of_the_bed(blender: Any) -> list[float]:
 
 
 def note(blender: Any, name: str) -> None:
-    """Write down what is shown, and take a picture."""
     form, bed = blender.part("device.view"), blender.beds()[0]
     blender.shot(name)
     blender.SEEN[name] = {
@@ -122,7 +117,6 @@ def note(blender: Any, name: str) -> None:
 
 
 def watch_overlay(blender: Any) -> None:
-    """Write down the box of the overlay, and the text at the cursor, whenever they are drawn."""
     module = blender.part("overlay.draw")
     draw = module.draw
 
@@ -138,7 +132,6 @@ def watch_overlay(blender: Any) -> None:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Look."""
     yield from see_at_once(blender)
     add_bed(blender)
     watch_overlay(blender)
@@ -175,7 +168,6 @@ def script(blender: Any) -> Iterator[float | None]:
 
 
 def levels_of_detail(blender: Any) -> Iterator[float | None]:
-    """Look at the bed from farther and farther away, and come back."""
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
     distance = looking.view_distance

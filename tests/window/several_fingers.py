@@ -1,7 +1,5 @@
 """Played by `driver`: forms with two fingertips, and with a hand, which come and go during a session."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,7 +10,6 @@ FINE_PINS = True
 
 
 def note(blender: Any, name: str) -> None:
-    """Write down the fingertips of the session, their forces, and who is selected."""
     session, roles = blender.sessions()[0], blender.part("roles")
     bed = blender.beds()[0]
     blender.SEEN[name] = {

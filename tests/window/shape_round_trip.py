@@ -1,7 +1,5 @@
 """Displays a sample shape and an object, presses the finger into it live, and keeps what was formed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,7 +7,6 @@ import bpy
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what a user does; every yield lets Blender work off the events."""
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     yield from blender.open_sidebar()

@@ -5,8 +5,6 @@ and asks first for a version of the protocol. Each motion is then 8 integers: 0,
 and to the user, turns about these axes, and the time since the one before, ms.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import struct
@@ -27,7 +25,6 @@ MOTION, HAND = struct.Struct("8i"), struct.pack("i", 1)
 
 @contextmanager
 def driver(folder: Path, blender: str) -> Iterator[str]:
-    """Run the stand-in; yield the path of its socket."""
     path, mark = str(folder / "space_mouse"), folder / "made"
     # Where a true driver runs, the file is there already, and stays.
     files = (USUAL, str(mark))
@@ -40,13 +37,11 @@ def driver(folder: Path, blender: str) -> Iterator[str]:
 
 
 def _run(blender: str, words: str) -> None:
-    """Run a line of Python in a Blender without a window."""
     options = "--background --factory-startup --python-exit-code 3 --python-expr"
     subprocess.run([blender, *options.split(), words], check=True, timeout=300, capture_output=True)
 
 
 def _listen(path: str) -> Iterator[str]:
-    """Listen at a path, and yield it."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(path)
         listener.listen()

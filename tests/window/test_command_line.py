@@ -1,7 +1,5 @@
 """``blender --command digiclay`` in a real Blender that has the extension's zip installed."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -47,7 +45,6 @@ def command(execute: Command, tmp_path_factory: pytest.TempPathFactory) -> Comma
 
 @pytest.fixture(scope="module")
 def run(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run made through Blender, its name with a blank and an umlaut."""
     out = tmp_path_factory.mktemp("runs") / "a täp"
     command("run", "tap", "--out", str(out))
     return out

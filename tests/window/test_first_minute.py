@@ -1,7 +1,5 @@
 """The guide's first page, followed by a hand: real events from outside Blender."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

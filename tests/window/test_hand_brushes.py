@@ -1,7 +1,5 @@
 """A quick drag raises all along its way, Shift smooths or forms a line: X events from outside."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Strokes by a hand while a 3D mouse turns the view, in a quad view and a second window; the way back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """An impatient hand: its strokes do not wait for the clock, are finished at once, and taken back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,6 @@ MIDDLE = slice(6, 19)
 
 
 def formed(seen: Seen, name: str) -> list[bool]:
-    """Return which of the lines are formed in a step."""
     return [bool((np.abs(down(seen, name)[row, MIDDLE]) > FORMED).all()) for row in ROWS]
 
 

@@ -1,7 +1,5 @@
 """What a hand draws with the Press tool is formed whole: X events from outside, without a pause."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.model.layout import Layout, make_grid

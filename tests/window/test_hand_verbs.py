@@ -1,7 +1,5 @@
 """A hand erases, locks and stamps, about a placed center; each is one undo step: X events from outside."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -19,7 +17,6 @@ def up(seen: Seen, name: str) -> np.ndarray:
 
 
 def locked(seen: Seen, name: str) -> np.ndarray:
-    """Return which pins are locked, rows by columns."""
     return np.array(seen[name]["locked"]).reshape(25, 25)
 
 

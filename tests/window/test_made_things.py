@@ -1,7 +1,5 @@
 """Things made by recorded strokes of the Press tool are what was intended, even, alike, and soon formed."""
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks.alike import list_differences, list_reliefs

@@ -1,7 +1,5 @@
 """What outlives the view or the moment it was begun in, and beds that are whole, in a real Blender window."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.window.blender_window import Seen

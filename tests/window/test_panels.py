@@ -1,7 +1,5 @@
 """Panels in a real Blender window: all unfolded, with a control method of one's own, and an export."""
 
-from __future__ import annotations
-
 import zipfile
 
 from tests.window.blender_window import Seen

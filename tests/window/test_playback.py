@@ -1,7 +1,5 @@
 """A live session driven by gizmo and playback, in second windows, during a render, and in other views."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A pen of the window system presses and leans as it is held: X events of a virtual tablet."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, make_matrices
@@ -15,7 +13,6 @@ pytestmark = pytest.mark.skipif(not ON_DISPLAY, reason="a screen with a pen need
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> Seen:
-    """Play the script once on a screen with a pen."""
     with pen_screen(tmp_path_factory.mktemp("screen")) as display:
         out = tmp_path_factory.mktemp("pen")
         return played("press_by_pen.py", out, size=(800, 560), by_hand=True, display=display)

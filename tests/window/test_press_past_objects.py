@@ -1,7 +1,5 @@
 """A click on an object in front of a bed is for that object; pins that are seen are pressed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Sizes by F, symmetric strokes, lines and rings, drawn by a hand in a real window."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

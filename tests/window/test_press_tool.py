@@ -1,7 +1,5 @@
 """The Press tool, the overlay, heat map and arrows in a real Blender window."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,6 @@ SETTLING = 0.5
 
 
 def finger(seen: Seen, name: str) -> np.ndarray:
-    """Return where the finger is in a step, mm."""
     return np.array(seen[name]["finger"])
 
 

@@ -1,7 +1,5 @@
 """A designer sees the form: a skin that can be pressed, no outline of pins, and nothing before the bed."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.window.blender_window import Seen

@@ -1,7 +1,5 @@
 """A live session in a real Blender window, used by simulated key presses and mouse moves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,6 @@ SETTLING = 0.1e-3
 
 @pytest.fixture(scope="module")
 def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Seen:
-    """What stood in the scene after each thing that was done to a session."""
     return played("interrupt_a_session.py", tmp_path_factory.mktemp("interrupt"), (800, 600))
 
 
@@ -27,7 +24,6 @@ def tried(tmp_path_factory: pytest.TempPathFactory) -> Seen:
 
 
 def lowest(look: dict[str, Any]) -> float:
-    """Return the lowest pin top drawn, m."""
     return float(look["heights"][0])
 
 

@@ -1,7 +1,5 @@
 """Several fingertips in a real Blender window: two, and a hand that is pressed, deleted and had back."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tests.window.blender_window import Seen

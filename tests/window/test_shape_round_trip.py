@@ -1,7 +1,5 @@
 """A shape in, clay, the finger, a shape kept, in a real Blender window."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.window.blender_window import Seen

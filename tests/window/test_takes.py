@@ -1,7 +1,5 @@
 """Takes in a real Blender window: recorded, exported, replayed, baked, played; Blender saves by itself."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tests.window.blender_window import REST, Seen, bed
