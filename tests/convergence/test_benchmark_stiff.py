@@ -30,9 +30,7 @@ def test_every_broken_invariant_is_seen(height: list[float], force: list[float],
     ("error", "estimate", "silent"),
     [(2.0, 0.2, True), (2.0, 1.1, False), (2.0, math.nan, True), (1e-5, math.nan, False)],
 )
-def test_a_run_is_silent_when_it_is_wrong_and_its_estimate_does_not_show_it(
-    error: float, estimate: float, *, silent: bool
-) -> None:
+def test_a_run_is_silent_when_it_is_wrong_and_its_estimate_does_not_show_it(error, estimate, *, silent):
     assert stiff.Outcome(error * stiff.WRONG, estimate * stiff.WRONG).silent is silent
 
 
@@ -50,12 +48,6 @@ def test_a_divergence_is_shown_by_quantity_value_and_time(monkeypatch: pytest.Mo
     monkeypatch.setattr(stiff, "replayed", diverged)
     outcome = stiff.outcome(EASY, np.zeros((1, 25)), "euler", 1e-3)
     assert outcome.cell == "height nan at 0.25 s"
-
-
-def test_all_steps_play_the_same_commands() -> None:
-    # Each divides the time of a command: the problem does not change with the step.
-    ratios = [stiff.HOLD / stiff.period_of(step) for step in stiff.STEPS]
-    assert ratios == pytest.approx([round(ratio) for ratio in ratios], abs=1e-9)
 
 
 def test_the_reference_agrees_with_another_stepper() -> None:

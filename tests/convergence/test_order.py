@@ -20,7 +20,6 @@ from scipy.integrate import solve_ivp
 from tests.assemble import Motion, one_cell, record, scripted
 
 PERIOD, COUNT = 20e-3, 5
-#: Steppers of a fixed step, by name.
 FIXED = ("bernoulli", "richardson", "euler", "heun", "runge_kutta_4")
 STEPPERS = {name: one_cell(stepper=name).stepper for name in FIXED}
 #: Physics steps of a period, each half of the one before: where the error falls as a power of the step, and

@@ -21,7 +21,6 @@ from benchmarks.stiff import CASES, EASY, HOLD
 SAMPLES = Path(__file__).parents[1] / "samples" / "states"
 #: Numpy calls a period of one step may cost more than the easy case.
 MOST = 8.0
-#: Steppers that may fail, but not silently.
 EXPLICIT = ("euler", "heun", "runge_kutta_4")
 WELL = [name for name, case in CASES.items() if not case.why]
 

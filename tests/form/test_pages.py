@@ -32,7 +32,6 @@ SOURCES = {
     for name in (*PACKAGES, "docs", "tests")
     for path in (ROOT / name).rglob("*.py")
 }
-#: Words that make a heading a sentence or a question.
 SENTENCE = re.compile(
     r"\?|^(what|how|why|where|when|who|which|whether)\b"
     r"|\b(is|are|was|were|has|have|does|do|can|must|costs|brings|comes|goes|stays|knows|says|tells|ends|stands"

@@ -14,7 +14,6 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
 MANIFEST: dict[str, Any] = tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
-#: Longest tagline and reason of a permission.
 LONGEST = 64
 #: Tags that the platform has for add-ons, of those that could ever fit.
 TAGS = {"3D View", "Add Mesh", "Animation", "Import-Export", "Mesh", "Modeling", "Physics", "Sculpt"}
@@ -79,15 +78,12 @@ def test_the_manifest_has_texts_tags_and_a_website_that_the_platform_takes() -> 
     assert MANIFEST["website"] == f"https://extensions.blender.org/add-ons/{MANIFEST['id']}/"
 
 
-def test_every_license_is_one_of_the_platform_and_has_its_text() -> None:
+def test_every_license_has_its_text_and_manifest_package_and_samples_name_the_same() -> None:
     named = [license.removeprefix("SPDX:") for license in MANIFEST["license"]]
     assert named[0] == "GPL-3.0-or-later"
     assert set(named) <= LICENSES
     assert "Creative Commons Legal Code\n\nCC0 1.0 Universal" in (ROOT / "LICENSES/CC0-1.0.txt").read_text()
     assert "GNU GENERAL PUBLIC LICENSE\n                       Version 3" in (ROOT / "LICENSE").read_text()
-
-
-def test_manifest_package_and_samples_name_the_same_licenses() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     # The wheel on a package index has no trimesh in it, the extension has.
     assert project["license"].split(" AND ") == [one.removeprefix("SPDX:") for one in MANIFEST["license"][:2]]

@@ -23,7 +23,6 @@ rate = 10
 """
 
 QUICK = 'scenes = ["tap"]\nerrors = false\nsettings.a.simulation.duration = 0.05\n'
-#: The command beside this Python.
 COMMAND = str(Path(sys.executable).with_name("digiclay"))
 
 

@@ -19,7 +19,6 @@ SLICED = [
     "smooth/crease_1.3mf",
 ]  # fmt: skip
 FORMATS = ("stl", "ascii.stl", "obj", "ply", "glb", "3mf")
-#: What admesh counts that a good file has none of.
 FAULTS = (
     "Facets with 1 disconnected edge", "Facets with 2 disconnected edges", "Facets with 3 disconnected edges",
     "Total disconnected facets", "Degenerate facets", "Edges fixed", "Facets removed", "Facets added",

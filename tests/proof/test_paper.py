@@ -80,16 +80,13 @@ def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_
     assert [mound["rim"], mound["rim_by_pins"]] == pytest.approx([4.5e-3, 6.2e-3], abs=0.1e-3)
 
 
-def test_every_claim_has_numbers_a_verdict_and_a_reason_where_it_does_not_hold(text: str) -> None:
+def test_every_claim_has_numbers_those_of_the_metrics_a_verdict_and_a_reason_if_it_fails(text, numbers):
     rows = claims(text)
     assert len(rows) == len(CLAIMS)
     assert [row for row in rows if len(row) != 4 or not all(row[:3])] == []
     assert [row[0] for row in rows if not re.search(r"\d|never lost", row[1])] == []
     assert [row[0] for row in rows if row[2] != "**holds**" and not row[3]] == []
     assert re.findall(r"\b(?:nan|inf|None)\b", text) == []
-
-
-def test_the_numbers_of_the_page_are_those_of_the_metrics(text: str, numbers: dict[str, Any]) -> None:
     one, two = (numbers["session"][method]["rfd_shaping"] for method in ("virtual_master", "cell_states"))
     assert f"{one:.3g} and {two:.3g} N, ratio {two / one:.1f}" in text
 

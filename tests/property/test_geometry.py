@@ -120,8 +120,6 @@ def test_the_window_has_every_cell_the_finger_could_touch_within_a_period(finger
     assert np.isin(touchable, cells).all()
 
 
-# Layout
-
 #: Distance of rows and shift of odd ones, in pitches.
 ARRANGEMENTS = {"aligned": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (math.sqrt(3) / 2, 0.5)}
 

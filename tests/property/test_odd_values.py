@@ -33,15 +33,9 @@ def test_a_failure_is_told_with_its_place(monkeypatch: pytest.MonkeyPatch) -> No
     [
         ("layout.rows", "1" + 400 * "0", "rows must be a finite number (got a whole number of 401 digits)"),
         ("layout.rows", "1" + 300 * "0", "rows must be at most 10000 (got a whole number of 301 digits)"),
-        ("layout.rows", "1e300", "layout.rows must be at most 10000"),
         ("layout.rows", "0x" + 900 * "f", "finite number (got a whole number of 1084 digits)"),
         ("valve.discharge_slope", "5e-324", "slope must be at least 1e-09 (got 4.94066e-324)"),
-        ("conduit.diameter", "5e-324", "conduit.diameter must be at least 1e-12 m"),
-        ("simulation.physics_step", "5e-324", "simulation.physics_step must be at least 1e-09 s"),
         ("simulation.control_period", "1e300", "simulation.control_period must be at most 1e+06 s"),
-        ("fluid.density", "1e308", "fluid.density must be at most 1e+06 kg/m3 (got 1e+308 kg/m3)"),
-        ("contact.stiffness", "1e308", "contact.stiffness must be at most 1e+09 N/m"),
-        ("contact.exponent", "1e300", "contact.exponent must be at most 1e+09 1/m"),
         ("supply.low", "-1e300", "supply.low must be at least -1e+10 Pa"),
         ("relaxation.times", "[1e300, 1, 1]", "relaxation.times must be at most 1e+06 s"),
         ("recorder.every", "1" + 30 * "0", "at most 1e+09 (got a whole number of 31 digits)"),
@@ -71,8 +65,6 @@ def test_steps_whose_plan_would_fill_the_memory_and_waypoints_at_one_time_are_re
         resolve(simulation if settings else {"trajectory": {"waypoints": points}})
     assert said in str(caught.value)
 
-
-# Bytes of a kept state
 
 SYSTEM = assemble(resolve({"layout": {"rows": 6, "columns": 10}}))
 *_, LAST = periods(SYSTEM, [path((0, 0, 0, 42), (0.2, 0, 0, 37))], begin(SYSTEM), 50)

@@ -31,7 +31,6 @@ points = st.lists(
     st.tuples(xy, xy, st.integers(320, 600).map(lambda tenths: tenths / 10)), min_size=3, max_size=6
 )
 turns = st.tuples(*[st.floats(-0.4, 0.4)] * 3)
-#: Seldom the slow one.
 steppers = st.sampled_from(["bernoulli", "bernoulli", "bernoulli", "runge_kutta_4"])
 
 
@@ -124,8 +123,6 @@ def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: di
     )
 
 
-# Cells that cannot change are not integrated, and nothing is lost by that
-
 PERIODS = 120
 BED = make_system(Layout(9, 9), control=VirtualMaster())
 
@@ -193,8 +190,6 @@ def test_pins_that_rise_into_a_still_finger_meet_it_at_once() -> None:
     assert np.array_equal(run.force[:, 40] > 0.0, touching)
 
 
-# Mirrored and rotated scenes give mirrored and rotated results
-
 #: Press, lift, drag, lift off: off the cells' axes, tilted. Time, x, y, z in mm, then the quaternion.
 WAYPOINTS = np.array(
     [
@@ -203,7 +198,6 @@ WAYPOINTS = np.array(
         (1.4, 4.4, -1.7, 60.0, 0.95, -0.1, 0.2, 0.2),
     ]
 )  # fmt: skip
-#: A press in the middle of the bed, of the waypoints.
 MIDDLE = WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0]
 #: What a mirror across x, or across y, makes of a waypoint.
 MIRRORED_X, MIRRORED_Y = np.array([1, -1, 1, 1, 1, 1, -1, -1]), np.array([1, 1, -1, 1, 1, -1, 1, -1])

@@ -12,10 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from digiclay import __version__
 from digiclay.cli import main
-from digiclay.core.mesh_io.mesh_reader import read
 
 from tests.timeouts import TIMEOUT
 
@@ -31,14 +29,6 @@ NEEDING_MORE = {
 FOLDERS = ("unit", "regression")
 #: Python and the file of requirements/ that pins its libraries, empty for what pip chooses.
 KINDS = {"3.11": "lowest", "3.12": "", "3.13": "highest"}
-#: Reads the meshes that it is given, and prints what is in them.
-SCRIPT = """
-import json, sys
-from pathlib import Path
-from digiclay.core.mesh_io.mesh_reader import read
-meshes = {name: read(Path(name)) for name in sys.argv[1:]}
-print(json.dumps({name: [mesh.vertices.tolist(), mesh.faces.tolist()] for name, mesh in meshes.items()}))
-"""
 #: Difference of heights between versions of numpy, m: its sums have another order, and valves amplify that.
 ROUNDING = 1e-12
 
@@ -137,6 +127,7 @@ def tap(bare: BarePython, tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = bare.run("digiclay", "run", "tap", "--out", "tap", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert "0.5 s simulated" in done.stdout
+    assert {path.name for path in (folder / "tap").iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
     return folder / "tap"
 
 
@@ -154,10 +145,6 @@ def test_nothing_is_installed_but_the_package_and_its_libraries(bare: BarePython
     assert found["digiclay"] == __version__
     assert {name: found[name] for name in bare.pins} == bare.pins
     assert bare.run("python", "-m", "pip", "check", cwd=tmp_path).returncode == 0
-
-
-def test_the_sample_tap_leaves_its_files(tap: Path) -> None:
-    assert {path.name for path in tap.iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
 
 
 def test_the_run_is_the_same_as_with_our_versions(tap: Path, tap_here: Path) -> None:
@@ -181,21 +168,6 @@ def test_a_missing_library_is_one_line(bare: BarePython, tap: Path) -> None:
     done = bare.run("digiclay", "plot", "tap", cwd=tap.parent)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "pip install digiclay[plots]" in done.stderr
-
-
-def test_meshes_are_read_as_with_our_versions(bare: BarePython, tmp_path: Path) -> None:
-    ball = trimesh.creation.icosphere(subdivisions=1, radius=10.0)
-    for name in ("ball.stl", "ball.ply", "ball.off", "ball.obj"):
-        ball.export(tmp_path / name)
-    (tmp_path / "text.stl").write_text(trimesh.exchange.stl.export_stl_ascii(ball), encoding="ascii")
-    (tmp_path / "text.ply").write_bytes(ball.export(file_type="ply", encoding="ascii"))
-    names = sorted(path.name for path in tmp_path.iterdir())
-    done = bare.run("python", "-c", SCRIPT, *names, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    for name, (vertices, faces) in json.loads(done.stdout).items():
-        here = read(tmp_path / name)
-        np.testing.assert_array_equal(here.vertices, vertices, err_msg=name)
-        np.testing.assert_array_equal(here.faces, faces, err_msg=name)
 
 
 def test_the_tests_of_the_core_pass(bare: BarePython, tmp_path: Path) -> None:

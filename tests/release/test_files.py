@@ -30,9 +30,7 @@ def contents(extension_zip: Path) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
 
 
-def test_the_zip_is_small_and_every_file_once_and_of_a_kind_that_is_needed(
-    contents: dict[str, bytes], extension_zip: Path
-) -> None:
+def test_the_zip_is_small_and_every_file_once_and_of_a_kind_that_is_needed(contents, extension_zip):
     assert extension_zip.stat().st_size < 2e6
     assert len(contents) > 200
     assert [name for name in contents if not KINDS.fullmatch(name)] == []
@@ -48,9 +46,7 @@ def test_what_the_manifest_leaves_out_is_not_there(contents: dict[str, bytes]) -
     assert set(named) & set(contents) == set()
 
 
-def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(
-    contents: dict[str, bytes], extension_zip: Path, tmp_path: Path
-) -> None:
+def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(contents, extension_zip, tmp_path):
     manifest = tomllib.loads(contents["blender_manifest.toml"].decode())
     wheels = sorted(f"./{name}" for name in contents if name.startswith("wheels/"))
     assert wheels == sorted(manifest["wheels"])

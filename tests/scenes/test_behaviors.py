@@ -41,9 +41,6 @@ def at(result: Result, time: float) -> int:
     return int(np.argmin(np.abs(result.history["time"] - time)))
 
 
-# Elastic and plastic
-
-
 @pytest.mark.parametrize("method", ["elastic", "force_display"])
 def test_a_bed_that_springs_back_is_at_rest_after_the_fingertip_left(method: str) -> None:
     height = heights(pressed(method))
@@ -70,9 +67,6 @@ def test_a_plastic_bed_stays_at_the_deepest_press_and_as_it_is_under_a_shallower
     assert np.ptp(heights(result)[at(result, 2.5) : at(result, 3.0)], axis=0).max() == 0.0
     assert result.history["total_force"][at(result, 3.0) :].max() > 0.0
     assert np.abs(heights(result)[-1] - before).max() <= DEAD_BAND
-
-
-# Viscous
 
 
 @pytest.mark.parametrize(("time_constant", "diffusivity"), [(0.3, 10e-6), (1.0, 0.0)])
@@ -130,25 +124,16 @@ def test_a_viscous_bed_that_has_recovered_is_at_rest_and_costs_nothing_as_a_fini
     assert last.active.cells.size == 0
 
 
-# Push and pull
-
-
-def test_a_pushed_pin_gives_way_and_stays() -> None:
+def test_a_pushed_pin_gives_way_and_stays_and_one_that_is_not_stays_at_rest_while_it_listens() -> None:
     result = pressed("push_pull")
     under, left = heights(result)[at(result, 1.99)], heights(result)[-1]
     assert under.min() < REST - 3e-3
     # The finger's last push, and the ripple of a pin that is moved: 20 mm/s in 5 ms.
     assert np.abs(left - under).max() < 0.1e-3
-
-
-def test_a_pin_that_is_not_pushed_stays_at_rest_while_it_listens() -> None:
     result = run(scene("push_pull", ((0.0, 0, 0, 40.3), (2.0, 0, 0, 40.3))))
     assert result.history["command"].any()
     # The ripple: 8 mm/s for 5 ms; and nothing that adds up over 200 cycles.
     assert np.abs(heights(result) - REST).max() < 40e-6
-
-
-# Force display
 
 
 @pytest.mark.parametrize("field", ["wave", "ramp"])
@@ -162,8 +147,6 @@ def test_a_resting_finger_feels_the_field(field: str) -> None:
     # takes 0.5 mN; a valve worked out for a free pin does 1 - F/F_max of it, half of it at 75 mN: 1 mN, 2 %.
     assert force[felt] == pytest.approx(asked[felt], abs=1e-3)
 
-
-# Shape display
 
 AWAY = ((0.0, 0, 0, 90), (12.0, 0, 0, 90))
 
@@ -192,7 +175,7 @@ def moving(result: Result) -> np.ndarray:
     return np.any(steps > 1e-6, axis=2)
 
 
-def test_a_one_time_refresh_moves_the_rows_one_after_another() -> None:
+def test_a_one_time_refresh_moves_row_by_row_and_a_gradual_one_shows_intermediate_surfaces() -> None:
     result, wanted = displayed("one_time", "saddle")
     height = heights(result).reshape(-1, 9, 9)
     settled = np.abs(height - wanted.reshape(9, 9)).max(axis=2) <= DEAD_BAND
@@ -200,9 +183,6 @@ def test_a_one_time_refresh_moves_the_rows_one_after_another() -> None:
         starts = int(np.argmax(moving(result)[:, row + 1]))
         assert np.all(settled[starts, : row + 1]), row
     assert np.argmax(settled.all(axis=1)) > 0
-
-
-def test_a_gradual_refresh_shows_its_intermediate_surfaces() -> None:
     result, wanted = displayed("gradual", "pyramid")
     for share in (1 / 3, 2 / 3, 1.0):
         surface = REST + share * (wanted - REST)
@@ -233,6 +213,3 @@ def test_a_displayed_shape_holds_against_a_finger() -> None:
     wanted = assemble(result.scene).controller.heights
     assert result.history["total_force"].max() > 0.5
     assert np.abs(heights(result)[-1] - wanted).max() <= DEAD_BAND + 1e-12
-
-
-# All of them

@@ -85,14 +85,11 @@ def test_nothing_sticks_in_a_mode_a_second_after_the_finger_has_left(method: str
     assert stuck == {}
 
 
-# Noise
-
 #: Press, lift a blister, drag it level, let go, and hang beside the ridge without touching it.
 WAY = [
     (0.0, -9, 0, 43), (0.7, -9, 0, 36), (1.0, -9, 0, 36), (2.2, -9, 0, 42), (2.4, -9, 0, 42),
     (4.0, 9, 0, 42), (4.1, 9, 0, 42), (4.3, 9, 0, 62), (4.5, 0, 15, 62), (4.7, 0, 15, 43), (5.0, 0, 15, 43),
 ]  # fmt: skip
-#: A finger that presses one spot and goes.
 PRESS = [(0.0, 0, 0, 43), (0.4, 0, 0, 38.5), (0.6, 0, 0, 38.5), (0.8, 0, 0, 46), (1.0, 0, 0, 46)]
 
 
@@ -107,11 +104,14 @@ def test_the_finger_is_lost_at_lift_off_alone_whatever_the_noise(method: str, no
     assert session(method, noise).metrics["losses"] == 1
 
 
-def test_noise_does_not_bias_the_force_that_is_held_and_is_no_finger_over_the_bed() -> None:
+def test_noise_does_not_bias_the_force_that_is_held_and_is_no_finger_over_the_bed_or_on_a_pin() -> None:
     quiet, noisy = (session("virtual_master", noise) for noise in (0, 5))
     # Force that only what is above the floor adds up to is 40 mN off at 5 mN of noise.
     assert noisy.metrics["rfd"] == pytest.approx(quiet.metrics["rfd"], abs=5e-3)
     assert not np.isin(noisy.history["mode"][-60:], (Mode.SPRING, Mode.FORCE_FOLLOW)).any()
+    above = [(0.0, 0, 0, 46), (1.0, 0, 0, 46)]
+    history = run(followed("push_pull", above, 7, sensors={"height_noise": 50e-6})).history
+    assert not (history["mode"] == Mode.FORCE_FOLLOW).any()
 
 
 @pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display"])
@@ -120,12 +120,6 @@ def test_noise_is_no_touch(method: str) -> None:
     untouched = history["force"].max(axis=0) == 0.0
     touched_modes = (Mode.SPRING, Mode.FORCE_FOLLOW)
     assert not np.isin(history["mode"][:, untouched], touched_modes).any()
-
-
-def test_pins_that_listen_are_not_touched_by_the_noise_of_their_heights() -> None:
-    above = [(0.0, 0, 0, 46), (1.0, 0, 0, 46)]
-    history = run(followed("push_pull", above, 7, sensors={"height_noise": 50e-6})).history
-    assert not (history["mode"] == Mode.FORCE_FOLLOW).any()
 
 
 @pytest.mark.parametrize(

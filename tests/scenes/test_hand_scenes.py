@@ -2,7 +2,6 @@
 
 import json
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -78,17 +77,13 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name: str
     ],
     ids=lambda part: " ".join(part[:1]),
 )  # fmt: skip
-def test_a_command_takes_a_scene_of_two_fingers(
-    command: list[str], made: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_command_takes_a_scene_of_two_fingers(command, made, tmp_path, monkeypatch):
     folder = folder_with(TWO, tmp_path, monkeypatch)
     assert main(command) == 0
     assert set(made) <= {path.name for path in (folder / "out").glob("*")}
 
 
-def test_describe_names_the_finger_of_a_part_and_counts_all_rows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_describe_names_the_finger_of_a_part_and_counts_all_rows(tmp_path, monkeypatch, capsys):
     folder_with(TWO, tmp_path, monkeypatch)
     assert main(["describe", "my.toml"]) == 0
     said = capsys.readouterr().out
@@ -102,9 +97,7 @@ def test_describe_names_the_finger_of_a_part_and_counts_all_rows(
     assert "finger #2.fingertip.length = 0.011 m" in capsys.readouterr().out
 
 
-def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(tmp_path, monkeypatch, capsys):
     folder = folder_with(TWO, tmp_path, monkeypatch)
     for count in "12":
         assert main([*GAINS[:-1], "--out", count, "--workers", count]) == 0
@@ -117,9 +110,7 @@ def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(
 
 
 @pytest.mark.parametrize("broken", ["fingertip", "finger_force"])
-def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(
-    broken: str, tmp_path: Path
-) -> None:
+def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(broken, tmp_path):
     scene = tmp_path / "my.toml"
     scene.write_text(TWO, encoding="utf-8")
     done = run(load(scene))

@@ -12,9 +12,7 @@ from digiclay.core.model.valve import Orifice
 from tests.package_copy import copy_package, find_changes, run_python
 
 #: An equal-percentage valve: the lift grows exponentially with the opening.
-VALVE = '''
-"""A valve whose lift grows exponentially with the opening."""
-
+VALVE = """
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +23,6 @@ from .valve import Orifice, Valve, make_orifice
 
 @dataclass(frozen=True)
 class EqualPercentage(Parameters):
-    """Seat valve with an exponential characteristic."""
-
     orifice_diameter: float = quantity(0.5e-3, "diameter of the orifice", unit="m", above=0.0)
     stroke: float = quantity(30e-6, "lift of the fully open valve", unit="m", above=0.0)
     rangeability: float = quantity(20.0, "lift when open over lift when just open", symbol="R", above=1.0)
@@ -38,19 +34,15 @@ class EqualPercentage(Parameters):
 
 @dataclass(frozen=True)
 class ExponentialOrifice(Orifice):
-    """Its flow law, with the lift (R^|K| - 1) / (R - 1)."""
-
     rangeability: float
 
     def laminar_lift(self, opening, out):
         lift = np.multiply(np.abs(opening, out), np.log(self.rangeability), out)
         lift = np.divide(np.expm1(lift, out), self.rangeability - 1.0, out)
         return np.multiply(lift, lift, out)
-'''
+"""
 #: A pad whose stiffness doubles over a length: the exponential law by other parameters.
-CONTACT = '''
-"""A pad whose stiffness doubles over a length."""
-
+CONTACT = """
 import math
 from dataclasses import dataclass
 
@@ -60,8 +52,6 @@ from .contact import ExponentialLaw
 
 @dataclass(frozen=True)
 class Pad(ExponentialLaw, Parameters):
-    """Pad with a stiffness that doubles."""
-
     stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", above=0.0)
     offset: float = quantity(0.0, "indentation at which force begins", unit="m", at_least=0.0)
     share: float = quantity(0.34, "share of the law a cell carries", above=0.0)
@@ -70,11 +60,9 @@ class Pad(ExponentialLaw, Parameters):
     @property
     def exponent(self):
         return math.log(2.0) / self.doubling
-'''
+"""
 #: A sponge gives way under a force, and swells back slowly, by a share of its way a second.
-SPONGE = '''
-"""Sponge: a pressed pin gives way, and swells back slowly."""
-
+SPONGE = """
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,16 +75,12 @@ from .drive import CellwiseControl, TouchParameters, check_damping, make_drive
 
 @dataclass(frozen=True)
 class Sponge(TouchParameters):
-    """Damping and swelling."""
-
     damping: float = quantity(5.0, "force for the speed at which a pin sinks", unit="N s/m", above=0.0)
     swelling_time: float = quantity(0.3, "time constant of the swelling", unit="s", symbol="τ_w", above=0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class SpongeControl(CellwiseControl):
-    """Controller of the sponge; a cell remembers for how many periods it has been pressed."""
-
     parameters: Sponge
 
     rows = 1
@@ -115,7 +99,7 @@ def build(parameters, device):
     check_damping(parameters.damping, device.cell, device.period)
     drive = make_drive(parameters, device.cell, device.period)
     return SpongeControl(parameters, device.cell.actuator, drive)
-'''
+"""
 #: What runs in the copy: three values of each part alone and in one batch; a line of JSON for each.
 SESSION = """
 import json, sys, tomllib

@@ -90,7 +90,6 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
     assert_all_as_alone(scenes, errors=True)
 
 
-#: Parameters of which each run of a stack has its own value.
 CHANGES = {
     "control": "control.force_gain=2|8 control.position_gain=200|800 control.loss_time=0.01|0.1"
     " control.travel=1e-3|4e-3",

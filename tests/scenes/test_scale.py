@@ -10,7 +10,7 @@ from benchmarks.session_parts import period_calls
 SMALL, LARGE = 25, 201
 
 
-def test_as_many_cells_take_part_on_40000_pins_as_on_625() -> None:
+def test_on_40000_pins_as_many_cells_take_part_in_as_many_numpy_calls_as_on_625() -> None:
     def count(side: int) -> list[int]:
         bed = scene(side)
         system = assemble(bed)
@@ -21,8 +21,6 @@ def test_as_many_cells_take_part_on_40000_pins_as_on_625() -> None:
     assert max(small) > 100
     assert count(LARGE) == small
 
-
-def test_a_period_on_40000_pins_takes_the_numpy_calls_of_one_on_625() -> None:
     def calls(side: int) -> list[int]:
         bed = scene(side)
         return period_calls(assemble(bed), bed.trajectories(), 120)[0]

@@ -27,6 +27,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
 from digiclay_serve.protocol import Flag, Frame, Pose, pack_pose, unpack_frame
+from tests.other_process import PACKAGES
 from tests.served import TOKEN, Server, frame_message, load_example, serve
 from tests.timeouts import TIMEOUT, wait_until
 
@@ -237,9 +238,6 @@ def test_a_signal_ends_a_server_whose_doors_hang_and_finishes_its_take(tmp_path:
     assert "doors that did not answer" in report["counts"]
 
 
-# Fingers with identities, and tracked hands
-
-
 def fingers_after(client: ClientConnection, *identities: int) -> dict[int, dict[str, Any]]:
     while True:
         said = json.loads(client.recv(TIMEOUT))
@@ -275,8 +273,7 @@ def test_a_session_has_fingers_by_identity_as_long_as_they_are_named(tmp_path: P
 def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path: Path) -> None:
     numbers = ", ".join(["0.01"] * 63)
     lines = f"Left wrist:, 0, 1, 0, 0, 0, 0, 1\nLeft landmarks:, {numbers}\n".encode()
-    path = os.pathsep.join([str(Path(__file__).parents[2] / "addon"), str(Path(__file__).parents[2])])
-    environment = {**os.environ, "PYTHONPATH": path, "DIGICLAY_SERVE_TOKEN": TOKEN}
+    environment = {**os.environ, "PYTHONPATH": PACKAGES, "DIGICLAY_SERVE_TOKEN": TOKEN}
     with serve(tmp_path, "--fingers", "5") as one, one.connect("?rate=200") as client:
         command = [sys.executable, "-m", "digiclay", "hands", "--to", f"ws://127.0.0.1:{one.port}"]
         with socket.socket() as free:
@@ -309,8 +306,6 @@ def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path: Path) 
         fingers_after(client, 0, 1, 2, 3, 4)
         assert played.wait(TIMEOUT) == 0
 
-
-# OSC, and the example of a pin display, with a pty as its serial line
 
 pin_display = load_example("pin_display")
 PLACE = (0.0, 0.0, 0.038)
@@ -376,17 +371,13 @@ def test_the_examples_of_the_page_run(server, door, monkeypatch, capsys):
     wait_until(lambda: received(door, "/digiclay/state", subscribe)[4:7] == pytest.approx(PLACE, abs=1e-8))
 
 
-def test_a_pose_comes_back_as_a_state(door: socket.socket) -> None:
-    is_well_by_osc(door, 1)
-    assert state_after(door, 1)[7:] == [1.0, 0.0, 0.0, 0.0]
-
-
 def test_the_pins_come_as_blobs_and_a_reset_has_its_message(door: socket.socket) -> None:
     subscribe = message("/digiclay/subscribe", TOKEN, "pins", 200.0)
     heights = np.frombuffer(received(door, "/digiclay/heights", subscribe)[1], ">f4")
     assert heights.shape == (81,)
     assert ((heights > 0.0) & (heights < 0.1)).all()
     is_well_by_osc(door, 2)
+    assert state_after(door, 2)[7:] == [1.0, 0.0, 0.0, 0.0]
     door.send(message("/digiclay/reset", TOKEN))
     assert state_after(door, 0)[3] == 0.0
 
@@ -458,20 +449,13 @@ def test_the_example_shows_the_heights_on_a_pin_display(server: Server, door: so
             heights = np.frombuffer(body, "<u2", offset=start) / 65535 * stroke
             os.write(ours, acknowledgement(body))
         assert heights.shape == (81,)
-        damaged = bytearray(acknowledgement(receive()))
-        damaged[3] ^= 0x11
-        os.write(ours, bytes(damaged) + b"\xff" * 40 + b"\xc0")
         lost = [receive() for _ in range(pin_display.WINDOW)]  # more come when these are dropped
-        os.write(ours, acknowledgement(receive()))
-        os.write(ours, acknowledgement(lost[0]))
         os.write(ours, acknowledgement(receive()))
         example.send_signal(signal.SIGINT)
         said = example.communicate(timeout=TIMEOUT)[0]
     counts = {name: int(count) for name, count in re.findall(r"(\w+): (\d+)", said)}
     assert counts["sent"] == counts["acknowledged"] + counts["dropped"]
     assert counts["dropped"] >= len(lost)
-    assert counts["damaged"] >= 3
-    assert counts["skipped"] > 0
     for line in (ours, theirs):
         os.close(line)
 

@@ -29,7 +29,6 @@ PROGRAM = re.compile(
 PLACEHOLDER = re.compile(r"(?<![\w./-])[A-Z]{3,}[0-9]?(?![\w./])(?!=)|\.\.\.|…|/path/to")
 #: Command without arguments: within a sentence it is the name of the command.
 NAME = re.compile(r"(?:blender --command digiclay|digiclay [\w-]+)")
-#: Block that is a file: name and content.
 FILE = re.compile(r'^```\w+ title="([^"]+)"\n(.*?)^```', re.MULTILINE | re.DOTALL)
 
 

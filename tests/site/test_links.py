@@ -11,7 +11,6 @@ import pytest
 
 #: Attributes that load something as soon as the page is opened.
 LOADED = {("img", "src"), ("script", "src"), ("link", "href"), ("iframe", "src"), ("source", "src")}
-#: What a style sheet loads.
 STYLES = re.compile(r"url\(\s*[\"']?([^\"')]+)|@import\s+[\"']([^\"']+)")
 
 

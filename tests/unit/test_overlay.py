@@ -59,7 +59,6 @@ def draw(told: Readings) -> Picture:
 
 EMPTY = np.empty(0)
 KNOCK = np.where(np.arange(1001) == 900, 180.0, 0.4)
-#: What a session tells; what is written then, and what is not.
 WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
     "all it has": (
         {}, ("Digital Clay", "Method: virtual master", "0.97 x real time", "2.1 µm, 0.46 mN", "0.35 N",

@@ -205,8 +205,6 @@ def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(job
     assert "--method method.py:SoftPad" in lists  # farms are told the code
 
 
-# The template and the page
-
 PAGE = Path(__file__).parents[2] / "docs" / "own-methods.md"
 CODE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
@@ -308,7 +306,6 @@ def keeping(first: str, later: str) -> str:
     )
 
 
-#: A function `command` of no use, before the mistake.
 NONE = "command = lambda *_: None\n"
 
 

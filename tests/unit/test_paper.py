@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.modes import Mode
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
@@ -32,9 +31,9 @@ from digiclay_paper.evidence import (
     trade,
     varied,
 )
-from digiclay_paper.figures_session import details, heights_and_force
+from digiclay_paper.figures_session import heights_and_force
 from digiclay_paper.paper_figures import COLUMNS, NAMED, curves, letter, table
-from digiclay_paper.relief_sections import LIMITS, asked_for, blister_section, sections
+from digiclay_paper.relief_sections import LIMITS, asked_for, sections
 from digiclay_paper.results import AS_IT_IS, SESSION, WAYS, Dragged, Located, Results, Session, Swing
 from digiclay_paper.scenes import METHODS
 from digiclay_paper.simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS, located, sessions
@@ -149,21 +148,6 @@ def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost:
     one, two = (axes for axes in figure.axes if axes.get_label().endswith("heights"))
     assert len(one.get_lines()) == len(two.get_lines()) > 0
     assert one.get_ylim() == two.get_ylim()
-
-
-def test_the_detail_of_the_session_shows_heights_of_cells_side_by_side_at_every_period(lost: Results) -> None:
-    figure = details(lost)
-    press, lift = figure.axes[:2]
-    session = lost.printed["virtual_master"]
-    time, height = session.detail["time"], session.detail["height"]
-    # The finger presses the middle of the bed, x = 0; the next cells are a pitch apart.
-    assert [line.get_label() for line in press.get_lines()] == [f"x = {x} mm" for x in (0, 3, 6, 9, 12)]
-    shown = press.get_lines()[0]
-    within = (time >= 0.5 - 1e-9) & (time <= 1.5 + 1e-9)
-    np.testing.assert_array_equal(shown.get_xdata(), time[within])
-    np.testing.assert_array_equal(shown.get_ydata(), 1e3 * height[within, 84])
-    # The lift's own course, of millimeters, is left out: what remains is in micrometers.
-    assert np.abs(lift.get_lines()[0].get_ydata()).max() < 100.0
 
 
 SURFACE = "in the surface"
@@ -287,8 +271,6 @@ def test_panels_are_lettered_and_their_named_curves_are_the_data() -> None:
     assert lines == [",".join(COLUMNS), "a,K_f low,1,time (s),3,force (N)", *named]
 
 
-# Sections through the relief
-
 Floats = NDArray[np.float64]
 REST, RIDGE, MOUND, VALLEY = 40e-3, 13.5e-3, 23e-3, -10e-3
 
@@ -323,12 +305,6 @@ def at(bare: Session, x: float, y: float) -> NDArray[np.bool_]:
     """Tell which cells are within half a pitch of a place, mm."""
     place: NDArray[np.bool_] = np.hypot(*(bare.history["position"] - (1e-3 * x, 1e-3 * y)).T) < 1.5e-3
     return place
-
-
-def test_asked_for_is_the_blister_carried_along_the_path(bare: Session) -> None:
-    asked = asked_for(bare)
-    heights = [float(asked[at(bare, *spot)][0]) for spot in ((0, -21), (21, -21), (0, 21), (0, 0))]
-    assert heights == pytest.approx([RIDGE, MOUND, VALLEY, 0.0], abs=1e-12)  # rounding
 
 
 def test_the_flank_asked_for_is_that_of_the_method_s_own_profile() -> None:
@@ -380,31 +356,6 @@ def test_a_raised_rim_is_no_mound_and_a_crease_with_a_hump_no_valley(bare: Sessi
     over = asked_for(bare)
     over[at(bare, 12, 21)] = -4e-3
     assert "along the valley" in missed(bare, over)
-
-
-def blister(method: str, rim: float, sign: float) -> Result:
-    scene = resolve({"control": {"method": method}, "layout": {"rows": 17, "columns": 17}})
-    place = assemble(scene).grid.positions
-    away = np.hypot(*place.T)
-    mode = np.where(away < 4.3e-3, Mode.FORCE_FOLLOW, Mode.BLISTER)[None]
-    reach = 3e-3 * (np.sqrt(9.0 / np.pi) - 0.5) if method == METHODS[1] else 0.0
-    assert scene.blister is not None
-    flat, wide = scene.blister.flat_radius, scene.blister.radius
-    over = 15e-3 * np.clip((wide - (away - reach)) / (wide - flat), 0.0, 1.0)
-    over[(away > 2e-3) & (away < 4e-3)] += rim
-    tip = np.array([[0.0, 0.0, REST + sign * 13.5e-3, 1.0, 0.0, 0.0, 0.0]])
-    history = {"height": (REST + sign * over)[None], "position": place, "fingertip": tip, "mode": mode}
-    return Result(scene, history, 1, 1.0, {})
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["convex", "concave"])
-def test_a_blister_with_a_rim_is_not_the_one_asked_for(method: str, sign: float) -> None:
-    even, rimmed = (blister_section(blister(method, rim, sign)) for rim in (0.0, 2e-3))
-    assert even.meets(LIMITS)
-    assert (even.rms, even.level, even.middle) == pytest.approx((0.0, 1.5e-3, 13.5e-3), abs=1e-12)
-    assert rimmed.rim == pytest.approx(2e-3, rel=1e-9)
-    assert not rimmed.meets(LIMITS)
 
 
 def test_the_claim_names_the_sections_that_are_missed() -> None:

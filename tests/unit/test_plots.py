@@ -185,16 +185,13 @@ TWO = Column("layout.pitch", "m", (2.5e-3, 3e-3), False)
 WORDS = Column("blister.profile", "", ("cone", "gaussian", "flat"), False)
 
 
-def test_one_axis_is_a_line_with_markers_labeled_with_units() -> None:
+def test_numbers_of_one_axis_are_a_line_from_left_to_right_with_units_and_words_make_none() -> None:
     picture = sweep_figure([ONE], "lag_mean", np.array([1e-3, 2e-3, 3e-3]))
     (axes,) = picture.axes
     (line,) = axes.get_lines()
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "lag_mean (mm)")
     assert (line.get_marker(), axes.get_xscale()) == ("o", "log")
     np.testing.assert_allclose(line.get_xydata(), [[1.0, 1.0], [2.0, 2.0], [4.0, 3.0]], rtol=1e-12)
-
-
-def test_numbers_in_any_order_make_a_line_from_left_to_right_and_words_make_none() -> None:
     lines = []
     for column in (Column("a.b", "", (3, 1, 2), False), WORDS):
         (axes,) = sweep_figure([column], "rfd", np.array([0.3, 0.1, 0.2])).axes

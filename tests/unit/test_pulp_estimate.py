@@ -125,9 +125,6 @@ def test_led_cells_stand_no_farther_from_the_top_than_they_may(raised, top, expe
     assert cells.form_heights(top) == pytest.approx([*expected, 40e-3])
 
 
-# Ahead of the finger
-
-
 LEAD = LeadProfile(level=7.5e-3, rise=20e-3, fall=20e-3, skirt=0.0)
 SKIRT = LeadProfile(level=7.5e-3, rise=20e-3, fall=20e-3, skirt=40e-3)
 

@@ -1,11 +1,10 @@
-"""Queue of press strokes: the same heights in whatever ticks, and the ghost that is shown of it at once."""
+"""Queue of press strokes: the same heights in whatever ticks, the ghost that is shown of it, its time."""
 
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
@@ -13,9 +12,9 @@ from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_ghosts
-from digiclay.strokes.stroke import Brush, draw, lay_path, lay_ring, make_images, start
+from digiclay.strokes.stroke import Brush, lay_path, lay_ring, make_images, start
 
-from tests.hand import TICK, finish, heights, let_go
+from tests.hand import finish, heights
 
 #: Rows and columns of a part of a bed, and its name, arrangement and method.
 PARTS = {
@@ -35,38 +34,6 @@ def begin(name: str) -> Running:
     return sculpting.begin_session(7, "Bed", scene, above)[0]
 
 
-def play(brush: Brush, interval: float, moves: int, waits: int = 0) -> Floats:
-    """Draw two strokes, so many moves a tick, with ticks of an interval, s; return the heights, m."""
-    session, now = begin("Method III"), 0.0
-
-    def tick(count: int = 1) -> None:
-        nonlocal session, now
-        for _ in range(count):
-            now += TICK
-            session = sculpting.advance(session, session.pose, now, 100, interval=interval)
-
-    tick(waits)
-    for number, y in enumerate((-6e-3, 4e-3), 1):
-        session, _ = queue_stroke(session, -15e-3, y, 4e-3, brush=brush)
-        for index, x in enumerate(np.linspace(-15e-3, 15e-3, 30)[1:].tolist()):
-            session = change_stroke(session, number, partial(draw, x=x, y=y + 0.1 * x, depth=4e-3))
-            tick(index % moves == 0)
-        session = let_go(session, number)
-    for _ in range(2000):
-        tick(bool(session.strokes))
-    assert session.finished_strokes == 2
-    return heights(session)
-
-
-@pytest.mark.parametrize("brush", [Brush.LOWER, Brush.RAISE])
-def test_the_same_path_leaves_the_same_heights_whatever_the_ticks(brush: Brush) -> None:
-    formed = play(brush, 1.0 / 30.0, 1)
-    assert np.ptp(formed) > 3.5e-3
-    for interval, moves, waits in ((1e-6, 1, 0), (0.1, 7, 0), (1.0, 30, 0), (1.0 / 30.0, 2, 9)):
-        # Between two strokes the pins have come to rest or not, within the tolerance of their valves.
-        np.testing.assert_allclose(play(brush, interval, moves, waits), formed, rtol=0, atol=5e-6)
-
-
 #: Strokes of one session: brush, height or depth, m, path, m, and images. The last valley is pressed with
 #: more than `motion.FIRM`, at which the fingertip waits for the pins.
 DRAWN = {
@@ -81,9 +48,7 @@ DRAWN = {
 
 @pytest.mark.parametrize("periods", [7, 64])
 @pytest.mark.parametrize("name", DRAWN)
-def test_strokes_leave_the_same_bits_however_many_periods_are_simulated_at_a_time(
-    name: str, periods: int
-) -> None:
+def test_strokes_leave_the_same_bits_however_many_periods_are_simulated_at_a_time(name, periods):
     scene, formed = make_scene("design", Layout(41, 41, 1.5e-3), "hybrid", 0.5), []
     for count in (1, periods):
         session, _ = sculpting.begin_session(7, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import SceneError, StateError
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.model.layout import Layout
 from digiclay.core.scene.toml_table import resolve
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
 from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import begin_session
-from digiclay.settings.devices import BEDS, FIRST, make_scene
 from digiclay.strokes.stroke import Brush
 
-from benchmarks.made import make
 from tests.hand import heights
 
 ALONG = ((0.0, -9e-3, 0.0), (0.1, 0.0, 0.0), (0.2, 9e-3, 0.0))
@@ -40,18 +37,6 @@ def test_a_replay_presses_along_the_whole_stroke_the_same_each_time() -> None:
     assert np.abs(risen[0]).max() < 0.1
     assert (session.strokes, session.finished_strokes) == ((), 1)
     np.testing.assert_array_equal(heights(play(PointerStroke(moves=ALONG))), heights(session))
-
-
-def test_a_quick_stroke_of_a_narrow_finger_leaves_an_even_floor() -> None:
-    bed = BEDS["design"]
-    scene = make_scene("paper", Layout(rows=21, columns=60, pitch=bed.pitch), "virtual_master", bed.share)
-    session, _ = begin_session(1, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))
-    quick = PointerStroke(depth=7e-3, moves=((0.0, -35e-3, -5e-3), (0.25, 35e-3, 5e-3)))
-    *_, session = play_strokes(session, (quick,))
-    grid, middle = session.system.grid, np.linspace(-25e-3, 25e-3, 40)
-    floor = 1e3 * heights(session)[grid.at(middle, middle / 7.0)]
-    # At 100 mm/s it varies by 1.3 mm.
-    assert np.ptp(floor) < 0.2
 
 
 def test_symmetry_strength_and_line_are_those_of_the_tool() -> None:
@@ -121,13 +106,3 @@ def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path: Path, text: str |
         read_strokes(path)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(str(path))
-
-
-def test_a_letter_can_be_read_on_the_bed_that_add_offers_first() -> None:
-    design = make("letter_a")
-    assert design.bed == FIRST
-    # 0.938; 0.906 where cells froze by the rule for uneven ground on even ground too: ragged flanks.
-    assert design.correlation > 0.92
-    # A relief of another height would correlate as well: it is as deep as intended, to a fifth.
-    assert design.slope == pytest.approx(1.0, abs=0.25)
-    assert design.error < 1e-3

@@ -5,28 +5,21 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.session.render_settings import Film, Turntable
 
-#: One second in periods of 5 ms.
 TIME = np.arange(201) * 5e-3
 
 
-def test_a_film_at_full_speed_lasts_as_long_as_its_session_and_ends_with_it() -> None:
+def test_a_film_lasts_as_long_as_its_session_or_a_part_of_it_and_shows_the_nearest_row() -> None:
     moments = Film(rate=25).moments(TIME)
     assert len(moments) == 26
     np.testing.assert_allclose(moments, np.arange(26) / 25, rtol=0, atol=1e-12)
     assert len(Film(rate=25, speed=0.5).moments(TIME)) == 51
     assert Film().rows([0.0]).tolist() == [0]  # a session of a single row
-
-
-def test_each_frame_shows_the_row_nearest_to_its_time() -> None:
+    film = Film(rate=25, start=0.2, stop=0.4)
+    assert TIME[film.rows(TIME)][[0, -1]].tolist() == pytest.approx([0.2, 0.4], abs=1e-12)
     uneven = np.array([0.0, 0.1, 0.5, 0.52, 1.0])
     film = Film(rate=10)
     wanted = [int(np.abs(uneven - moment).argmin()) for moment in film.moments(uneven)]
     assert film.rows(uneven).tolist() == wanted
-
-
-def test_a_part_of_a_session_can_be_filmed() -> None:
-    film = Film(rate=25, start=0.2, stop=0.4)
-    assert TIME[film.rows(TIME)][[0, -1]].tolist() == pytest.approx([0.2, 0.4], abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -177,8 +177,6 @@ def test_a_folder_without_leave_to_write_is_told_before_any_work(locked: Path) -
         check_folder(locked / "run", overwrite=False)
 
 
-# The recorder
-
 ROWS = Rows(physics=2, queue=2)
 CELLS = 3
 

@@ -1,6 +1,5 @@
 """Scenes: defaults, presets, what goes together, text and back; files found, read, overridden, refused."""
 
-import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -21,13 +20,10 @@ from digiclay.core.scene.schema import (
 from digiclay.core.scene.toml_table import PRESETS, format_scene, resolve
 
 
-def test_an_empty_file_is_a_whole_scene() -> None:
+def test_an_empty_file_is_a_whole_scene_that_presses_once_below_the_rest_height() -> None:
     scene = resolve({})
     assert (scene.layout.rows, scene.layout.pitch, scene.valve.orifice_diameter) == (25, 3e-3, 0.5e-3)
     assert tuple(name for name in SECTIONS if scene.section(name) is None) == UNASKED
-
-
-def test_a_scene_without_a_path_presses_once_below_the_rest_height() -> None:
     scene = resolve({"actuator": {"rest_height": 0.03}})
     assert 0.0 < min(point.position[2] for point in scene.section("trajectory").waypoints) < 0.03
     points = [{"time": 0, "position": [0, 0, 0.05]}, {"time": 0.7, "position": [0, 0, 0.05]}]
@@ -94,10 +90,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"valv": {"a": 1}}, "valv must be a known key (got a section). Did you mean valve?"),
     ({"valve": {"a\nb": 1}}, "valve.'a\\nb' must be a known key (got 1). Known here: "),
     ({"fluid": {"density": "thick"}}, "fluid.density must be a number, or a text such as '3 kg/m3' (got 'th"),
-    ({"fluid": {"density": math.nan}}, "fluid.density must be a finite number (got nan kg/m3)."),
     ({"layout": {"rows": 0}}, "layout.rows must be at least 1 (got 0)."),
-    ({"relaxation": {"times": 1.0}}, "relaxation.times must be a list of numbers (got 1.0)."),
-    ({"name": 3}, "name must be a text (got 3)."),
     ({"valve": {"stroke": "3 s"}}, "valve.stroke must be in m or a multiple of it (got '3 s')."),
     ({"simulation": {"stepper": "leapfrog"}}, "simulation.stepper must be one of bernoulli, richardson, ada"),
     ({"preset": "quick"}, "preset must be one of paper, fast, viscous, design (got 'quick')."),
@@ -168,9 +161,6 @@ def test_a_written_scene_names_every_parameter() -> None:
     tables = tomllib.loads(format_scene(scene))
     missing = [(name, key) for name in PARTS for key in vars(scene.section(name)) if key not in tables[name]]
     assert missing == []
-
-
-# Files
 
 
 def scene(folder: Path, text: str, **settings: str) -> Scene:

@@ -161,16 +161,13 @@ def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(lat
 ALL = ("sensors.force_noise=0.5 mN", "sensors.height_noise=5 um", "sensors.delay=1")
 
 
-def test_the_seed_makes_the_session_also_one_taken_up_again_in_the_middle() -> None:
+def test_seed_and_coarse_sensors_make_the_session_also_one_taken_up_again_in_the_middle() -> None:
     noisy, other = (sample("slow_press", *ALL, f"sensors.seed={seed}") for seed in (0, 1))
     path = noisy.section("trajectory").trajectory()
     first, second = (record(assemble(one), path, 200) for one in (noisy, other))
     assert np.abs(first.height - second.height).max() > 1e-6
     rest = record(assemble(noisy), path, 93, record(assemble(noisy), path, 107).last)
     np.testing.assert_array_equal(rest.height, first.height[107:])
-
-
-def test_coarse_height_sensors_change_the_session_and_perfect_ones_do_not() -> None:
     plain = heights()
     assert np.abs(heights("sensors.height_step=0.5 mm") - plain).max() > 1e-4
     np.testing.assert_array_equal(heights("sensors.delay=0"), plain)
@@ -178,9 +175,7 @@ def test_coarse_height_sensors_change_the_session_and_perfect_ones_do_not() -> N
 
 # The force observer: what it makes of a pin's motion, beside the force that is there
 
-#: Control period, s.
 PERIOD = 5e-3
-#: A finger that goes down onto the only pin and stays.
 PRESS = [{"time": 0.0, "position": [0, 0, 0.0395]}, {"time": 0.6, "position": [0, 0, 0.036]}]
 AWAY = [{"time": 0.0, "position": [0, 0, 0.09]}, {"time": 0.6, "position": [0, 0, 0.09]}]
 

@@ -15,7 +15,6 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.files.file_lock import find_host
 from digiclay.core.files.run_folder import (
     LONGEST,
-    find_name,
     fold_name,
     make_safe_name,
     make_unique_names,
@@ -30,7 +29,6 @@ from hypothesis import strategies as st
 from tests.other_process import dead
 from tests.scene_files import SCENE, folder_with, left
 
-#: As a JOBS file's first lines.
 QUICK = 'errors = false\nexport = ["stl"]\n'
 
 
@@ -74,25 +72,6 @@ def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts: list[str]) 
     for place, name in enumerate(names):
         first = [fold_name(one) for one in safe].index(fold_name(safe[place]))
         assert (name == safe[place]) == (first == place)
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        ("../scene.toml", "above"),
-        ("scene.toml", "here"),
-        ("./scene.toml", "here"),
-        ("sub/../scene.toml", "here"),
-        ("a b.toml", "a b"),
-        ("/scene.toml", "scene"),
-        ("...toml", "scene"),
-    ],
-)
-def test_a_scene_has_the_name_of_its_file_or_of_its_real_folder(path, name, tmp_path, monkeypatch):
-    folder = tmp_path / "above" / "here"
-    folder.mkdir(parents=True)
-    monkeypatch.chdir(folder)
-    assert find_name(Path(path)) == name
 
 
 def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsys):
@@ -173,8 +152,6 @@ def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word: str) -> Non
     assert Path("work/metrics.json").is_file()
     assert not os.path.lexists("metrics.json")
 
-
-# A disk that is full, and what was left half-made
 
 SWEEP = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
 BATCH = ["batch", "jobs.toml", "--prepare", "--out", "o", "--quiet"]

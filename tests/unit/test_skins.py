@@ -26,29 +26,12 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
 
 from tests.live_skin import interpolate
-from tests.prisms import prism_volume
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 
 def pins(rows: int, columns: int, arrangement: str = "aligned") -> np.ndarray:
     return make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_flat_bed_has_the_volume_of_its_outline_times_its_thickness(arrangement):
-    # Every strip between two rows is a parallelogram (columns - 1) pitches wide, also between shifted rows.
-    layout = Layout(rows=5, columns=4, arrangement=arrangement)
-    outline = 4 * layout.row_spacing * 3 * layout.pitch
-    volume = prism_volume(pins(5, 4, arrangement), np.full(20, 0.04), 5, 4, base=0.01)
-    assert volume == pytest.approx(outline * 0.03, rel=1e-12)  # rounding of some 20 additions
-
-
-def test_the_skin_passes_through_every_pin_top():
-    place, height = pins(4, 6), np.random.default_rng(1).uniform(0.0, 0.1, 24)
-    vertices, faces = make_solid(place, height, 4, 6)
-    np.testing.assert_array_equal(vertices[:24], np.column_stack([place, height]))
-    assert set(faces[: 2 * 3 * 5].ravel()) == set(range(24))
 
 
 @pytest.mark.parametrize("thickness", [BASE_THICKNESS, 0.01])
@@ -186,8 +169,6 @@ def test_differences_no_file_can_hold_make_no_wall():
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     assert area.min() > 1e-8  # m²; a wall of the least step would have 3e-10
 
-
-# Skins between the pins
 
 #: Radius of a pin's end: half the bore.
 CAP = 1e-3
@@ -333,20 +314,6 @@ def test_the_skin_goes_through_the_top_of_every_pin(arrangement: str, kind: str,
         assert apart.min() < 1e-9
         # A point of the surface may have a second one for the sides, of the same height.
         np.testing.assert_allclose(skin[top][apart < 1e-9], height[pin], rtol=0, atol=ROUNDING)
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_skin_lies_nowhere_above_or_below_all_pins_about_it(arrangement: str, kind: str) -> None:
-    instant = at_rest(6, 7, arrangement)
-    height = rough(instant)
-    lattice = make_lattice(instant, 4)
-    skin = interpolate(lattice, height, kind)
-    # In the shifted arrangements the pins about a point are those of the two rows beside it.
-    reach = 1.6 * instant.pitch
-    for at in np.flatnonzero(~lattice.sunk):
-        near = height[(np.abs(instant.position - lattice.place[at]) < reach).all(axis=1)]
-        assert near.min() - ROUNDING <= skin[at] <= near.max() + ROUNDING
 
 
 def test_inside_the_bed_it_is_the_smooth_skin_of_the_exports() -> None:

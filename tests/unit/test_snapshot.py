@@ -47,11 +47,14 @@ def packed_parts(state: State) -> list[Any]:
     return [*(array.tobytes() for array in (*arrays, *kept)), *rest, memory]
 
 
+RISING = {"shape": {"file": "ripple", "rise": "10 mm"}}
 SENSORS = {"sensors": {"delay": 3, "observer": "valve", "height_noise": "1 um"}}  # that remember
 
 
 @pytest.mark.parametrize(
-    ("method", "tables"), [*((method, {}) for method in METHODS), ("virtual_master", SENSORS)], ids=str
+    ("method", "tables"),
+    [*((method, {}) for method in METHODS), ("virtual_master", SENSORS), ("viscous", RISING)],
+    ids=str,
 )
 def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str, tables: dict[str, Any]) -> None:
     system = system_of(method, **tables)
@@ -86,14 +89,6 @@ def test_a_state_of_another_bed_is_refused(tables: dict[str, Any], said: str) ->
     _, data = kept()
     with pytest.raises(StateError, match=said):
         snapshot.load(assemble(resolve({"layout": SIZES, **tables})), data)
-
-
-@pytest.mark.parametrize(
-    "data", [b"", b"nothing", START, START + b"\xff\xff\xff\xff", START + bytes(90), None, 7]
-)
-def test_bytes_that_are_no_state_are_refused(data: Any) -> None:
-    with pytest.raises(StateError, match="Reset the session"):
-        snapshot.load(system_of(), data)
 
 
 def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:

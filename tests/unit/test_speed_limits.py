@@ -74,13 +74,10 @@ def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the
         track(device(columns=9), Drag(), 10e-3)
 
 
-def test_a_drag_is_followed_at_15_mm_a_second_and_has_a_limit() -> None:
+def test_a_drag_has_a_limit_and_a_finger_that_is_lost_is_counted_with_its_time() -> None:
     drag = Drag(height=6e-3, length=30e-3)
     found = find_largest_speed(device(), drag, Criterion(), low=15e-3, high=70e-3, resolution=60e-3)
     assert found == 15e-3
-
-
-def test_a_finger_that_is_lost_is_counted_with_its_time() -> None:
     # No pin rises at 40 mm/s; the finger leaves at 2 s.
     judged, done = track(device(), Lift(), 40e-3)
     assert judged.losses == done.metrics["losses"] == 1

@@ -54,15 +54,12 @@ def test_an_active_set_serves_while_the_controlled_disc_is_within_a_pitch_around
     assert select.serves(first, 0, None, tuple(1e-3 * one for one in disc)) == serves
 
 
-def test_the_stored_codes_never_change() -> None:
+def test_stored_codes_never_change_and_every_mode_has_a_meaning_and_a_color_unlike_all_others() -> None:
     # Histories on disk hold them.
     assert {mode.name: int(mode) for mode in Mode} == {
         "REST": 0, "HOLD": 1, "EDGE": 2, "BLISTER": 3,
         "SPRING": 4, "FORCE_FOLLOW": 5, "CRITICAL": 6, "FROZEN": 7, "LOCKED": 8,
     }  # fmt: skip
-
-
-def test_every_mode_has_a_meaning_and_a_color_unlike_all_others() -> None:
     assert MEANINGS.keys() == COLORS.keys() == set(Mode)
     colors = np.array(list(COLORS.values()))
     assert 0.0 <= colors.min() <= colors.max() <= 1.0

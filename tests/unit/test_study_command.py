@@ -38,7 +38,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in texts}
 
 
-def test_a_study_leaves_tables_a_page_and_a_plot(whole: Path) -> None:
+def test_a_study_leaves_tables_a_page_and_a_plot_and_every_point_is_the_run_with_its_settings(whole):
     left = {path.name for path in whole.iterdir() if not path.name.startswith(".")}
     assert left == {"indices.csv", "indices.png", "points", "points.csv", "study.json", "study.md"}
     # Two parameters of first and total order, and a pair; a press in the middle has no lag.
@@ -56,9 +56,6 @@ def test_a_study_leaves_tables_a_page_and_a_plot(whole: Path) -> None:
     assert "| `control.position_gain` | 100 to 1000, log |" in page
     assert "| `rfd` | N |" in page
     assert (page.count("± "), page.count("It does not vary.")) == (2 * 5 + 1, 1)
-
-
-def test_every_point_is_the_run_with_its_settings(whole: Path) -> None:
     found = rows(whole / "points.csv")
     assert len(found) == 1 + 8 * 6
     for row, settings in (
@@ -142,9 +139,6 @@ def test_a_missing_library_is_told_with_the_extra_that_has_it(command, library, 
     monkeypatch.setitem(sys.modules, library, None)  # as Python marks what cannot be imported
     said = f"digiclay {command} needs {library}: run 'pip install digiclay[study]'.\n"
     refused([command, "my.toml", *GAINS, "--out", "out"], said)
-
-
-# Ranges
 
 
 @pytest.mark.parametrize(

@@ -221,25 +221,6 @@ def test_a_phase_is_judged_alone_and_a_method_that_counts_nothing_itself_loses_t
     assert (phase["losses"], whole["losses"]) == (1.0, 1.0)
 
 
-def test_a_relief_that_is_nominal_has_no_error() -> None:
-    scene = resolve({"layout": {"rows": 9, "columns": 25}, "control": {"method": "virtual_master"}})
-    line = np.linspace(-30e-3, 30e-3, 61)
-    tip = np.zeros((61, 7))
-    tip[:, 0], tip[:, 2] = line, scene.actuator.rest_height + 8e-3
-    place = assemble(scene).grid.positions
-    following = np.full(61, 5)
-    history = {"fingertip": tip, "position": place, "total_force": np.full(61, 0.4)}
-    history["mode"] = np.full((61, len(place)), Mode.FORCE_FOLLOW)
-    rest = scene.actuator.rest_height
-    # One row in four is taken.
-    thin = {**history, "fingertip": tip[::4]}
-    history["height"] = (rest + find_nominal(scene, thin, following[::4], 1.5e-3))[None]
-    assert measure_relief(scene, history, 1.5e-3).largest == pytest.approx(0.0, abs=1e-12)
-    off = measure_relief(scene, history, 1.0e-3)
-    assert off.largest == pytest.approx(0.5e-3)
-    assert measure_relief(scene, history, None).rms is None
-
-
 def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_found() -> None:
     scene = resolve({"layout": {"rows": 25, "columns": 25}, "control": {"method": "virtual_master"}})
     rest, place = scene.actuator.rest_height, assemble(scene).grid.positions

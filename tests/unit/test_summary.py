@@ -233,8 +233,6 @@ def test_the_summary_is_json_and_has_every_key_at_extremes_as_well():
         compute_metrics(nothing, WHOLE)
 
 
-# Overshoot, settling time, oscillation
-
 FINE = np.linspace(0.0, 10.0, 10001)
 #: A second-order step response with damping 0.5 and 1 rad/s.
 DAMPED = np.sqrt(0.75)
@@ -276,14 +274,11 @@ def test_the_settling_time_is_known(time: Any, values: Any, target: float, band:
     assert measure_settling_time(time, values, target, band) == wanted
 
 
-def test_a_sine_has_its_amplitude_and_frequency_and_a_drift_has_none() -> None:
+def test_a_sine_has_its_amplitude_and_frequency_and_mean_and_deviation_are_weighted() -> None:
     assert measure_amplitude(3.0 + 0.2 * np.sin(8.0 * FINE)) == pytest.approx(0.2, rel=1e-4)
     # Ten rises; each is found to a row of 1 ms.
     assert measure_frequency(FINE, np.sin(2.0 * np.pi * 1.3 * FINE + 0.3)) == pytest.approx(1.3, rel=1e-3)
     assert measure_frequency(FINE, FINE) is None
-
-
-def test_mean_and_deviation_are_weighted_and_nothing_has_none() -> None:
     # A value for 3 s and another, 4 higher, for 1 s: mean 1, variance (3·1 + 1·9)/4.
     values, weight, nothing = np.array([0.0, 4.0]), np.array([3.0, 1.0]), np.empty(0)
     assert compute_deviation(values, weight) == pytest.approx(np.sqrt(3.0), rel=1e-12)
@@ -356,8 +351,6 @@ def test_what_is_no_deviation_is_refused(values: tuple[float, float, float], sai
         perceive(*values)
 
 
-# What the finger leaves behind over its path, on surfaces made by hand
-
 #: 21 pins 3 mm apart on a slanting line; the finger goes over all of them in 201 rows, 50 mm up.
 LINE, ALONG = np.linspace(-30e-3, 30e-3, 21), (0.6, 0.8)
 PLACE, TIP = np.outer(LINE, ALONG), np.zeros((201, 7))
@@ -381,16 +374,13 @@ def test_a_ridge_has_its_height_over_the_path_at_each_pin() -> None:
     np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
 
 
-def test_pins_the_finger_did_not_go_on_from_do_not_count() -> None:
+def test_pins_the_finger_did_not_go_on_from_a_press_without_travel_and_no_rows_do_not_count() -> None:
     # Of the 21 pins the last four are less than 11 mm before the end of the way.
     final = np.where(LINE > 18.5e-3, 90e-3, 50e-3)
     found = errors(final)
     assert (len(found), found.max()) == (17, 0.0)
     # With 12 mm, as if none is given, the last of them is on the border.
     assert len(measure_ridge_errors(PLACE, final, TIP, ALL)) in (16, 17)
-
-
-def test_neither_a_press_without_travel_nor_no_rows_leave_a_ridge() -> None:
     still = np.tile(TIP[100], (50, 1))
     assert measure_ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
     assert errors(np.full(21, 50e-3), rows=~ALL).size == 0

@@ -28,7 +28,6 @@ from tests.assemble import record, replayed, sample
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, stay_away
 
 Floats = NDArray[np.float64]
-#: Control periods of the take.
 COUNT = 160
 
 
@@ -201,6 +200,7 @@ def rows_with(at: int, **columns: float) -> Floats:
         ({"surfaces": np.full((1, 120), 0.04)}, "got surface 0 is an array of the shape .120,."),
         ({"surfaces": np.full((1, 121), np.inf)}, "got surface 0 has the height inf m"),
         ({"surfaces": np.full((1, 121), 1.0)}, "got surface 0 has the height 1 m"),
+        ({"surfaces": np.full((1, 121), -0.01)}, "got surface 0 has the height -0.01 m"),
         ({"surfaces": np.full((1, 121), "a")}, "got surface 0 is an array of .* of <U1"),
         ({"surfaces": np.array(0.04)}, "damaged and cannot be read"),
         ({"surfaces": np.empty((0, 121))}, "got row"),
@@ -214,14 +214,11 @@ def test_hostile_orders_and_a_version_yet_to_come_are_refused_in_one_line(parts,
     assert "\n" not in str(refused.value)
 
 
-def test_a_take_with_smooth_strokes_is_no_scene_file() -> None:
+def test_a_take_with_smooth_strokes_is_no_scene_file_and_a_bake_shows_what_was_smoothed() -> None:
     take = ordered_take()
     system = assemble(SCENE)
     with pytest.raises(OutputError, match="has strokes in which the valves drive pins"):
         to_scene(replace(take, start=snapshot.dump(system, begin(system))), "mine")
-
-
-def test_a_bake_shows_what_was_smoothed() -> None:
     take = ordered_take()
     *_, last = replay(take)
     *_, frames = simulate_frames(take, 1.0 / take.duration)

@@ -4,32 +4,10 @@ import numpy as np
 import pytest
 from digiclay.core.engine.simulation import begin, step
 from digiclay.core.model.fingertip import LEVEL, Fingertip
-from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.model.touch import trace_finger
+from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import interpolate_poses
 
 from tests.assemble import make_system, path, record
-
-
-def dragged(periods: int) -> np.ndarray:
-    """Return poses (t, 3, 7) of a finger that is dragged and tilted, a period of 5 ms each."""
-    moments = np.linspace(0.0, 1.0, 2 * periods + 1)
-    turn = 0.2 * moments
-    still = np.zeros((2, len(turn)))
-    way = (20e-3 * moments, 5e-3 * moments**2, 38e-3 - 1e-3 * moments)
-    whole = np.column_stack([*way, np.cos(turn), np.sin(turn), *still])
-    return np.stack([whole[2 * i : 2 * i + 3] for i in range(periods)])
-
-
-def test_undersides_of_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
-    poses, bed = dragged(70), make_grid(Layout())
-    whole, places = trace_finger(Fingertip(), poses), bed.compute_basis(np.arange(100, 400))
-    alone = [trace_finger(Fingertip(), poses[i : i + 1], i) for i in range(len(poses))]
-    for i, one in enumerate(alone):
-        assert np.array_equal(whole.at(i).under(places), one.at(i).under(places))
-    # Other places in mid way have their own undersides.
-    other = bed.compute_basis(np.arange(50))
-    assert np.array_equal(whole.at(40).under(other), alone[40].at(40).under(other))
 
 
 @pytest.mark.parametrize("turn", [LEVEL, (0.8, 0.0, 0.6, 0.0), (0.5, -0.5, 0.5, 0.5), (-0.6, 0.1, 0.0, 0.8)])

@@ -55,15 +55,12 @@ def test_the_smooth_path_of_few_waypoints(times, heights, at, wanted):
     assert poses[:, 2] == pytest.approx(wanted, abs=1e-15)
 
 
-def test_the_finger_turns_along_the_shortest_arc_at_constant_rate() -> None:
+def test_the_finger_turns_along_the_shortest_arc_at_constant_rate_by_quaternions_of_any_length() -> None:
     # SciPy's slerp goes the short way about as well.
     times = np.linspace(TIMES[0], TIMES[-1], 300)
     slerp = Slerp(TIMES, Rotation.from_quat(TURNS[:, [1, 2, 3, 0]]))(times)
     ours = Rotation.from_quat(SMOOTH.poses(times)[:, [4, 5, 6, 3]])
     assert (slerp.inv() * ours).magnitude().max() < 1e-7  # arccos near 1 keeps half of the digits
-
-
-def test_quaternions_of_any_length_and_sign_are_orientations_and_a_way_between_poses_ends_there() -> None:
     turns = np.array([TURNS[0], -2.0 * TURNS[0]])
     poses = Trajectory(np.array([0.0, 1.0]), np.zeros((2, 3)), turns).poses(np.linspace(0, 1, 20))
     assert np.abs(poses[:, 3:] @ TURNS[0]) == pytest.approx(1.0, abs=1e-15)

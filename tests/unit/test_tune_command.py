@@ -11,9 +11,8 @@ from digiclay.cli import main
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
-from numpy.typing import NDArray
 
-from digiclay_study.tune_command import Trials, find_front, find_knee, propose_generations
+from digiclay_study.tune_command import find_front, find_knee
 from tests.scene_files import SMALL_BLISTER, interrupt_after, rows
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
@@ -59,14 +58,11 @@ def files(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in names}
 
 
-def test_a_tuning_leaves_tables_a_plot_and_a_scene(whole: Path) -> None:
+def test_a_tuning_leaves_tables_a_plot_and_a_scene_that_gives_the_same_metrics(whole: Path) -> None:
     left = {path.name for path in whole.iterdir() if not path.name.startswith(".")}
     assert left == {"chosen.toml", "front.csv", "front.png", "points", "points.csv", "tuning.json"}
     assert len(rows(whole / "points.csv")) == len(list((whole / "points").iterdir())) == ALL
     assert (whole / "front.png").read_bytes()[:4] == b"\x89PNG"
-
-
-def test_the_chosen_scene_is_a_scene_file_that_gives_the_same_metrics(whole: Path) -> None:
     scene = load(whole / "chosen.toml")
     metrics = run(scene).metrics
     # A stack takes sums in another order than a run by itself.
@@ -150,39 +146,3 @@ def test_a_front_has_the_points_that_none_dominates_in_order() -> None:
 )
 def test_the_knee_is_where_both_are_small(front: list[list[float]], knee: int) -> None:
     assert find_knee(np.array(front)) == knee
-
-
-def measure(shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return two outputs whose front is the line x0 from 0 to 1, x1 = 0.5: y1 = 1 - sqrt(y0)."""
-    off = 1.0 + 8.0 * np.abs(shares[:, 1] - 0.5)
-    return np.column_stack([shares[:, 0], off * (1.0 - np.sqrt(shares[:, 0] / off))])
-
-
-def evolve(count: int, seed: int = 1) -> NDArray[np.float64]:
-    """Return the outputs of all generations; a third of the plane is forbidden, a few points fail."""
-    generations = propose_generations(2, 24, seed)
-    shares, found = next(generations), []
-    for _ in range(count):
-        values = measure(shares)
-        violation = np.maximum(shares[:, 0] - 0.67, 0.0)
-        found.append(np.where(shares[:, :1] > 0.67, np.nan, values))
-        values[3], violation[3] = np.inf, 2.0
-        shares = generations.send(Trials(values, violation))
-    return np.concatenate(found)
-
-
-def find_gap(values: NDArray[np.float64]) -> float:
-    front = values[find_front(values)]
-    x = np.linspace(0.1, 0.6, 50)
-    best = np.array([front[front[:, 0] <= one, 1].min() for one in x])
-    return float(np.max(best - (1.0 - np.sqrt(x))))
-
-
-def test_generations_come_near_the_known_front_and_nearer_than_the_same_number_of_random_points() -> None:
-    found = evolve(12)
-    shares = np.random.default_rng(1).random((len(found), 2))
-    assert find_gap(found) < min(0.1, 0.5 * find_gap(measure(shares)))
-    # The same outcomes lead to the same generations.
-    first = found[: 4 * 24]
-    assert np.array_equal(evolve(4), first, equal_nan=True)
-    assert not np.array_equal(evolve(4, 2), first, equal_nan=True)

@@ -78,9 +78,7 @@ def test_each_is_one_gesture_that_is_taken_back_whole_and_replayed_bit_for_bit(d
 
 
 @pytest.mark.parametrize(("strength", "left"), [(1.0, 0.02), (0.05, 5.5)])
-def test_one_stroke_erases_what_is_in_its_ring_and_a_weak_one_part_of_it(
-    strength: float, left: float
-) -> None:
+def test_one_stroke_erases_what_is_in_its_ring_and_a_weak_one_part_of_it(strength, left):
     formed = play(begin(), HOLE)
     before = relief(formed)
     done = play(formed, stroke("erase", strength=strength))

@@ -18,7 +18,6 @@ ADDON = HERE.parents[1] / "addon" / "digiclay"
 #: A run takes two minutes under a virtual screen with software GL, and has taken more than eight on a busy
 #: machine; beyond this it hangs, s.
 LIMIT = 1200
-#: What a script has seen, by name.
 Seen = dict[str, Any]
 #: Pins at rest, and how far a pin is down at least that a finger of 4 mm depth has passed, mm.
 REST, FORMED = 40.0, 1.0

@@ -28,7 +28,6 @@ EXTENSION = "bl_ext.user_default.digiclay"
 OUT, SCRIPT = (Path(text) for text in sys.argv[sys.argv.index("--") + 1 :][:2])
 #: Time between steps, s: software GL draws a window of this size in a third of it.
 PAUSE = 0.4
-#: What the script has seen, for `blender_window.played`.
 SEEN: dict[str, Any] = {}
 
 

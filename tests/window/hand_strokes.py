@@ -14,7 +14,6 @@ HALF = 27.0
 STROKES = ((0.3, 125), (3.0, 60))
 #: Places of three taps within a second, mm.
 TAPS = ((-24.0, 24.0), (0.0, 24.0), (24.0, 24.0))
-#: Strokes of the gallery, and what is formed of it.
 DRAWN = Path(__file__).parents[2] / "benchmarks" / "strokes"
 THINGS = ("letter_a", "r_lowered", "smiley", "spiral", "coin", "portrait")
 

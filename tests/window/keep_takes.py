@@ -73,7 +73,6 @@ def ridge(blender: Any) -> Iterator[float | None]:
     note(blender, "raised")
     yield from blender.grab((30, 0, 0), "X", steps=15, periods=20)
     yield from blender.settle()
-    note(blender, "ridge")
     blender.shot("takes_ridge")
     yield from to_height(blender, 75.0, steps=1)
     note(blender, "ridge left")

@@ -7,7 +7,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-#: Pins as a user sees them.
 FINE_PINS = True
 #: Panels unfolded in one picture, so that each is seen whole in a window of 800 pixels.
 PICTURES = {

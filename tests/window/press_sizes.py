@@ -1,15 +1,19 @@
-"""Sets sizes with F, draws symmetric strokes, lines and rings, by X events from outside."""
+"""Clicks past a cube in all kinds of views; sets sizes with F, draws symmetric strokes, lines and rings."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import bpy
+import numpy as np
+from mathutils import Vector
 
 from tests.window.hand_strokes import (
     act,
+    add_bed,
     brush,
     drag,
     finish,
+    focus_window,
     hand,
     line,
     note,
@@ -21,15 +25,19 @@ from tests.window.hand_strokes import (
     to,
 )
 
-#: Ends of the stroke that is mirrored, mm.
 MIRRORED = ((-27.0, 12.0), (-9.0, 12.0))
 #: Radius of the ring, mm.
 RADIUS = 21.0
 #: How far the mouse goes sideways to make the fingertip larger, mm on the bed: half of what its size grows.
 WIDER = 4.0
+#: Places of the pins, mm: behind the cube, and beside it.
+COVERED, BARE = (15.0, -15.0), (-27.0, -27.0)
+#: How far the cube is from the place it covers, Blender units.
+DISTANCE = 0.25
 
 
 def script(blender: Any) -> Iterator[float | None]:
+    yield from past_objects(blender)
     yield from prepare(blender, "TOP")
     blender.call(bpy.ops.view3d.view_all)
     # The first press starts the session.
@@ -120,3 +128,120 @@ def shapes(blender: Any) -> Iterator[float | None]:
     settings.path, settings.stabilizer = "FREE", 9.0
     yield from stroke(blender, "stabilized", (-27.0, 0.0), (27.0, 0.0))
     settings.stabilizer = 0.0
+
+
+def put(blender: Any) -> None:
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)  # a view that has changed knows so when drawn
+    area, _ = blender.view()
+    looking = area.spaces.active.region_3d
+    place = blender.world(*COVERED)
+    level = looking.view_perspective == "ORTHO" or looking.window_matrix[3][3] == 1.0
+    eye = looking.view_matrix.inverted()
+    way = eye.col[2].to_3d() if level else (eye.translation - place).normalized()
+    bpy.data.objects["Cube"].location = place + DISTANCE * way
+
+
+def try_both(blender: Any, name: str) -> Iterator[float | None]:
+    """Click on the cube, then on the pins beside it; write down what each has pressed and selected."""
+    put(blender)
+    blender.call(bpy.ops.object.select_all, action="DESELECT")
+    yield 0.5
+    blender.shot(f"past_{name}")
+    seen = {}
+    for what, place in (("covered", COVERED), ("bare", BARE)):
+        yield from act(blender, to(on_the_screen(blender, *place), 0.3), "click 1 sleep 0.3")
+        seen[what] = sum(session.finished_strokes for session in blender.sessions())
+        seen[f"{what} selected"] = [thing.name for thing in blender.window().view_layer.objects.selected]
+    blender.SEEN[name] = seen
+    yield from reset(blender)
+
+
+def past_objects(blender: Any) -> Iterator[float | None]:
+    yield from put_cube(blender)
+    area, _ = blender.view()
+    space = area.spaces.active
+    yield from try_both(blender, "perspective")
+    blender.call(bpy.ops.view3d.view_persportho)
+    yield 0.5
+    yield from try_both(blender, "orthographic")
+    blender.call(bpy.ops.view3d.view_persportho)
+    blender.call(bpy.ops.object.camera_add)
+    blender.window().scene.camera = bpy.context.object
+    blender.call(bpy.ops.view3d.camera_to_view)
+    yield 0.5
+    yield from try_both(blender, "camera")
+    blender.call(bpy.ops.view3d.view_camera)
+    space.shading.show_xray = True
+    yield 0.5
+    yield from try_both(blender, "xray")
+    space.shading.show_xray = False
+    yield from drawn_under(blender)
+    blender.call(bpy.ops.screen.region_quadview)
+    yield 0.5
+    yield from quarters(blender)
+    blender.call(bpy.ops.screen.region_quadview)
+    yield 0.5
+    blender.SEEN["reported"] = read_reports(blender)
+    yield from add_from_elsewhere(blender)
+
+
+def put_cube(blender: Any) -> Iterator[float | None]:
+    add_bed(blender)
+    blender.call(bpy.ops.mesh.primitive_cube_add, size=0.12)
+    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    yield from focus_window()
+    blender.window().view_layer.objects.active = blender.beds()[0]
+    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    yield 1.0
+
+
+def drawn_under(blender: Any) -> Iterator[float | None]:
+    put(blender)
+    yield 0.5
+    yield from finish(blender, line(blender, (-24.0, COVERED[1]), (24.0, COVERED[1])))
+    blender.SEEN["drawn under"] = blender.heights()[7].tolist()
+    yield from reset(blender)
+
+
+def quarters(blender: Any) -> Iterator[float | None]:
+    """Point at the covered place and the bare one in each quarter of a quad view, the cube above the bed."""
+    bpy.data.objects["Cube"].location = blender.world(*COVERED) + Vector((0.0, 0.0, DISTANCE))
+    yield 1.0
+    blender.shot("past_quarters")
+    aim, found = blender.part("press.aim"), {}
+    area, _ = blender.view()
+    regions = [region for region in area.regions if region.type == "WINDOW"]
+    for region in regions:
+        with bpy.context.temp_override(window=blender.window(), area=area, region=region):
+            context = bpy.context
+            kind = "top" if abs(context.region_data.view_matrix[2][2]) > 0.99 else "other"
+            bed = blender.beds()[0]
+            for what, place in (("covered", COVERED), ("bare", BARE)):
+                point = 1e-3 * np.array([[*place, 40.0]])
+                (xy,) = blender.part("bridge").project(context, bed, point)
+                hit = aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
+                found.setdefault(f"{kind} {what}", []).append(hit)
+    blender.SEEN["quarters"] = found | {"count": len(regions)}
+
+
+def read_reports(blender: Any) -> str:
+    area = next(area for area in blender.window().screen.areas if area.type == "PROPERTIES")
+    area.type = "INFO"
+    with bpy.context.temp_override(window=blender.window(), area=area, region=area.regions[-1]):
+        bpy.ops.info.select_all(action="SELECT")
+        bpy.ops.info.report_copy()
+    return str(bpy.context.window_manager.clipboard)
+
+
+def add_from_elsewhere(blender: Any) -> Iterator[float | None]:
+    """Add a small bed into a cube that is seen along each axis; write down where the bed is."""
+    blender.call(bpy.ops.object.select_all, action="SELECT")
+    blender.call(bpy.ops.object.delete)
+    blender.call(bpy.ops.mesh.primitive_cube_add)
+    for axis in ("TOP", "FRONT", "BOTTOM"):
+        blender.call(bpy.ops.view3d.view_axis, type=axis)
+        yield 0.5
+        blender.call(bpy.ops.mesh.digital_clay_add, rows=6, columns=6)
+        (bed,) = blender.beds()
+        blender.SEEN[axis] = [float(bed.location.xy.length), bed.location.z]
+        bpy.data.batch_remove([bed, *bed.children_recursive])

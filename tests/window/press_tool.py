@@ -1,4 +1,4 @@
-"""Draws a valley with the Press tool, undoes, taps, changes the depth; turns what is shown on and off."""
+"""Draws a valley with the Press tool, changes the depth; turns what is shown on and off."""
 
 import os
 from collections.abc import Iterator
@@ -82,13 +82,6 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.shot("press_held")
     yield from let_go(blender, 18.0, 6.0)
     note(blender, "let go")
-    yield from drag(blender, [(0.0, -18.0)])
-    yield from let_go(blender, 0.0, -18.0)
-    note(blender, "tapped")
-    for name in ("tap undone", "valley undone", "valley redone"):
-        yield from blender.undo(name, redo="redone" in name)
-        note(blender, name)
-
     yield from depths(blender)
     yield from shown(blender)
     yield from ended(blender)
@@ -103,7 +96,6 @@ def depths(blender: Any) -> Iterator[float | None]:
         blender.event("WHEELDOWNMOUSE", "PRESS", at, ctrl=True)
         yield 0.1
     yield from come(blender)
-    note(blender, "after the wheel")
     # Moves that Blender makes up itself have the keys that are held.
     blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
     for step in range(1, 5):
@@ -116,7 +108,6 @@ def depths(blender: Any) -> Iterator[float | None]:
     yield from blender.settle()
     blender.event("LEFTMOUSE", "RELEASE", at)
     yield from blender.settle()
-    note(blender, "taken back")
 
 
 def disabled(blender: Any) -> Iterator[float | None]:

@@ -10,13 +10,11 @@ import numpy as np
 EVENTS = 150
 #: After so many of them a session is started where none runs any more.
 REVIVED = 4
-#: What is done, and how often out of the sum.
 CHOICES = {
     "move": 60, "turn": 8, "grab": 30, "undo": 34, "redo": 14, "edit": 12, "select": 16, "delete": 8,
     "add": 6, "start": 40, "stop": 4, "pause": 12, "step": 8, "rewind": 12, "reset": 6, "method": 8,
     "scale": 5, "workspace": 5, "scene": 5, "play": 6, "parameter": 5, "duplicate": 4, "save": 3, "load": 2,
 }  # fmt: skip
-#: Those of them that are a key.
 KEYS: dict[str, tuple[str, dict[str, bool]]] = {
     "undo": ("Z", {"ctrl": True}), "redo": ("Z", {"ctrl": True, "shift": True}), "edit": ("TAB", {}),
     "delete": ("DEL", {}), "stop": ("ESC", {}), "pause": ("P", {}), "step": ("P", {"shift": True}),

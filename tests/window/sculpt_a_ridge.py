@@ -1,4 +1,4 @@
-"""Starts a session, forms a valley with G, undoes, redoes, pauses, rewinds, saves and loads, stops."""
+"""Forms a valley with G, undoes, pauses, saves and loads; forms a shape; forms with several fingertips."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,6 +7,14 @@ import bpy
 
 
 def script(blender: Any) -> Iterator[float | None]:
+    yield from valley(blender)
+    yield from shape(blender)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 1.0
+    yield from several_fingers(blender)
+
+
+def valley(blender: Any) -> Iterator[float | None]:
     after, undo = blender.after, blender.undo
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
@@ -59,3 +67,116 @@ def script(blender: Any) -> Iterator[float | None]:
     for _ in range(3):
         blender.key("Z", blender.middle(), ctrl=True)
         yield 0.6
+
+
+def shape(blender: Any) -> Iterator[float | None]:
+    """Display a sample shape, press the fingertip into it live, and keep what was formed."""
+    yield from blender.empty_scene()
+    yield from blender.add_paper_bed()
+    yield from blender.open_sidebar()
+    blender.key("HOME", blender.middle())
+    yield None
+    blender.select(blender.beds()[0])
+    blender.look("flat")
+    blender.call(bpy.ops.digiclay.shape_sample, "EXEC_DEFAULT", True, sample="ripple", rise=12.0)
+    yield None
+    blender.look("displayed")
+    blender.call(bpy.ops.wm.call_panel, "INVOKE_DEFAULT", name="DIGICLAY_PT_shapes")
+    yield None
+    blender.shot("shape_panel")
+    blender.key("ESC", blender.middle())
+    yield None
+
+    yield from blender.start(blender.fingertip())
+    blender.look("session on a shape")
+    yield from blender.grab((0, 0, -10), "Z", look_as="into the shape")
+    yield from blender.settle()
+    blender.shot("shape_pressed")
+    yield from blender.grab((0, 0, 25), "Z")
+    yield from blender.settle()
+    blender.key("ESC", blender.middle())
+    yield None
+    yield None
+    blender.look("formed shape")
+    blender.call(bpy.ops.digiclay.shape_keep, "EXEC_DEFAULT", True)
+    yield None
+    blender.SEEN["kept"] = len(blender.beds()[0].digiclay.shape.heights)
+    blender.call(bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="solid", beside=False)
+    yield None
+    mesh = blender.window().view_layer.objects.active
+    blender.SEEN["mesh"] = max(vertex.co.z for vertex in mesh.data.vertices) / blender.part("bridge").SCALE
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield None
+
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield None
+    blender.SEEN["keeping undone"] = blender.beds()[0].digiclay.shape.file
+
+    blender.call(bpy.ops.wm.call_menu, "INVOKE_DEFAULT", name="DIGICLAY_MT_samples")
+    yield None
+    blender.shot("sample_menu")
+    blender.key("ESC", blender.middle())
+    yield None
+    blender.call(bpy.ops.digiclay.add_sample, "EXEC_DEFAULT", True, sample="session:signature")
+    yield None
+    blender.key("HOME", blender.middle())
+    yield None
+    blender.shot("sample_signature")
+    blender.SEEN["beds"] = len(blender.beds())
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield None
+    blender.SEEN["beds after undo"] = len(blender.beds())
+
+
+def note(blender: Any, name: str) -> None:
+    session, roles = blender.sessions()[0], blender.part("roles")
+    bed = blender.beds()[0]
+    blender.SEEN[name] = {
+        "numbers": list(session.numbers), "tips": list(roles.fingertips_of(bed)),
+        "poses": (1e3 * session.poses[:, :3]).tolist(), "waits": session.blocking_reason,
+        "forces": session.state.finger_forces().tolist(),
+    }  # fmt: skip
+
+
+def several_fingers(blender: Any) -> Iterator[float | None]:
+    """Press two fingertips, then a hand by its palm; delete it, undo that, copy a fingertip."""
+    yield from blender.scene_with_bed(bed="paper")
+    yield from blender.open_sidebar()
+    yield from blender.start()
+    blender.call(bpy.ops.digiclay.add_fingertip)
+    yield from blender.settle()
+    note(blender, "two")
+    roles = blender.part("roles")
+    for number, x in ((1, -14.0), (2, 14.0)):
+        tip = roles.fingertips_of(blender.beds()[0])[number]
+        tip.location.x, tip.location.y = 1e-2 * x, 0.0
+        blender.select(tip)
+        yield from blender.grab((0.0, 0.0, -9.0), "Z", periods=4)
+    note(blender, "two pressed")
+    blender.shot("two")
+    blender.select(blender.beds()[0])
+    blender.call(bpy.ops.digiclay.add_hand)
+    yield from blender.settle()
+    note(blender, "hand")
+    blender.shot("hand above")
+    yield from blender.grab((0.0, 0.0, -9.0), "Z", periods=4)
+    note(blender, "hand pressed")
+    blender.beds()[0].digiclay_display.overlay_full = True
+    yield from blender.rounds(10)
+    blender.shot("hand")
+    yield from blender.grab((0.0, 0.0, 12.0), "Z", periods=4)
+    blender.key("DEL", blender.middle())
+    yield from blender.settle(10)
+    note(blender, "deleted")
+    yield from blender.undo("undone")
+    yield from blender.settle(10)
+    note(blender, "hand again")
+    blender.select(roles.fingertips_of(blender.beds()[0])[4])
+    blender.key("D", blender.middle(), shift=True)
+    yield 0.5
+    blender.key("RET", blender.middle())
+    yield from blender.settle(10)
+    note(blender, "copied")
+    blender.shot("copied")
+    blender.call(bpy.ops.digiclay.session_stop)
+    yield from blender.stopped()

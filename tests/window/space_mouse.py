@@ -17,7 +17,6 @@ from pathlib import Path
 #: Blender asks libspnav only where this file is there, whatever it is.
 USUAL = "/var/run/spnav.sock"
 
-#: Name of the environment variable with the path of the socket.
 VARIABLE = "SPNAV_SOCKET"
 #: A motion; the number that a hand sends first, in place of a request of the library.
 MOTION, HAND = struct.Struct("8i"), struct.pack("i", 1)

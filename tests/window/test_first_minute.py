@@ -13,13 +13,10 @@ REST = 40.0
 GUIDE = Path(__file__).parents[2] / "docs" / "guide.md"
 
 
-def test_the_script_takes_the_steps_of_the_page(seen: Seen) -> None:
+def test_the_script_takes_the_steps_of_the_page_and_each_does_what_it_says(seen: Seen) -> None:
     page = GUIDE.read_text(encoding="utf-8").partition("## First ridge")[2].partition("##")[0]
     steps = re.findall(r"^\d\. (.*?\.)(?=\s)", page, re.MULTILINE | re.DOTALL)
     assert [" ".join(step.split()) for step in steps] == seen["steps"]
-
-
-def test_each_step_does_what_it_says(seen: Seen) -> None:
     assert (seen["added"], seen["tab"]) == (1, "Digital Clay")
     # The factory file looks from 17 units away at its cube; bed and fingertip are 1.6 units wide.
     assert 1.0 < seen["distance"] < 6.0

@@ -16,14 +16,11 @@ def formed(seen: Seen, name: str) -> list[bool]:
     return [bool((np.abs(down(seen, name)[row, MIDDLE]) > FORMED).all()) for row in ROWS]
 
 
-def test_strokes_drawn_at_once_are_all_formed_and_undone_one_by_one(seen: Seen) -> None:
+def test_strokes_drawn_at_once_do_not_wait_for_the_clock_are_all_formed_and_undone_one_by_one(seen):
     assert seen["left"] >= 2  # the hand was faster
     assert formed(seen, "formed") == [True] * 3
     for count in (1, 2):
         assert formed(seen, f"undone {count}") == [True] * (3 - count) + [False] * count
-
-
-def test_strokes_do_not_wait_for_the_wall_clock(seen: Seen) -> None:
     # By the clock it were 5 ms in a tick, of which there are at most 30 a second. Software draws for most of
     # the time, and the machine is shared.
     assert seen["time"]["simulated"] > 2.0 * 0.15 * seen["time"]["after the hand"]
@@ -35,14 +32,11 @@ def test_strokes_are_finished_at_once_each_with_its_undo_step(seen: Seen) -> Non
     assert formed(seen, "finished, undone") == [True, True, False]
 
 
-def test_esc_lets_strokes_go_on_that_are_being_finished_at_once(seen: Seen) -> None:
+def test_esc_lets_strokes_go_on_that_are_being_finished_at_once_else_it_takes_back_the_last(seen):
     assert seen["let go on"]["left"] >= 1
     assert seen["let go on"]["sessions"] == 1
     assert formed(seen, "let go on, formed") == [True] * 3
     assert formed(seen, "let go on, undone") == [True, True, False]
-
-
-def test_esc_in_the_midst_takes_back_the_last_stroke(seen: Seen) -> None:
     assert formed(seen, "one taken back") == [True, True, False]
 
 

@@ -6,7 +6,6 @@ from benchmarks.alike import list_differences, list_reliefs
 from benchmarks.intended import THINGS
 from benchmarks.made import make
 
-#: Longest time until a thing is formed, simulated, s.
 TIMES = {"r_lowered": 6.0, "r_raised": 7.0, "spiral": 7.0, "ring": 5.0, "leaf": 12.0, "lines": 15.0}
 
 

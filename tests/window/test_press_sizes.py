@@ -1,4 +1,4 @@
-"""Sizes by F, symmetric strokes, lines and rings, drawn by a hand in a real window."""
+"""Clicks past an object, sizes by F, symmetric strokes, lines and rings, by a hand in a real window."""
 
 import numpy as np
 import pytest
@@ -21,9 +21,7 @@ PLAYED = {"script": "press_sizes.py", "size": (800, 560), "by_hand": True}
         pytest.param("brackets", 11.0, 1e-3, id="brackets make the fingertip larger and smaller"),
     ],
 )
-def test_the_session_goes_on_with_the_size_that_is_set(
-    seen: Seen, name: str, size: float, tolerance: float
-) -> None:
+def test_the_session_goes_on_with_the_size_that_is_set(seen, name, size, tolerance):
     found = [seen[name][key] for key in ("size", "drawn size", "simulated")]
     assert found == pytest.approx([size] * 3, abs=tolerance)
     assert np.ptp(found) < 1e-3
@@ -47,16 +45,13 @@ def test_a_symmetric_stroke_forms_its_images_and_is_one_undo_step(seen: Seen) ->
     assert np.abs(down(seen, "symmetric undone")).max() < 1e-3
 
 
-def test_a_line_the_line_of_a_shift_click_and_a_stabilized_stroke_cover_all_their_pins(seen: Seen) -> None:
+def test_a_line_that_of_a_shift_click_a_stabilized_stroke_and_a_ring_cover_their_pins_alone(seen):
     assert (down(seen, "stabilized")[12, 3:22] > FORMED).mean() >= 0.95
     formed = down(seen, "lines") > FORMED
     assert formed[4, 3:22].mean() >= 0.95
     assert formed[4:22, 21].mean() >= 0.95
     # The blister reaches 15 mm to the side.
     assert not formed[10:22, 3:15].any()
-
-
-def test_a_ring_covers_its_circumference_and_leaves_its_middle(seen: Seen) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     rows, columns = (
         np.rint(12.0 + RADIUS / 3.0 * part).astype(int) for part in (np.sin(angle), np.cos(angle))
@@ -64,3 +59,29 @@ def test_a_ring_covers_its_circumference_and_leaves_its_middle(seen: Seen) -> No
     formed = down(seen, "ring") > FORMED
     assert formed[rows, columns].mean() >= 0.95
     assert not formed[11:14, 11:14].any()
+
+
+@pytest.mark.parametrize("name", ["perspective", "orthographic", "camera"])
+def test_a_click_on_an_object_selects_it_and_one_beside_it_presses(seen: Seen, name: str) -> None:
+    before = seen[name]["covered"]
+    assert seen[name]["covered selected"] == ["Cube"]
+    assert seen[name]["bare"] == before + 1
+
+
+def test_pins_that_are_seen_are_pressed_through_xray_and_on_the_way_behind_an_object(seen: Seen) -> None:
+    assert seen["xray"]["covered selected"] == []
+    assert seen["xray"]["bare"] == seen["camera"]["bare"] + 2
+    # 24 mm to either side of the middle, 3 mm a pin; the fingertip presses 4 mm deep.
+    assert np.max(seen["drawn under"][4:21]) < 40.0 - 1.0
+
+
+def test_in_a_quad_view_each_quarter_sees_for_itself_and_a_click_says_what_hides_the_bed(seen: Seen) -> None:
+    found = seen["quarters"]
+    assert (found["count"], found["top covered"], found["top bare"]) == (4, [False], [True])
+    assert seen["reported"].count("Cube hides the bed here") == 3  # in three views
+
+
+def test_a_bed_that_is_added_in_a_cube_goes_on_top_of_it_or_beside_it_where_that_is_seen(seen: Seen) -> None:
+    # Its origin is the floor of the bed, a little above its underside; the cube is 2 units large.
+    where = {axis: tuple(one > 1.0 for one in seen[axis]) for axis in ("TOP", "FRONT", "BOTTOM")}
+    assert where == {"TOP": (False, True), "FRONT": (False, True), "BOTTOM": (True, False)}

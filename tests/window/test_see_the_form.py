@@ -9,14 +9,11 @@ PLAYED = {"script": "see_the_form.py", "by_hand": True}
 FEW = 150
 
 
-def test_ten_valleys_of_3_mm_are_read_from_above_as_a_bed_is_seen_at_once(seen: Seen) -> None:
+def test_ten_valleys_of_3_mm_are_read_from_above_and_the_light_that_a_user_chooses_remains(seen):
     # A tenth is seen at a glance. As pins in the light of the factory file they differ by color alone.
     assert len(seen["lit"]) == 10
     assert min(seen["lit"]) > 0.35
     assert min(seen["lit"]) > 2.0 * max(seen["as pins"])
-
-
-def test_a_view_is_lit_once_and_what_the_user_does_then_remains(seen: Seen) -> None:
     assert (seen["shading"], seen["the user's"]) == (["MATCAP", True], "STUDIO")
 
 

@@ -37,7 +37,7 @@ def test_dragging_moves_the_fingertip_of_a_bed_at_rest_and_nothing_else_without_
     assert seen["drag undone"]["pose"] == added["pose"]
 
 
-def test_the_ridge_grows_during_the_move(seen: Seen) -> None:
+def test_the_ridge_grows_and_the_fingertip_is_felt_during_the_move(seen: Seen) -> None:
     pressing = [lowest(seen[f"pressing {step}"]) for step in range(1, 7)]
     assert pressing[-1] < pressing[0]
     # Cells that keep the height they were left at, and those the fingertip leaves behind: its trail.
@@ -45,19 +45,18 @@ def test_the_ridge_grows_during_the_move(seen: Seen) -> None:
     trail = modes[:, 1] + modes[:, 7]
     assert (np.diff(trail) >= 0).all()
     assert trail[-1] > trail[1] + 20
-
-
-def test_the_fingertip_is_felt_while_it_is_moved_and_a_machine_too_slow_tells_its_speed(seen: Seen) -> None:
     # The set point is 0.4 N.
     assert all(0.1 < seen[f"drawing {step}"]["force"] < 2.0 for step in range(2, 9))
     # Software GL draws a frame in a third of a second; 20 periods of 5 ms are simulated in between at most.
     assert 0.0 < seen["drawn"]["factor"] <= 1.1
 
 
-def test_what_was_formed_stays_when_the_fingertip_is_lifted(seen: Seen) -> None:
+def test_what_was_formed_stays_when_lifted_and_backspace_and_undo_take_it_back_and_bring_it(seen):
     assert seen["lifted"]["modes"][1] > 100
     assert seen["lifted"]["force"] == 0.0
     assert lowest(seen["lifted"]) < 39e-3
+    assert lowest(seen["rewound"]) > lowest(seen["resumed"]) + 1e-3
+    assert lowest(seen["rewinding undone"]) == pytest.approx(lowest(seen["resumed"]), abs=SETTLING)
 
 
 def test_undo_and_redo_take_one_gesture_after_the_other_and_the_session_goes_on(seen: Seen) -> None:
@@ -80,11 +79,6 @@ def test_p_pauses_and_resumes_and_shift_p_does_one_period(seen: Seen) -> None:
     assert seen["resumed"]["period"] > paused["period"] + 1
 
 
-def test_backspace_takes_back_a_gesture_and_undo_brings_it_back(seen: Seen) -> None:
-    assert lowest(seen["rewound"]) > lowest(seen["resumed"]) + 1e-3
-    assert lowest(seen["rewinding undone"]) == pytest.approx(lowest(seen["resumed"]), abs=SETTLING)
-
-
 def test_a_file_saved_in_mid_session_is_loaded_as_it_was_and_esc_keeps_what_is_formed(seen: Seen) -> None:
     saved, loaded, later, stopped = (seen[name] for name in ("saved", "loaded", "going on", "stopped"))
     assert [look["sessions"] for look in (loaded, later, stopped)] == [0, 1, 0]
@@ -104,9 +98,7 @@ def test_a_file_saved_in_mid_session_is_loaded_as_it_was_and_esc_keeps_what_is_f
         ("scaled", "must be the same along x, y and z", "scaled no more"),
     ],
 )
-def test_a_session_waits_with_the_reason_and_goes_on(
-    interrupted: Seen, stopped: str, words: str, again: str
-) -> None:
+def test_a_session_waits_with_the_reason_and_goes_on(interrupted, stopped, words, again):
     waiting, later = interrupted[stopped], interrupted[again]
     assert words in waiting["waits"]
     assert words in waiting["said"]
@@ -159,3 +151,42 @@ def test_150_random_events_leave_no_traceback_and_a_bed_that_can_be_formed(tried
     assert tried["live"] > 100
     assert tried["formed"]["sessions"] == 1
     assert lowest(tried["formed"]) < 39.5e-3
+
+
+def test_the_shape_comes_up_and_a_session_goes_on_from_it_with_the_fingertip_above(seen: Seen) -> None:
+    assert seen["flat"]["heights"] == pytest.approx([0.04, 0.04], abs=1e-7)
+    # The dead band of the height control, 10 µm.
+    assert seen["displayed"]["heights"] == pytest.approx([0.04, 0.052], abs=1.1e-5)
+    assert seen["displayed"]["pose"][2] > 0.052
+    assert seen["session on a shape"]["sessions"] == 1
+    assert seen["session on a shape"]["heights"] == pytest.approx(seen["displayed"]["heights"], abs=1e-7)
+
+
+def test_the_fingertip_forms_the_shape_which_is_made_a_mesh_and_kept_in_one_undo_step(seen: Seen) -> None:
+    assert max(seen[name]["force"] for name in seen if name.startswith("into the shape")) > 0.1
+    assert seen["formed shape"]["sessions"] == 0
+    assert seen["formed shape"]["heights"] != pytest.approx(seen["displayed"]["heights"], abs=1e-4)
+    assert seen["mesh"] == pytest.approx(seen["formed shape"]["heights"][1], abs=1e-7)
+    assert (seen["kept"] > 100, seen["keeping undone"]) == (True, "ripple")
+    assert (seen["beds"], seen["beds after undo"]) == (2, 1)
+
+
+HAND = list(range(1, 8))
+
+
+def test_fingertips_come_and_go_while_the_session_goes_on(seen: Seen) -> None:
+    found = {name: seen[name]["numbers"] for name in ("two", "hand", "deleted", "hand again", "copied")}
+    assert found == {
+        "two": [1, 2], "hand": HAND, "deleted": [1, 2], "hand again": HAND, "copied": [*HAND, 8],
+    }  # fmt: skip
+    assert [seen[name]["tips"] == seen[name]["numbers"] for name in found] == [True] * 5
+    assert [seen[name]["waits"] for name in found] == [""] * 5
+
+
+def test_two_fingertips_press_each_with_its_force_and_a_hand_as_one(seen: Seen) -> None:
+    assert min(seen["two pressed"]["forces"]) > 0.01
+    moved = np.array(seen["hand pressed"]["poses"]) - seen["hand"]["poses"]
+    # The mouse moves by pixels.
+    np.testing.assert_allclose(moved[2:], [[0.0, 0.0, -9.0]] * 5, rtol=0, atol=0.3)
+    np.testing.assert_allclose(moved[:2], 0.0, rtol=0, atol=1e-3)
+    assert min(seen["hand pressed"]["forces"]) > 0.01

@@ -23,9 +23,7 @@ def test_what_is_recorded_is_kept_and_exported_in_mid_session_and_replayed_after
     assert [seen[name]["replay can be pressed"] for name in ("kept", "stopped")] == [False, True]
 
 
-def test_blender_saves_by_itself_in_mid_session_with_the_recording_as_a_take(
-    seen: Seen,
-) -> None:
+def test_blender_saves_by_itself_in_mid_session_with_the_recording_as_a_take(seen):
     # Blender puts it off for as long as a modal operator runs: the session steps aside for it.
     assert seen["saved by itself"]
     recovered = seen["recovered"]
@@ -35,14 +33,11 @@ def test_blender_saves_by_itself_in_mid_session_with_the_recording_as_a_take(
     assert (recovered["sessions"], recovered["replay can be pressed"]) == (0, True)
 
 
-def test_esc_in_a_replay_leaves_bed_and_finger_as_they_were(seen: Seen) -> None:
+def test_esc_in_a_replay_leaves_bed_and_finger_as_they_were_and_a_replay_ends_where_the_take_did(seen):
     stopped, during, after = (seen[name] for name in ("stopped", "replaying", "replay stopped"))
     assert during["pose"] != stopped["pose"]
     assert (after["bed"], after["kept"]) == (stopped["bed"], stopped["kept"])
     np.testing.assert_allclose(after["pose"], stopped["pose"], rtol=0, atol=1e-7)  # float32
-
-
-def test_a_replay_ends_where_the_take_did(seen: Seen) -> None:
     np.testing.assert_allclose(bed(seen, "replayed"), bed(seen, "kept"), rtol=0, atol=SETTLING)
     assert "bit for bit" in seen["output"]
 
