@@ -31,7 +31,6 @@ ANSWERS = {
 
 
 def find_adapter(method: str) -> run.Adapter:
-    """Return the adapter of a method; skip the test where MuJoCo is absent."""
     if method.startswith("MuJoCo") and find_spec("mujoco") is None:
         pytest.skip("mujoco-core is not installed")
     return next(adapter for adapter in run.list_adapters() if method in adapter.methods)

@@ -43,7 +43,6 @@ def reference(name: str) -> tuple[Floats, float]:
 
 
 def replayed(name: str, step: float) -> Floats:
-    """Return the heights of the default stepper under the recorded commands, (t, n), m."""
     with stiff.strict():
         return stiff.replayed(name, "bernoulli", step, stiff.period_of(step))
 

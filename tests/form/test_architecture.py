@@ -132,7 +132,6 @@ def tracked(*patterns: str) -> list[Path]:
 
 
 def lines_with(pattern: re.Pattern[str]) -> list[str]:
-    """Return ``file:line: text`` where a tracked text file matches."""
     hits = []
     for path in tracked():
         data = path.read_bytes()
@@ -183,7 +182,6 @@ def test_no_module_imports_itself_by_way_of_others(package: Path) -> None:
 def find_imports(
     files: Iterable[Path], wrong: Callable[[str], bool], *, inside_functions: bool = True
 ) -> list[str]:
-    """Return ``file:line: module`` of the imports whose top module is wrong."""
     return [
         f"{path.relative_to(ROOT)}:{line}: {target}"
         for path in files

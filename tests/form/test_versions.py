@@ -21,7 +21,6 @@ def numbers(version: str) -> list[int]:
 
 
 def read_pins(name: str) -> dict[str, list[int]]:
-    """Return the pinned versions of the bounded libraries in a file of requirements/."""
     text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
     pins = dict(re.findall(r"^([\w-]+)==([\d.]+)$", text, re.MULTILINE))
     return {library: numbers(pin) for library, pin in pins.items() if library in BOUNDS}

@@ -103,7 +103,6 @@ def assert_within_reach(system: System, finger: Trajectory, height: Floats) -> N
 def assert_withstands(
     bed: Layout, spots: list[Spot], turn: tuple[float, ...], period: float, stepper: str, **changes: object
 ) -> None:
-    """Check that a finger's jumps move no pin that is shut, and take none where none can be."""
     system = make_system(
         bed, stepper=stepper, period=period, step=period, control=scripted(half_shut), **changes
     )

@@ -204,7 +204,6 @@ MIRRORED_X, MIRRORED_Y = np.array([1, -1, 1, 1, 1, 1, -1, -1]), np.array([1, 1, 
 
 
 def turned(points: Floats) -> Floats:
-    """Return waypoints turned by 90 degrees about z: (x, y) to (-y, x)."""
     t, x, y, z, *q = points.T
     half = np.sqrt(0.5)
     w, qx, qy, qz = q

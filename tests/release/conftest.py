@@ -41,7 +41,6 @@ def commit(folder: Path) -> None:
 
 
 def clone(source: Path, folder: Path) -> Path:
-    """Clone a repository, without its tags; return the checkout."""
     git(source, "clone", "-q", "--no-tags", str(source), str(folder))
     for name, value in {"user.name": "A Tester", "user.email": "tester@example.org"}.items():
         git(folder, "config", name, value)
@@ -95,7 +94,6 @@ def edit(name: str, old: str, new: str) -> Callable[[Path], None]:
 
 @pytest.fixture(scope="session")
 def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of this checkout with everything committed; never changed."""
     return copy_checkout(tmp_path_factory.mktemp("original") / "checkout")
 
 

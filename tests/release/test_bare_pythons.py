@@ -35,8 +35,6 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class BarePython:
-    """Folder of an environment with the wheel; the versions of libraries that it was to have, by name."""
-
     folder: Path
     pins: dict[str, str]
 
@@ -52,7 +50,6 @@ class BarePython:
 
 
 def read_pins(name: str) -> dict[str, str]:
-    """Return the versions that a file in requirements/ pins."""
     text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
     return dict(re.findall(r"^([\w-]+)==([\w.]+)$", text, re.MULTILINE))
 

@@ -61,7 +61,6 @@ def frame_after(client: ClientConnection, number: int) -> Frame:
 
 
 def is_well(server: Server, number: int) -> None:
-    """Check that a client is served as ever; the fingertip may be another's for 2 s."""
     with server.connect("?format=binary&rate=200") as client:
         client.send(pack_pose(Pose(PRESS, number)))
         for frame in frames(client):

@@ -33,8 +33,6 @@ FILE = re.compile(r'^```\w+ title="([^"]+)"\n(.*?)^```', re.MULTILINE | re.DOTAL
 
 
 class Command(NamedTuple):
-    """One command of a page, and whether it stands in a block of code; else within a sentence or a table."""
-
     text: str
     block: bool
 
@@ -64,7 +62,6 @@ def find_commands(text: str) -> list[Command]:
 
 
 def find_files(text: str) -> dict[str, str]:
-    """Return the files of a page by name: its blocks with a title."""
     return dict(FILE.findall(text))
 
 

@@ -15,8 +15,6 @@ STYLES = re.compile(r"url\(\s*[\"']?([^\"')]+)|@import\s+[\"']([^\"']+)")
 
 
 class Page(HTMLParser):
-    """Reader of a page: its anchors, its links, and what it loads."""
-
     def __init__(self, text: str) -> None:
         super().__init__()
         self.anchors: set[str] = set()

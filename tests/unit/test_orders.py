@@ -163,7 +163,6 @@ def bumpy(system: System, lowest: float = -8e-3, highest: float = 8e-3) -> Float
 
 
 def place_until_arrived(system: System, state: State, surface: Floats, patience: float = 2.0) -> State:
-    """Return the state after pins were placed, until all have arrived; `patience` in s."""
     count = round(patience / system.period)
     for after in simulate_path(system, state, stay_away(count), place(count, surface)):
         if has_arrived(after):
@@ -333,7 +332,6 @@ def test_one_quick_pass_of_smooth_halves_what_varies_on_flat_ground_and_on_a_rid
 
 
 def order(system: System, x: float, y: float, radius: float) -> Controller:
-    """Return the controller of a period in which a disc is smoothed, m."""
     orders = Orders(repeat_order(1, Verb.AVERAGE, x, y, radius, 1.0))
     (control,) = order_periods(system.controller, system.grid, system.cell, system.period, orders)
     assert control is not None

@@ -28,7 +28,6 @@ ROOM = (0.0, 0.0, 900.0, 700.0)
 
 
 def session(**changes: object) -> Readings:
-    """Return what a session of ten seconds tells, two pins picked."""
     time = np.linspace(0.0, 10.0, 1001)
     told = Readings(
         name="Digital Clay", method="virtual_master", paused=False, waiting=False, factor=0.97,

@@ -48,7 +48,6 @@ def results(*swings: Swing, **bad: Follows) -> Results:
 
 
 def swing(gain: float, amplitude: float, settling: float | None, position_gain: float = 500.0) -> Swing:
-    """Return one point of the sweep; it swings where it does not settle."""
     return Swing(gain, position_gain, amplitude, None if settling else 10.0, settling)
 
 
@@ -157,7 +156,6 @@ BAD = EASY._replace(follows=replace(GOOD, lag=5e-3))
 
 
 def dragged(**found: Dragged) -> dict[tuple[str, str, str], Dragged]:
-    """Return drags in the surface, by variant ("it": as it is) and method ("I", "II")."""
     variants = {"it": AS_IT_IS, "rise": NO_RISE, "staggered": STAGGERED, "gaussian": GAUSSIAN}
     keys = (name.split("_") for name in found)
     known = [(variants[what], scenes.METHODS[len(which) - 1], SURFACE) for what, which in keys]

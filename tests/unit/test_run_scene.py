@@ -191,7 +191,6 @@ def after(start: State, period: int) -> State:
 
 
 def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, list[float]]:
-    """Record a session that may be cut short; return the first cell's column of each array."""
     start = make_initial_state(ROWS, CELLS, 0.04, None)
     recording = RunRecording(Recorder(every), ROWS, start, periods)
     last = start

@@ -15,6 +15,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.files.file_lock import find_host
 from digiclay.core.files.run_folder import (
     LONGEST,
+    find_name,
     fold_name,
     make_safe_name,
     make_unique_names,
@@ -34,7 +35,6 @@ QUICK = 'errors = false\nexport = ["stl"]\n'
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder within an empty one; in both is the same scene."""
     work = tmp_path / "work"
     work.mkdir()
     (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
@@ -150,6 +150,7 @@ def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word: str) -> Non
     shutil.copy("my.toml", "scene.toml")
     assert main(["run", word, "--quiet", "--no-errors"]) == 0
     assert Path("work/metrics.json").is_file()
+    assert find_name(Path("/scene.toml")) == find_name(Path("...toml")) == "scene"
     assert not os.path.lexists("metrics.json")
 
 

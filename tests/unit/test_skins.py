@@ -297,7 +297,6 @@ def at_rest(rows: int, columns: int, arrangement: str = "aligned") -> Instant:
 
 
 def rough(instant: Instant) -> np.ndarray:
-    """Return heights with steps of several mm between neighbors, m."""
     return 0.04 + 0.005 * np.random.default_rng(3).standard_normal(len(instant.position))
 
 

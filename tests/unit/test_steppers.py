@@ -125,7 +125,6 @@ class Setter(Explicit):
     nodes = (0.0, 1.0)
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
-        """Return how far the rows go; the first cell is thrown off from its start only."""
         way = np.zeros_like(y)
         way[0] = self.ways if self.height is None else self.height - y[0]
         if self.height is None and y[0, 0] != 0.04:

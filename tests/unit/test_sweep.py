@@ -213,7 +213,6 @@ def some(count: int = 3) -> list[Point]:
 
 
 def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> dict[int, Record]:
-    """Run points, each in a bundle of its own; return what was kept."""
     done: dict[int, Record] = {}
     finish(
         submit(executor, task, [(point,) for point in todo], **{"stopped": lambda: False, **known}),

@@ -130,7 +130,6 @@ def test_locks_are_taken_off_by_ctrl_turned_over_and_cleared() -> None:
 
 
 def ramp(session: Running) -> Floats:
-    """Return where the pins stand, (21, 21), mm."""
     return 1e3 * session.system.grid.x.reshape(21, 21)
 
 

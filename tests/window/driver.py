@@ -61,7 +61,6 @@ def view() -> tuple[Any, Any]:
 
 
 def middle() -> tuple[int, int]:
-    """Return the middle of the 3D view, window pixels."""
     _, region = view()
     return region.x + region.width // 2, region.y + region.height // 2
 
@@ -86,7 +85,6 @@ def world(x: float, y: float, z: float = 40.0) -> Vector:
 
 
 def on_the_bed(x: float, y: float, z: float = 40.0) -> tuple[int, int]:
-    """Return where a place in the first bed's space, mm, is seen, window pixels."""
     return pixel(world(x, y, z))
 
 
@@ -272,7 +270,6 @@ def settle(ticks: int = 3) -> Iterator[float | None]:
 
 
 def simulate(periods: int) -> Iterator[float | None]:
-    """Wait until every session has simulated so many control periods more; none of them may be paused."""
     begun = {one.uid: one.state.period for one in part("sessions.running").list_sessions()}
     for _ in range(200):
         sessions = part("sessions.running").list_sessions()

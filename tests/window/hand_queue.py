@@ -63,7 +63,6 @@ def script(blender: Any) -> Iterator[float | None]:
 
 
 def queue(blender: Any) -> Iterator[float | None]:
-    """Draw three strokes at once; undo takes them back one by one."""
     # So few are for a finger that is moved by hand.
     preferences, usual = blender.preferences(), blender.preferences().most_periods
     preferences.most_periods = 1
@@ -88,7 +87,6 @@ def queue(blender: Any) -> Iterator[float | None]:
 
 
 def haste(blender: Any) -> Iterator[float | None]:
-    """Have the strokes finished at once; then let Esc end that, and then again have them finished."""
     loop = blender.part("live.loop").LOOP
     for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.1 key Escape")):
         yield from drawn(blender, *LINES)

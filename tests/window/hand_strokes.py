@@ -176,7 +176,6 @@ def message(blender: Any) -> Iterator[float | None]:
 
 
 def taps(blender: Any) -> Iterator[float | None]:
-    """Press three times within a second; then Ctrl-Z takes back one of them."""
     note(blender, "before the taps")
     yield from act(blender, *(to(on_the_screen(blender, *at), 0.08) + " click 1 sleep 0.15" for at in TAPS))
     note(blender, "taps")

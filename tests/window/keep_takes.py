@@ -99,7 +99,6 @@ def saved(blender: Any, earlier: int) -> Iterator[float | None]:
 
 
 def replayed(blender: Any) -> Iterator[float | None]:
-    """Replay the take: stop it by Esc half way, then let it come to its end."""
     before = fingertip(blender)
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
     yield from blender.until(lambda: fingertip(blender) != before)
@@ -195,7 +194,6 @@ def leave_files(blender: Any) -> Iterator[float | None]:
 
 
 def recording(blender: Any) -> Iterator[float | None]:
-    """Have the session of a bed, a new one if there is none, record for a moment."""
     if not blender.beds():
         blender.call(bpy.ops.mesh.digital_clay_add, rows=9, columns=9)
     yield from blender.start(blender.beds()[0])

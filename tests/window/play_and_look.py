@@ -289,7 +289,6 @@ def counted(blender: Any, name: str) -> None:
 
 
 def looked(blender: Any, name: str) -> Iterator[float | None]:
-    """Wait until Blender has done what was asked for and it was looked at; count."""
     watch = blender.part("device.unit")
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))

@@ -204,7 +204,6 @@ def drawn_under(blender: Any) -> Iterator[float | None]:
 
 
 def quarters(blender: Any) -> Iterator[float | None]:
-    """Point at the covered place and the bare one in each quarter of a quad view, the cube above the bed."""
     bpy.data.objects["Cube"].location = blender.world(*COVERED) + Vector((0.0, 0.0, DISTANCE))
     yield 1.0
     blender.shot("past_quarters")

@@ -51,7 +51,6 @@ def let_go(blender: Any, x: float, y: float) -> Iterator[float | None]:
 
 
 def note(blender: Any, name: str) -> None:
-    """Write down heights, where the finger is, what pins are picked, and whether the overlay is drawn."""
     blender.look(name)
     tip = blender.fingertip()
     blender.SEEN[name] |= {

@@ -7,11 +7,10 @@ import bpy
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    yield from valley(blender)
-    yield from shape(blender)
-    bpy.ops.wm.read_homefile(use_empty=True)
-    yield 1.0
-    yield from several_fingers(blender)
+    for step in (valley, shape, several_fingers):
+        yield from step(blender)
+        bpy.ops.wm.read_homefile(use_empty=True)
+        yield 1.0
 
 
 def valley(blender: Any) -> Iterator[float | None]:

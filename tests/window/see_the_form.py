@@ -11,7 +11,6 @@ from tests.window.hand_strokes import act, add_bed, done, finish, focus_window, 
 
 
 def count_orange(name: str, blender: Any) -> int:
-    """Return how many pixels of the 3D view in a picture have the color of a selection's outline."""
     red, green, blue = np.moveaxis(read_shot(name, blender), -1, 0)
     return int(((red > 0.85) & (green > 0.45) & (green < 0.75) & (blue < 0.35)).sum())
 
@@ -95,7 +94,6 @@ def measure_lines(blender: Any, count: int, name: str) -> list[float]:
 
 
 def rectangle_of_the_bed(blender: Any) -> list[float]:
-    """Return left, bottom, right and top of the bed in its 3D view, pixels."""
     bed = blender.beds()[0]
     corners = np.array([blender.pixel(bed.matrix_world @ Vector(corner)) for corner in bed.bound_box])
     _, region = blender.view()

@@ -33,7 +33,6 @@ def execute(tmp_path_factory: pytest.TempPathFactory) -> Command:
 
 @pytest.fixture(scope="module")
 def command(execute: Command, tmp_path_factory: pytest.TempPathFactory) -> Command:
-    """Blender with the zip installed; a function that gives it a command."""
     folder = tmp_path_factory.mktemp("built")
     execute(sys.executable, str(TOOL), "--out", str(folder))
     (archive,) = folder.glob("*.zip")

@@ -19,7 +19,6 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Seen:
 
 @pytest.fixture(scope="module")
 def tried(tmp_path_factory: pytest.TempPathFactory) -> Seen:
-    """What 150 random events came to; they check what must hold after each."""
     return played("random_events.py", tmp_path_factory.mktemp("random"), (800, 600))
 
 
