@@ -6,7 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.model.conduit import Conduit, OrificeAndConduit
+from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.valve import Fluid, Orifice, Valve, make_orifice
+from scipy.integrate import quad
+
+from tests.assemble import one_cell
 
 OPENINGS = np.array([0.05, 0.2, 0.5, 0.8, 1.0])
 #: A wide valve and a thin fluid: the flow of a free cell is turbulent.
@@ -101,3 +105,32 @@ def test_a_conduit_without_length_changes_nothing_and_behind_a_wide_valve_it_is_
     # 200 mm against 0.8 mm: the valve's resistance is (1/250)^4 of the conduit's, some 1e-9.
     drop = np.array([1e2, 1e4, 1e5])
     assert wide.flow(np.ones(3), drop) * wide.resistance == pytest.approx(drop, rel=1e-6)
+
+
+def test_the_resistance_is_that_of_a_parabolic_profile() -> None:
+    fluid, conduit = Fluid(), Conduit()
+    edge, gradient = conduit.diameter / 2.0, 1e5 / conduit.length
+
+    def ring(r: float) -> float:
+        return gradient * (edge**2 - r**2) / (4.0 * fluid.dynamic_viscosity) * 2.0 * math.pi * r
+
+    # The integrand is a cubic: quadrature is exact but for rounding.
+    assert conduit.resistance(fluid) == pytest.approx(1e5 / quad(ring, 0.0, edge)[0], rel=1e-12)
+
+
+def test_the_drop_between_reservoir_and_load_moves_the_pin() -> None:
+    cell = one_cell(valve_lag=None, relaxation=None).cell
+    contact, lift = cell.touch.contact, 0.5e5 * np.pi * 1e-6  # P_s A_a = 0.157 N
+
+    def speed_under(force: float, opening: float) -> float:
+        depth = np.log1p(force / contact.share * contact.exponent / contact.stiffness) / contact.exponent
+        y, under = np.array([[50e-3]]), np.array([50e-3 - depth])
+        return float(compute_rates(cell, y, under, np.array([opening]))[0, 0])
+
+    assert speed_under(1.5 * lift, 1.0) < 0.0
+    # Twice the balance force turns ΔP = P_s - F/A_a into its opposite; the laminar flow with it. Rounding.
+    assert speed_under(2.0 * lift, 1.0) == pytest.approx(-speed_under(0.0, 1.0), rel=1e-9)
+    # Rounding of ΔP: 1e-16 of 0.5 bar, against the free speed of 24 mm/s.
+    assert abs(speed_under(lift, 1.0)) < 1e-12
+    assert speed_under(0.1, -1.0) < speed_under(0.0, -1.0) < 0.0
+    assert speed_under(1e3, 0.0) == 0.0
