@@ -94,17 +94,17 @@ def make_scene(method: str, fingers: int, size: int = 40) -> Scene:
     return replace(bed, method=method or paper.method, fingers=paper.fingers * fingers)
 
 
-def trace(ways: list[Way], period: float) -> Floats:
+def trace(ways: list[Way], period: float, turn: float = TURN) -> Floats:
     """Return the path (t + 1, f, 7) of fingertips that go straight between the points of their ways."""
     times = np.arange(0.0, max(way[-1][0] for way in ways), period)
     path = np.zeros((times.size, len(ways), 7))
-    cosine, sine = np.cos(TURN), np.sin(TURN)
+    cosine, sine = np.cos(turn), np.sin(turn)
     for finger, way in enumerate(ways):
         moment, *place = np.array(way, np.float64).T
         x, y, z = (1e-3 * np.interp(times, moment, along) for along in place)
         x, y = x + SHIFT[0], y + SHIFT[1]
         path[:, finger, :3] = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z])
-        path[:, finger, 3], path[:, finger, 6] = np.cos(TURN / 2), np.sin(TURN / 2)
+        path[:, finger, 3], path[:, finger, 6] = np.cos(turn / 2), np.sin(turn / 2)
     return path
 
 
@@ -135,10 +135,10 @@ def feel(system: System, path: Floats) -> Felt:
     return Felt(np.array([state.finger_forces() for state in states]), system.period)
 
 
-def measure_near(method: str, name: str) -> tuple[Felt, list[Felt]]:
-    """Return what the two fingertips of a case feel together, and each alone."""
+def measure_near(method: str, name: str, turn: float = TURN) -> tuple[Felt, list[Felt]]:
+    """Return what the two fingertips of a case, turned, feel together, and each alone."""
     one, two = (assemble(make_scene(method, count)) for count in (1, 2))
-    path = trace(CASES[name], two.period)
+    path = trace(CASES[name], two.period, turn)
     return feel(two, path), [feel(one, path[:, [finger]]) for finger in range(2)]
 
 

@@ -27,10 +27,15 @@ from .finger_sections import Sections, Whole
 CAPTURE = 1.2
 #: Shares of that within which pressed pins begin a new finger, and within which pins are under one.
 NEW, UNDER = 0.65, 0.5
+#: How far above a pressed pin a predicted underside may be that presses it, m.
+REACHED = 6e-3
 #: Slope of an underside beyond the join, see `model.fingertip`.
 STEEP = 0.5 / (1.0 - JOIN) ** 0.5
 #: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
 BEYOND = 1e3
+OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
+#: Share of a pin that a finger does not see.
+HIDDEN = -1.0
 #: No finger.
 NOBODY = -1
 NO_DISC: Disc = (0.0, 0.0, -1.0)
@@ -72,7 +77,7 @@ class Columns:
         cells = np.zeros(present.shape, np.intp)
         cells.T[present.T] = self.flat
         basis = self._places[:, cells]
-        basis[:, ~present] = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
+        basis[:, ~present] = OUTSIDE
         return present, cells, basis
 
 
@@ -104,28 +109,34 @@ class HandControl:
     def locate(self, memory: Hands, touched: Measurement) -> tuple[Hands, Any]:
         """Divide the pressed pins among the fingers, and let each controller take in its own."""
         (pressed,) = touched.force.nonzero()
-        owner = np.full(touched.force.size, NOBODY)
+        owner, shares = np.full(touched.force.size, NOBODY), np.zeros((len(self.runs), 0))
         if pressed.size:
             basis, force = touched.quadratic_basis[:, pressed], touched.force[pressed]
             who = touched.pressing[:, pressed].argmax(axis=0)
-            owner[pressed] = self._find_new(basis, force, self._assign(memory, basis), who)
-        located = self.locate_each(memory.fingers, touched, owner, pressed)
+            under = self._predict_under(memory, basis)
+            height = touched.height[pressed]
+            if self._predicts:
+                under[under > height + REACHED] = np.inf
+            owner[pressed] = self._find_new(basis, force, find_lowest(under), who)
+            shares = self._share(under, owner[pressed], height)
+        located = self.locate_each(memory.fingers, touched, owner, pressed, shares)
         discs = [disc for _, disc in located]
         return Hands(tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs)), discs
 
     def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
         """Let each controller command the pins around its finger; of two for one pin obey one."""
-        columns, owner = self.arrange("all", seen), np.full(seen.force.size, NOBODY)
+        columns = self.arrange("all", seen)
+        double, shares = columns.double, np.ones((len(self.runs), seen.force.size))
+        owner = np.full(double.size, NOBODY)
         # What stands in one column alone is no other finger's.
-        pressed = columns.double[seen.force[columns.double] != 0.0]
-        if pressed.size:
-            owner[pressed] = self._assign(memory, seen.quadratic_basis[:, pressed])
-        fingers, given = self.command_each(memory.fingers, seen, owner, columns)
+        if double.size:
+            owner, shares[:, double] = self._claim(memory, seen, double)
+        fingers, given = self.command_each(memory.fingers, seen, shares, columns)
         memory = memory._replace(fingers=tuple(fingers))
         chosen = np.empty(seen.target.size, np.intp)
         chosen[columns.flat] = np.arange(columns.flat.size)
-        if columns.double.size:
-            chosen[columns.double] = self._choose(memory, seen, owner, columns, given.target)
+        if double.size:
+            chosen[double] = self._choose(memory, seen, owner, columns, given.target)
         # What is remembered of a pin's command is that of the command obeyed, for all fingers.
         count = int(self.runs[0].rows)
         for row in getattr(self.runs[0], "pin_rows", ()):
@@ -133,31 +144,71 @@ class HandControl:
         return memory, Commands(given.target[chosen], given.mode[chosen], given.command[chosen])
 
     def locate_each(
-        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells
+        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells, shares: Floats
     ) -> list[tuple[Any, Disc | None]]:
-        """Return memory and disc of each finger; `owner` (m,) of the cells, which are `pressed`, (q,)."""
+        """Return memory and disc of each finger; `owner` (m,) of the cells; `shares` of those `pressed`."""
         raise NotImplementedError
 
     def command_each(
-        self, memory: tuple[Any, ...], seen: Measurement, owner: Cells, columns: Columns
+        self, memory: tuple[Any, ...], seen: Measurement, shares: Floats, columns: Columns
     ) -> tuple[list[Any], Commands]:
         """Return the memories, and commands for the cells of all columns, one after the other."""
         raise NotImplementedError
 
-    def _assign(self, memory: Hands, basis: Floats) -> Cells:
-        """Return the finger that each pressed pin belongs to, (q,); `NOBODY`: none is near."""
+    def _claim(self, memory: Hands, seen: Measurement, double: Cells) -> tuple[Cells, Floats]:
+        """Return whose pins in several columns are, (g,), and what each finger sees of them, (f, g).
+
+        That is a share of the force; `HIDDEN`: not even the pin. A pin that a fingertip presses, or would if
+        a blister raised it to its top, is that fingertip's. Where one blister would press it into another's
+        fingertip, and not the other way round, it is the other's alone: it cannot be high for the one.
+        """
+        basis, height = seen.quadratic_basis[:, double], seen.height[double]
+        under, blisters = self._predict_under(memory, basis), self._find_blisters(memory)
+        x, y, radius, ground, top = blisters.T[..., None]
+        inside = np.hypot(basis[1] - x, basis[2] - y) <= radius
+        tops = np.where(inside, np.maximum(top, ground), -np.inf)
+        low, second = np.partition(under, 1, axis=0)[:2]
+        harms = tops > np.where(under == low, second, low)
+        harms &= ~(harms | np.isinf(under)).all(axis=0)
+        shares = np.where(harms, HIDDEN, self._share(under, find_lowest(under), height))
+        claimed = (seen.force[double] != 0.0) | (tops > low).any(axis=0)
+        return np.where(claimed, find_lowest(np.where(harms, np.inf, under)), NOBODY), shares
+
+    def _share(self, under: Floats, owner: Cells, height: Floats) -> Floats:
+        """Return the shares of fingers in the forces of pins, (f, q), by the undersides over them, m."""
+        shares = np.where(owner == np.arange(len(self.runs))[:, None], 1.0, 0.0)
+        if self._predicts:
+            (both,) = (np.count_nonzero(under < height, axis=0) > 1).nonzero()
+            depths = np.maximum(height[both] - under[:, both], 0.0)
+            laws = [run.pulp.touch.contact for run in self.runs]
+            tension = np.array([law.tension(depth) for law, depth in zip(laws, depths, strict=True)])
+            shares[:, both] = tension / tension.sum(axis=0)
+        return shares
+
+    @property
+    def _predicts(self) -> bool:
+        """Whether the method predicts undersides."""
+        return hasattr(self.runs[0], "predict_under")
+
+    def _find_blisters(self, memory: Hands) -> Floats:
+        """Return the blisters of all fingers, (f, 5), as `find_blister` does."""
+        followed = zip(self.runs, memory.fingers, strict=True)
+        return np.array([find_blister(run, own) for run, own in followed])
+
+    def _predict_under(self, memory: Hands, basis: Floats) -> Floats:
+        """Return the undersides of fingers over pins, (f, q), m; infinite where one is not near."""
         places = np.array([own.place or (np.inf, np.inf) for own in memory.fingers])[:, :, None]
         with np.errstate(invalid="ignore"):
             apart = (basis[1] - places[:, 0]) ** 2 + (basis[2] - places[:, 1]) ** 2
         far = ~(apart <= self.capture[:, None] ** 2)
         rank = self._estimate_under(memory, apart)
-        if hasattr(self.runs[0], "predict_under"):
+        if self._predicts:
             for run in set(self.runs):
                 own = [i for i, one in enumerate(memory.fingers) if one.place and self.runs[i] is run]
                 if own:
                     rank[own] = run.predict_under([memory.fingers[i] for i in own], basis)
         np.putmask(rank, far, np.inf)
-        return np.where(far.all(axis=0), NOBODY, rank.argmin(axis=0))
+        return rank
 
     def _estimate_under(self, memory: Hands, square: Floats) -> Floats:
         """Return undersides of fingers at squared distances, (f, q), m², from the tops of blisters, m."""
@@ -165,7 +216,7 @@ class HandControl:
         size = np.array(self.sizes)[:, None]
         reduced = square / size**2
         under = STEEP * np.maximum(reduced - JOIN, 0.0) - np.sqrt(np.maximum(1.0 - reduced, 1.0 - JOIN))
-        heights: Floats = tops + size * under
+        heights: Floats = tops + size * (1.0 + under)
         return heights
 
     def _find_new(self, basis: Floats, force: Floats, owner: Cells, who: Cells) -> Cells:
@@ -197,9 +248,7 @@ class HandControl:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
         copies = columns.copies
         fingers, (x, y) = columns.finger[copies], seen.quadratic_basis[1:3, columns.double]
-        followed = zip(self.runs, memory.fingers, strict=True)
-        blisters = np.array([find_blister(run, own) for run, own in followed])
-        at_x, at_y, radius, ground = blisters[fingers].transpose(2, 0, 1)
+        at_x, at_y, radius, ground, _ = self._find_blisters(memory)[fingers].transpose(2, 0, 1)
         apart = np.hypot(x - at_x, y - at_y)
         inside = apart <= radius
         # Outside of all blisters pins are led, or left as they are.
@@ -208,7 +257,7 @@ class HandControl:
         # Under a fingertip its own blister is obeyed, and where it presses before all.
         under = inside & (apart <= UNDER * self.capture[fingers])
         off = np.where(under, 1.0 - apart, off)
-        off = np.where(owner[columns.double] == fingers, 2.0, off)
+        off = np.where(owner == fingers, 2.0, off)
         chosen: Cells = np.take_along_axis(copies, off.argmax(axis=0)[None], 0)[0]
         return chosen
 
@@ -235,7 +284,7 @@ class HandTogether(HandControl):
     """The method's of all of them."""
 
     def locate_each(
-        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells
+        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells, shares: Floats
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see the pressed cells, without the forces on those of the others."""
         count = len(self.runs)
@@ -249,18 +298,17 @@ class HandTogether(HandControl):
         return list(zip(*self.together.locate(list(memory), columns), strict=True))
 
     def command_each(
-        self, memory: tuple[Any, ...], seen: Measurement, owner: Cells, columns: Columns
+        self, memory: tuple[Any, ...], seen: Measurement, shares: Floats, columns: Columns
     ) -> tuple[list[Any], Commands]:
         """Let each command its column, without the forces on cells of the others."""
         (present, at, basis), count = columns.padded, int(self.runs[0].rows)
-        others, fingers = owner[at], np.arange(len(self.runs))
-        theirs = (others != NOBODY) & (others != fingers)
+        fingers = np.arange(len(self.runs))
         rows = np.arange(count)[:, None, None] + count * fingers
         own = seen.own[rows, at]
         shown = Measurement(
             basis,
             seen.height[at],
-            np.where(theirs | ~present, 0.0, seen.force[at]),
+            np.where(present, seen.force[at] * np.maximum(shares[fingers, at], 0.0), 0.0),
             seen.target[at],
             seen.mode[at],
             own,
@@ -279,19 +327,22 @@ class HandInGroups(HandControl):
     """Controller of several fingers, for other methods; those `sort`ed alike are served together, if any."""
 
     def locate_each(
-        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells
+        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells, shares: Floats
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see its column without the cells of the others, and what it presses elsewhere."""
         fingers = np.arange(len(self.runs))[:, None]
-        seen = np.zeros((len(self.runs), owner.size), np.bool_)
+        seen, parts = np.zeros((len(self.runs), owner.size), np.bool_), np.ones((len(self.runs), owner.size))
         if touched.discs is not None:
             followed = np.array([own.place is not None for own in memory])[:, None]
             free = (owner == NOBODY) | (owner == fingers)
             seen = self.arrange("touched", touched).inside & free & followed
-        seen[:, pressed] |= owner[pressed] == fingers
+        parts[:, pressed] = shares
+        seen[:, pressed] |= (owner[pressed] != NOBODY) & (shares > 0.0)
         located: dict[int, tuple[Any, Disc | None]] = {}
         finger, cells = seen.nonzero()
-        for group, _, part, sections in self._divide(memory, touched, touched.force[cells], finger, cells):
+        for group, _, part, sections in self._divide(
+            memory, touched, touched.force[cells] * parts[finger, cells], finger, cells
+        ):
             run, own = self.runs[group[0]], [memory[i] for i in group]
             if len(group) == 1:
                 located[group[0]] = run.locate(*own, part)
@@ -300,16 +351,17 @@ class HandInGroups(HandControl):
         return [located[i] for i in range(len(memory))]
 
     def command_each(
-        self, memory: tuple[Any, ...], seen: Measurement, owner: Cells, columns: Columns
+        self, memory: tuple[Any, ...], seen: Measurement, shares: Floats, columns: Columns
     ) -> tuple[list[Any], Commands]:
         """Let each command its column, without the forces on cells of the others."""
         finger, cells = columns.finger, columns.flat
-        theirs = (owner[cells] != finger) & (owner[cells] != NOBODY)
-        force = np.where(theirs, 0.0, seen.force[cells])
+        parts = shares[finger, cells]
+        force = seen.force[cells] * np.maximum(parts, 0.0)
         fingers = list(memory)
         given = Commands(np.empty(cells.size), np.empty(cells.size, np.int8), np.empty(cells.size))
         for group, chosen, part, sections in self._divide(memory, seen, force, finger, cells):
             run, own = self.runs[group[0]], [memory[i] for i in group]
+            part.quadratic_basis[:, parts[chosen] == HIDDEN] = OUTSIDE
             if len(group) == 1:
                 fingers[group[0]], orders = run.command(*own, part)
             else:
@@ -352,12 +404,18 @@ class HandInGroups(HandControl):
             flat[own] = part.own
 
 
-def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float]:
-    """Return where a blister is, x, y and radius, m, below 0: none, and the height of its ground, m."""
+def find_lowest(under: Floats) -> Cells:
+    """Return the finger with the lowest of undersides (f, q), (q,); `NOBODY`: all are infinite."""
+    return np.where(np.isinf(under).all(axis=0), NOBODY, under.argmin(axis=0))
+
+
+def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float, float]:
+    """Return where a blister is, x, y and radius, m, below 0: none; the heights of its ground and top, m."""
     x, y = memory.place or (0.0, 0.0)
     # That of a method without a master reaches from the pressed cells on.
     radius = run.blister.radius + getattr(run.parameters, "jump", 0.0)
-    return x, y, radius if memory.place else -1.0, memory.edge
+    top = getattr(memory, "top", getattr(memory, "height", memory.edge))
+    return x, y, radius if memory.place else -1.0, memory.edge, top
 
 
 def follows_finger(controller: Controller) -> bool:
