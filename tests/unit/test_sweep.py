@@ -129,9 +129,9 @@ def test_a_point_that_fails_or_is_no_scene_is_recorded_and_the_others_go_on(caps
     assert main([*vary, "simulation.duration=1e6,9e5", "--out", "none"]) == 2
     assert capsys.readouterr().err.startswith("Every point failed; the first one: recorder.every must be")
     triggers = ["--vary", "control.blister_trigger=0.01,0.03", "--vary", "control.spring_trigger=0.02,0.06"]
-    assert main(["sweep", "my.toml", "--quiet", "--method", "cell_states", *triggers, "--out", "out"]) == 0
-    assert [line["error"] for line in rows("out")][:2] == ["", ""]
-    assert "must be below spring_trigger, 0.02 N (got 0.03 N)" in rows("out")[2]["error"]
+    assert main(["sweep", "my.toml", "--quiet", "--method", "cell_states", *triggers, "--out", "mixed"]) == 0
+    assert [line["error"] for line in rows("mixed")][:2] == ["", ""]
+    assert "must be below spring_trigger, 0.02 N (got 0.03 N)" in rows("mixed")[2]["error"]
 
 
 def test_finished_points_are_kept_for_another_metric_too_and_unreadable_ones_run_again(here: Path) -> None:
