@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from typing import Any
 
@@ -11,7 +11,10 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
+from digiclay.core.control.masters import VirtualMasterBatch, VirtualMasterColumns
+from digiclay.core.control.travel import Heading
 from digiclay.core.control.virtual_master import (
+    MANY,
     Master,
     Phase,
     VirtualMaster,
@@ -22,6 +25,7 @@ from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.valve import Fluid, Valve
+from digiclay.core.scene.columns import join_controllers
 
 from tests.assemble import make_basis, make_system, master, path, record
 
@@ -427,3 +431,49 @@ def test_a_blister_partly_off_the_bed_rises_as_well(x: float, y: float, row: int
     assert heights[row, column] > 43e-3
     assert heights.min() > 39.9e-3
     assert np.all(formed(40.0, 0.0) == 40e-3)  # off the bed it changes nothing
+
+
+@pytest.mark.parametrize("laminar", [True, False])
+def test_many_masters_decide_side_by_side_as_each_alone_bit_for_bit(laminar: bool) -> None:
+    draw = np.random.default_rng(3)
+    one, runs = control(), []
+    valve = replace(one.model.flow.valve, turbulent=one.model.flow.valve.turbulent / 50.0)
+    model = one.model if laminar else replace(one.model, laminar=False, flow=valve)
+    for _ in range(4 * MANY):
+        gains = replace(one.parameters, force_gain=draw.uniform(1, 9), felt_force=draw.uniform(0.5e-3, 2e-3))
+        runs.append(replace(one, parameters=gains, model=model))
+    together = join_controllers(runs)
+    parts = {field.name: getattr(together, field.name) for field in fields(together)}
+    each = VirtualMasterBatch(**parts)
+    assert type(together) is VirtualMasterColumns
+    count, kinds = len(runs), set()
+    masters = [
+        Master(
+            Phase(draw.integers(4)), *draw.uniform(-25e-3, 25e-3, 2), draw.choice([45e-3, 0.1]),
+            draw.uniform(-1, 1), 44e-3, 40e-3, Heading(*draw.uniform(-25e-3, 25e-3, 2), 0.6, 0.8), 44e-3,
+            int(draw.choice([0, 0, 3, 40])),
+        )
+        for _ in runs
+    ]  # fmt: skip
+    both: list = [masters, masters]
+    for _ in range(12):
+        # Some are not felt, some not near; most go on where they are, or a little farther.
+        total = draw.choice([0.0, 0.2, 0.5], count)
+        near = total * draw.choice([0.0, 1e-3, 1.0, 1.0], count)
+        x, y = np.array([(own.x, own.y) for own in both[0]]).T + draw.choice([0.0, 1e-4, 3e-3], (2, count))
+        sums = [total, total * x, total * y, near, near * x, near * y]
+        level, cells = draw.uniform(0.0, 0.5, count), draw.integers(0, 9, count)
+        results = []
+        for place, (method, given) in enumerate(
+            [(each, [list(map(float, own)) for own in (*sums, level)]), (together, [*sums, level])]
+        ):
+            memory = method.follow(both[place], *given[:6])
+            memory = method.lead(memory, given[0], [0.045 * own for own in given[0]])
+            memory = method.set_edge(memory, given[6], cells.tolist())
+            both[place] = memory
+            pose, heights = method.get_pose(memory), method.get_heights(memory)
+            results.append([*map(repr, memory), *map(repr, method.find_disc(memory))])
+            results[-1] += [repr(np.array(row, np.float64).tolist()) for row in (*pose, *heights)]
+        assert results[0] == results[1]
+        kinds |= {own.phase for own in both[0]}
+    assert kinds == set(Phase)

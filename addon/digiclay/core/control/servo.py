@@ -89,9 +89,8 @@ class BatchControl:
     runs: tuple[Any, ...] = field(default=(), kw_only=True)
     """In a batch the controllers of its runs, with plain numbers; empty in a single run."""
 
-    @property
-    def batch_class(self) -> type[BatchControl]:
-        """Class of the controller of a batch, with the same fields."""
+    def find_batch_class(self, count: int) -> type[BatchControl]:
+        """Return the class of the controller of a batch of so many runs, with the same fields."""
         return type(self)
 
 

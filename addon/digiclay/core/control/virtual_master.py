@@ -11,7 +11,6 @@ master is decided in plain numbers, run by run.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -26,6 +25,7 @@ from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement, SetPoint
 from ..model.delay import Queue
 from ..model.interfaces import Flow
+from ..model.laws import import_part
 from ..model.layout import RELATIVE_TOLERANCE, Disc
 from ..model.physics import GAUSS, Cell
 from .blister import Blister, BlisterRule
@@ -38,6 +38,8 @@ from .travel import Heading, Rim, measure_excess, update_heading
 #: to 0.33 of it measured while the fingertip moves slowly.
 HEAVIEST = 0.25
 NONE = Constants((0.0,))
+#: Number of runs from which on their masters are led side by side: of fewer plain numbers take less time.
+MANY = 40
 #: Where an idle master stands, m: so far away that no cell is in its blister.
 NOWHERE = 1e3
 #: Share of its radius that a blister in search of the fingertip may take along what is frozen: 1.5 of 15 mm.
@@ -224,10 +226,11 @@ class VirtualMasterControl(BatchControl):
         """State rows a cell needs."""
         return self.ground.rows
 
-    @property
-    def batch_class(self) -> type[VirtualMasterControl]:
-        """Class of the controller of a batch."""
-        return VirtualMasterBatch
+    def find_batch_class(self, count: int) -> type[VirtualMasterControl]:
+        """Return the class of the controller of a batch of so many runs."""
+        name = "VirtualMasterBatch" if count < MANY else "VirtualMasterColumns"
+        found: type[VirtualMasterControl] = import_part("control.masters", name)
+        return found
 
     def begin(self) -> Master:
         """Return the memory before a session."""
@@ -333,6 +336,10 @@ class VirtualMasterControl(BatchControl):
 
     # Sums over cells, and their commands: of one run, or of a batch.
 
+    def to_numbers(self, sums: Floats) -> Any:
+        """Return sums as `follow`, `lead` and `set_edge` take them: plain numbers, of a batch (b,)."""
+        return sums.tolist()
+
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Locate the fingertip and move the master; see `Controller`."""
         basis, force = touched.quadratic_basis, touched.force
@@ -341,14 +348,14 @@ class VirtualMasterControl(BatchControl):
         x, y, *_ = self.get_pose(memory)
         beyond = measure_excess(x, y, self.parameters.radius * (1.0 + RELATIVE_TOLERANCE), basis)
         (none,) = NONE[force.shape]
-        total, *center = sum_weighted(basis, force).tolist()
-        near = sum_weighted(basis, np.where(beyond > none, none, force)).tolist()
+        total, *center = self.to_numbers(sum_weighted(basis, force))
+        near = self.to_numbers(sum_weighted(basis, np.where(beyond > none, none, force)))
         # Next to the master noise stays in the controlled force, for what is below the floor adds up; farther
         # off only what is no noise counts, see docs/equations.md.
         hidden = (beyond <= 0.0) & (touched.force < self.floor) if self._noisy else None
-        noise = () if hidden is None else (sum_weighted(touched.force, hidden).tolist(),)
+        noise = () if hidden is None else (self.to_numbers(sum_weighted(touched.force, hidden)),)
         memory = self.follow(memory, total, *center[:2], *near[:3])
-        surface = sum_weighted(touched.height, force).tolist() if self.is_new(memory) else total
+        surface = self.to_numbers(sum_weighted(touched.height, force)) if self.is_new(memory) else total
         memory = self.lead(memory, total, surface, *noise)
         return memory, self.find_disc(memory)
 
@@ -365,7 +372,7 @@ class VirtualMasterControl(BatchControl):
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         cells = self._rule.divide(self.get_pose(memory), seen.quadratic_basis)
         facing = self._rule.find_edge(cells)
-        level = sum_weighted(seen.height, facing).tolist()
+        level = self.to_numbers(sum_weighted(seen.height, facing))
         memory = self.set_edge(memory, level, count_true(facing))
         return memory, raise_blister(self._rule, self.ground, cells, seen, self.get_heights(memory), mode)
 
@@ -385,36 +392,6 @@ class VirtualMasterControl(BatchControl):
     def _limits(self) -> Constants:
         """Height of a pin at rest, and how far from it one counts as formed, m."""
         return Constants((self.actuator.rest_height, self.parameters.dead_band))
-
-
-def _decide_by_run(
-    decide: Callable[..., Any], join: Callable[[Iterable[Any]], Any] = list
-) -> Callable[..., Any]:
-    """Return a method of a batch's controller: each run's decision on its memory and numbers, joined."""
-
-    def decide_all(batch: VirtualMasterBatch, memory: list[Master], *columns: list[Any]) -> Any:
-        return join(map(decide, batch.runs, memory, *columns))
-
-    return decide_all
-
-
-def _gather(rows: Iterable[tuple[Any, ...]]) -> tuple[Any, ...]:
-    """Return the numbers of each run as arrays (b,)."""
-    return tuple(map(np.array, zip(*rows, strict=True)))
-
-
-@dataclass(frozen=True, eq=False)
-class VirtualMasterBatch(VirtualMasterControl):
-    """Controller of Method I for the beds of a batch: its memory is a list of masters."""
-
-    follow = _decide_by_run(VirtualMasterControl.follow)
-    is_new = _decide_by_run(VirtualMasterControl.is_new, any)
-    lead = _decide_by_run(VirtualMasterControl.lead)
-    find_disc = _decide_by_run(VirtualMasterControl.find_disc)
-    is_active = _decide_by_run(VirtualMasterControl.is_active, any)
-    get_pose = _decide_by_run(VirtualMasterControl.get_pose, _gather)
-    set_edge = _decide_by_run(VirtualMasterControl.set_edge)
-    get_heights = _decide_by_run(VirtualMasterControl.get_heights, _gather)
 
 
 def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl:

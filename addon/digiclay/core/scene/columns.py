@@ -92,7 +92,7 @@ def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any
     if isinstance(first, BatchControl) and not by_set:
         merged = merge_parts(controllers)
         parts = {part.name: getattr(merged, part.name) for part in fields(merged)}
-        return merged.batch_class(**parts | {"runs": tuple(controllers)})
+        return merged.find_batch_class(len(controllers))(**parts | {"runs": tuple(controllers)})
     return first if isinstance(first, Uncontrolled) else RunByRun(tuple(controllers))
 
 
