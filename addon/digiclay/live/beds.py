@@ -98,7 +98,7 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
     bed[TICK] = running.tick
     if before is not None and running.snapshot is before.snapshot:
         return
-    numbers = bytes(running.numbers)
+    numbers = bytes(running.names)
     for name, data in ((STATE, running.snapshot), (POSE, running.poses.tobytes()), (NUMBERS, numbers)):
         # Blender takes bytes that are assigned over others for a text: it stops at the first 0,
         # and corrupts its memory where the lengths differ.
@@ -132,7 +132,7 @@ def read_numbers(bed: Any) -> tuple[int, ...]:
     """Return the numbers of the fingertips at the stored state; 1 for older files and unusable ones."""
     value = bed.get(NUMBERS)
     numbers = tuple(value) if isinstance(value, bytes) else ()
-    valid = 0 < len(numbers) == len(set(numbers)) and all(0 < one <= len(FINGERS) for one in numbers)
+    valid = 0 < len(numbers) == len(set(numbers)) <= len(FINGERS) and min(numbers) > 0
     return numbers if valid else (1,)
 
 

@@ -12,12 +12,14 @@ from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
+from ..core.engine.system import System
 from ..core.files.run_folder import write_whole
 from ..core.scene.assembly import assemble
 from ..core.scene.toml_table import format_scene
 from ..core.session import snapshot
-from ..core.session.live_session import Clock, periods_due, simulate_path
+from ..core.session.live_session import Clock, periods_due
 from ..core.session.take import MOST_PARTS, Take, refine, to_scene
+from ..core.session.take import play as play_take
 from ..device import view
 from ..device.instant import find_ellipsoids
 from ..live import beds, handlers, tick
@@ -122,7 +124,7 @@ def play(operator: Any, context: Any) -> None:
 class ReplayTake(TimedAction, bpy.types.Operator):
     """Replay a take at its recorded speed. Esc stops and restores the bed"""
 
-    _states: Iterator[State]
+    _states: Iterator[tuple[System, State]]
     _clock: Clock
     _at: int
 
@@ -140,8 +142,8 @@ class ReplayTake(TimedAction, bpy.types.Operator):
     def perform(self, context: Any) -> None:
         """Play it without showing anything but its end."""
         self._begin(context)
-        for state in self._states:
-            self._state, self._at = state, self._at + 1
+        for moment in self._states:
+            (self._system, self._state), self._at = moment, self._at + 1
         self._finish(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
@@ -165,7 +167,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             self._clock, time.perf_counter(), period, preferences.get(context).most_periods
         )
         for _ in range(min(count, self._take.periods - self._at)):
-            self._state = next(self._states)
+            self._system, self._state = next(self._states)
             self._at += 1
         if self._at == self._take.periods:
             self.cancel(context)
@@ -192,13 +194,11 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         # The poses of the fingertips now: they may have been moved since the last session.
         self._stood = bridge.poses(bed)
         self._take: Take = takes.read(bed, self.take)
-        self._system = assemble(refine(self._take.scene, self.parts))
+        self._states = play_take(self._take, refine(self._take.scene, self.parts))
+        self._system, self._state = next(self._states)
         if self._system.grid.count != len(bed.data.vertices):
             here, there = len(bed.data.vertices), self._system.grid.count
             raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
-        self._state = snapshot.load(self._system, self._take.start)
-        take = self._take
-        self._states = simulate_path(self._system, self._state, take.poses, take.orders)
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:
@@ -211,9 +211,13 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         state = snapshot.dump(system, self._state)
         self._place(bed)
         # The session that would go on from here.
-        uid, poses, tick_count = bed.session_uid, self._take.poses[-1], beds.read_tick(bed)
-        numbers = tuple(fingertips_of(bed)) if len(fingertips_of(bed)) == len(poses) else None
-        begun = sculpting.begin_session(uid, bed.name, self._take.scene, poses, state, tick_count, numbers)
+        own, tick_count = len(self._take.scene.fingers), beds.read_tick(bed)
+        numbers = tuple(fingertips_of(bed))
+        numbers = numbers if len(numbers) == own else tuple(range(1, own + 1))
+        begun = sculpting.begin_session(
+            bed.session_uid, bed.name, self._take.scene, self._take.poses[-1, :own], state, tick_count,
+            numbers, running.name_fingers(numbers, system.fingers),
+        )  # fmt: skip
         beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)
         seconds = f"{self._take.duration:.1f} s"

@@ -184,7 +184,7 @@ def _mark(
     pins, boxes = list(session.trace.pins), tuple(picture.boxes)
     tops = np.column_stack([session.system.grid.positions[pins], session.state.row(0)[pins]])
     numbers = _list_numbers(session)
-    tips = session.poses[:, :3].copy()
+    tips = session.poses[: len(session.numbers), :3].copy()
     tips[:, 2] += [2.0 * finger.height for finger in find_ellipsoids(session.scene)]
     marks = [(color, 4.0, "") for _, color in zip(pins, colors.pins, strict=False)]
     marks += [(palettes.finger_color(number), 9.0, f"{number}") for number in numbers]

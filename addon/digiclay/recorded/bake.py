@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,8 @@ from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_se
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip
-from ..core.scene.assembly import assemble
-from ..core.session import snapshot
-from ..core.session.live_session import simulate_path
-from ..core.session.take import Take
+from ..core.model.layout import make_grid
+from ..core.session.take import Take, play
 from ..device import view
 from ..device.node_tree import attribute, enabled, mesh_of, new_tree, node, number, sample, socket, store
 from ..roles import BAKE, PALM, ROLE, fingertips_of, owner_of
@@ -91,19 +88,18 @@ def frame_periods(take: Take, rate: float) -> NDArray[np.intp]:
 def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
     """Simulate a take; yield the share done after each control period, and at last the `BakedFrames`."""
     wanted = frame_periods(take, rate)
-    system = assemble(take.scene)
-    count = system.grid.count
+    grid = make_grid(take.scene.layout)
+    count = grid.count
     height = np.empty((wanted.size, count), np.float32)
     force, mode = np.empty_like(height), np.empty((wanted.size, count), np.int8)
-    frame, start = 0, snapshot.load(system, take.start)
-    states = simulate_path(system, start, take.poses, take.orders)
-    for period, state in enumerate(chain([start], states)):
+    frame = 0
+    for period, (system, state) in enumerate(play(take)):
         while frame < wanted.size and wanted[frame] == period:
             height[frame], force[frame] = state.row(0), state.row(system.rows.force)
             mode[frame] = state.mode()
             frame += 1
         yield period / take.periods
-    yield BakedFrames(system.grid.positions, height, mode, force, take.poses[wanted])
+    yield BakedFrames(grid.positions, height, mode, force, take.poses[wanted])
 
 
 def apply(

@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..core.model.fingers import MOST_FINGERS
 from ..core.session.accuracy import ErrorMonitor, Errors
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
 from ..strokes.stroke import Stroke
+
+#: Number of the first fingertip that is no object of Blender.
+OWN = MOST_FINGERS + 1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -18,7 +22,8 @@ class Running(LiveSession):
     #: `session_uid` of the bed, and its name for messages.
     uid: int
     name: str
-    #: Numbers of the fingertips, in the order of `poses`: they keep theirs when others come or go.
+    #: Numbers of the fingertips, in the order of `poses`: they keep theirs when others come or go. Behind
+    #: them, in `system` and `poses`, are those that a stroke has for its images, see `names`.
     numbers: tuple[int, ...] = (1,)
     #: The state by `core.session.snapshot`; also in the bed's property.
     snapshot: bytes
@@ -54,6 +59,16 @@ class Running(LiveSession):
     last_place: tuple[float, float] | None = None
     #: Stored settings of the bed that `scene` was made of; None: unknown.
     settings: tuple[Any, ...] | None = None
+
+    @property
+    def names(self) -> tuple[int, ...]:
+        """Numbers of all fingertips, those of a stroke's images included, which are in no scene."""
+        return name_fingers(self.numbers, len(self.poses))
+
+
+def name_fingers(numbers: tuple[int, ...], count: int) -> tuple[int, ...]:
+    """Return the numbers of so many fingertips: those that have `numbers`, and those that a stroke adds."""
+    return (*numbers, *range(OWN, OWN + count - len(numbers)))
 
 
 @dataclass

@@ -15,19 +15,21 @@ from ..core.control.orders import Orders
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
 from ..core.engine.system import System
+from ..core.model.fingers import MOST_FINGERS
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
 from ..core.shapes.heightmap import HeightMap
 from ..device.instant import CLEARANCE, find_ellipsoid
-from ..strokes.motion import DRAG, follow
+from ..strokes.motion import DRAG, follow, follow_images
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.nominal import Device
+from ..strokes.pose import turn_image
 from ..strokes.stroke import ALONE, FINISHING, Brush, Image, Stroke, start
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
-from .running import Running
+from .running import Running, name_fingers
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
@@ -55,16 +57,20 @@ def begin_session(
 ) -> tuple[Running, str]:  # fmt: skip
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost.
 
-    `numbers`: of the fingertips; `was`: of those that the snapshot has.
+    `numbers`: of the fingertips, behind those of the scene others like its first one; `was`: of those that
+    the snapshot has.
     """
-    system, numbers = assemble(scene), numbers or tuple(range(1, len(scene.fingers) + 1))
+    own = len(scene.fingers)
+    numbers = numbers or tuple(range(1, own + 1))
+    whole = scene.with_fingers(len(numbers))
+    system = assemble(whole)
     state, lost = _load_state(system, _change_fingers(scene, system, kept, was or numbers, numbers))
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
         scene=scene, system=system, state=state, poses=poses, uid=uid, name=name, snapshot=now, tick=tick + 1,
-        numbers=numbers, clock=live_session.Clock(), monitor=accuracy.start(scene),
-        trace=recent_trace.start(system.period, fingers=system.fingers),
+        numbers=numbers[:own], clock=live_session.Clock(), monitor=accuracy.start(whole),
+        trace=recent_trace.start(system.period, fingers=own),
         next_gesture=live_session.Moment(state.period, now, poses),
     )  # fmt: skip
     return running, lost
@@ -166,8 +172,36 @@ def _follow_stroke(running: Running, count: int) -> Running:
         return running
     # The other fingers stay where they are.
     paths = np.repeat(running.poses[None], len(path), axis=0)
-    paths[:, 0] = path
+    paths[:, list_pressing(running)[: path.shape[1]]] = path
     return _follow(running, paths, orders, PAUSE)
+
+
+def list_pressing(running: Running) -> list[int]:
+    """Return the places of the fingertips of strokes: the first one's, and those of further images."""
+    return [0, *range(len(running.numbers), len(running.poses))]
+
+
+def _give_fingers(running: Running, count: int) -> Running:
+    """Return the session with so many fingertips for a stroke, new ones where the first one's images are."""
+    own = len(running.numbers)
+    total = own + min(max(count, 1), MOST_FINGERS - own + 1) - 1
+    had = len(running.poses)
+    if total == had or running.system.cell.touch is None:
+        return running
+    scene = running.scene.with_fingers(total)
+    system = assemble(scene)
+    places = [place if place < had else None for place in range(total)]
+    state = snapshot.change_fingers(running.system, system, running.state, places)
+    poses = np.concatenate([running.poses, np.empty((max(0, total - had), 7))])[:total]
+    (x, y, z), above = poses[0, :3].tolist(), float(running.state.row(0).max()) + CLEARANCE
+    images = running.strokes[0].images[1:] if total > had else ()
+    for finger, image in zip(range(had, total), images, strict=False):
+        poses[finger] = *image.place(x, y), max(z, above), *turn_image(poses[0, 3:], image)
+    recording = running.recording and running.recording.let_in(poses)
+    monitor = running.monitor and accuracy.start(scene)
+    return _pack(
+        replace(running, system=system, state=state, poses=poses, recording=recording, monitor=monitor)
+    )
 
 
 def estimate_time(running: Running) -> float:
@@ -177,8 +211,9 @@ def estimate_time(running: Running) -> float:
         speed, deepest = DRAG, max(sample.depth for sample in stroke.samples)
         if tracking is not None:
             speed = tracking.limit_drag(deepest, pressed=stroke.brush is Brush.LOWER)
-        for path in stroke.ahead:
-            time += BESIDE + float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) / speed
+        lengths = [float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in stroke.ahead]
+        times = [BESIDE + length / speed for length in lengths]
+        time += sum(times) if stroke.brush in SWEEPS else max(times)
     return time
 
 
@@ -199,7 +234,8 @@ def _follow(running: Running, path: Floats, orders: Orders | None, pause: int) -
         index = state.period - first
         monitor = monitor and accuracy.note(monitor, state, path[index : index + 2], pause)
         if state.period % trace.every == 0:
-            rows.append(recent_trace.sample(system, state, running.scene.set_point, trace.pins))
+            row = recent_trace.sample(system, state, running.scene.set_point, trace.pins)
+            rows.append(row[: trace.rows.shape[1]])
 
     gone, errors = live_session.follow_path(running, path, orders, running.tick, watch), None
     if monitor:
@@ -239,7 +275,14 @@ def restore(
 
     `was`: numbers of the fingertips of the snapshot, unless they are those of the session.
     """
-    if was is not None and was != running.numbers:
+    poses = poses.reshape(-1, 7)
+    if len(running.poses) > len(running.numbers):  # a stroke that is taken back takes its fingertips along
+        system = assemble(running.scene)
+        monitor = running.monitor and accuracy.start(running.scene)
+        own = running.poses[: len(running.numbers)]
+        running = replace(running, system=system, monitor=monitor, poses=own)
+    was = was or name_fingers(running.numbers, len(poses))
+    if was != running.numbers:
         kept = _change_fingers(running.scene, running.system, kept, was, running.numbers)
         poses = match_poses(poses, was, running.poses, running.numbers)
     state, _ = _load_state(running.system, kept)
@@ -268,21 +311,26 @@ def change_scene(
     if numbers[0] != running.numbers[0]:  # another fingertip has no part in its strokes
         running = drop_strokes(running)
     was, others = running.numbers, running.poses if poses is None else poses
+    images = running.names[len(was) :]
+    kept = match_poses(running.poses, running.names, others, numbers)
     other, lost = begin_session(
-        running.uid, running.name, scene, match_poses(running.poses, was, others, numbers), running.snapshot,
-        running.tick, numbers, was,
+        running.uid, running.name, scene, np.concatenate([kept, running.poses[len(was) :]]), running.snapshot,
+        running.tick, (*numbers, *images), running.names,
     )  # fmt: skip
 
     def change(moment: live_session.Moment) -> live_session.Moment:
-        kept = _change_fingers(scene, other.system, moment.snapshot, was, numbers)
+        kept = _change_fingers(scene, plain, moment.snapshot, was, numbers)
         assert kept is not None
         return replace(moment, snapshot=kept, poses=match_poses(moment.poses, was, others, numbers))
 
+    plain = assemble(scene) if images else other.system
     if numbers != was:
         start = running.stroke_start and change(running.stroke_start)
         running = replace(running, gestures=tuple(map(change, running.gestures)), stroke_start=start)
     names = ["clock", "paused", "blocking_reason", "finished_strokes", "last_place"]
     names += [] if lost else ["gestures", "strokes", "stroke_start"]
+    if lost:
+        other = _give_fingers(other, 1)
     trace = recent_trace.pick(other.trace, running.trace.pins, other.system.grid.count)
     return replace(other, trace=trace, **{name: getattr(running, name) for name in names}), lost
 
@@ -328,11 +376,12 @@ def restore_gesture(running: Running, gesture: live_session.Moment) -> Running:
 
 def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the fingertip off it; this can be rewound like a gesture."""
+    running = drop_strokes(running)
     # Before period 0, at which the first gesture after the reset may begin.
     before = live_session.Moment(-1, running.snapshot, running.poses)
     poses = running.poses.copy()
     poses[:, 2] = np.maximum(poses[:, 2], running.system.cell.actuator.rest_height + CLEARANCE)
-    back = restore(replace(drop_strokes(running), gestures=()), None, poses, tick=-1)
+    back = restore(replace(running, gestures=()), None, poses, tick=-1)
     return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
 
 
@@ -368,21 +417,30 @@ def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stro
 
 def drop_strokes(running: Running) -> Running:
     """Return the session without unfinished strokes; the fingertip stays there, upright."""
-    poses, turn = running.poses.copy(), running.strokes[0].turn if running.strokes else None
+    turn = running.strokes[0].turn if running.strokes else None
+    running = _give_fingers(running, 1)
+    poses = running.poses.copy()
     if turn is not None:
         poses[0, 3:] = turn
     return replace(running, strokes=(), stroke_start=None, poses=poses)
 
 
 def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | None]:
-    """Return the session, and path (k + 1, 7), k <= count, and orders of its first stroke.
+    """Return the session, and paths (k + 1, m, 7), k <= count, and orders of its first stroke.
 
-    The path ends where the stroke waits for the hand: there the clay stands still.
+    The paths, of the fingertips that `list_pressing` begins with, end where the stroke waits for the hand:
+    there the clay stands still.
     """
-    if running.strokes[0].height is None:
+    stroke = running.strokes[0]
+    if stroke.height is None:
         begun = live_session.Moment(running.state.period, running.snapshot, running.poses)
         running = replace(running, next_gesture=begun, stroke_start=begun)
-    stroke, path, orders = _advance(running, running.strokes[0], count)
+        if stroke.brush not in WHOLE:
+            tracking = None if stroke.brush in SWEEPS else find_tracking(running.scene, running.system)
+            stroke = begin_stroke(stroke, running.state.row(0), running.pose[3:], tracking)
+    running = _give_fingers(running, len(stroke.parts))
+    stroke, path, orders = _advance(running, stroke, count)
+    path = path.reshape(len(path), -1, 7)
     left = (stroke, *running.strokes[1:])
     running = replace(running, strokes=left)
     if stroke.done:
@@ -403,18 +461,18 @@ def find_device(running: Running) -> Device:
 
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
-    """Advance the fingertip along a stroke; return it, the path, and the orders."""
+    """Advance fingertips along a stroke; return it, the paths (k + 1, 7) or (k + 1, m, 7), and the orders."""
     state, pose, period, device = running.state, running.pose, running.system.period, find_device(running)
-    swept = stroke.brush in SWEEPS
     if stroke.brush in WHOLE:
         return order_all(stroke, pose)
-    if stroke.height is None:
-        tracking = None if swept else find_tracking(running.scene, running.system)
-        stroke = begin_stroke(stroke, state.row(0), pose[3:], tracking)
     arrived = live_session.has_arrived(state)
-    if swept:
+    if stroke.brush in SWEEPS:
         return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
     if stroke.phase == FINISHING:
         return finish(stroke, device, state.row(0), pose, count, period, arrived=arrived)
+    if stroke.parts:
+        pressing = list_pressing(running)
+        poses, forces = running.poses[pressing], state.finger_forces()[pressing]
+        return *follow_images(stroke, device, state.row(0), poses, count, period, forces), None
     force = recent_trace.measure_total_force(running.system, state)
     return *follow(stroke, device, state.row(0), pose, count, period, force), None

@@ -6,6 +6,10 @@ hand has not drawn further, it waits, and the session with it. So what it does f
 Depth counts from the surface as it was when the finger began, or when its pass did: pins that give way do not
 draw the fingertip after them. No Blender in here.
 
+Each image of a path has a fingertip, as far as there are any, and all go at once. Of two that come near each
+other the one of the later image lifts, and comes down again behind the other one; where images coincide, one
+of them is gone along.
+
 A brush that raises presses until the blister starts, and rises to its height there. Every brush then goes
 along at its height, up and down over what is formed.
 """
@@ -21,7 +25,19 @@ from ..core.base.arrays import Floats
 from ..core.model.fingertip import Fingertip
 from .nominal import Device, find_nominal, find_undersides, returns
 from .pose import lean_finger, turn_image, turn_toward
-from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, RISING, STAMPS, Brush, Stroke
+from .stroke import (
+    ABOVE,
+    DONE,
+    DRAGGING,
+    FINISHING,
+    LEAVING,
+    PRESSING,
+    RISING,
+    STAMPS,
+    YIELDING,
+    Brush,
+    Stroke,
+)
 from .tracking import SUDDEN, Tracking
 
 #: Lowest point of the fingertip, m.
@@ -52,6 +68,10 @@ FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3
+#: An image that is at another one, in largest diameters of the fingertip, yields; in pitches, is the same.
+TOO_NEAR, SAME = 0.75, 0.5
+#: Phases in which it touches, or is about to.
+DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +129,9 @@ def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | Non
     begun = replace(stroke, height=height, ground=height, phase=ABOVE, tracking=tracking, turn=turn)
     if tracking is None and stroke.brush.needs_blister:
         return replace(begun, phase=LEAVING, images=stroke.images[:1])
-    return begun
+    if stroke.brush in STAMPS or len(stroke.images) == 1:
+        return begun
+    return replace(begun, parts=tuple(replace(begun, image=image) for image in range(len(stroke.images))))
 
 
 def follow(
@@ -130,19 +152,90 @@ def follow(
         stroke = stroke if firm else replace(stroke, waited=0)
         # No farther than to where the force may count.
         count = 1 if _is_uneven(stroke, device, pose, count * period) else count
-    way, path = Way(device, period, find_safe(stroke, device)), [pose]
+    way, path = Way(device, period, find_safe(stroke, device, now)), [pose]
     while len(path) <= count and stroke.phase not in (FINISHING, DONE):
         step = _step(stroke, way, path[-1][:3].tolist())
         if step is None:
             break
         before, (stroke, place) = stroke, step
         if (stroke.phase, stroke.image) != (before.phase, before.image):
-            way = replace(way, safe=find_safe(stroke, device))
+            way = replace(way, safe=find_safe(stroke, device, now))
         turn = _turn(stroke, path[-1][3:], place[2] >= way.safe - NEAR, period)
         path.append(np.array([*place, *turn]))
         if stroke.phase != before.phase:
             break
     return stroke, np.array(path)
+
+
+def follow_images(
+    stroke: Stroke, device: Device, now: Floats, poses: Floats, count: int, period: float, forces: Floats
+) -> tuple[Stroke, Floats]:
+    """Advance m fingertips along the images of a stroke; return it and the paths (k + 1, m, 7), k <= count.
+
+    They begin with the first m images, and go on with those m further on. Where one waits for the hand, all
+    do: what they do follows from the path alone. Otherwise as `follow`.
+    """
+    path = [poses]
+    for part in stroke.parts:
+        dragged, at = part.tracking and part.phase == DRAGGING, poses[part.image % len(poses)]
+        if part.phase in (ABOVE, YIELDING) or (dragged and _is_uneven(part, device, at, count * period)):
+            count = 1
+    while len(path) <= count and stroke.parts:
+        before, (stroke, places) = stroke, _follow_once(stroke, device, now, path[-1], period, forces)
+        if stroke is before:
+            break
+        path.append(places)
+        if [part.phase for part in stroke.parts] != [part.phase for part in before.parts]:
+            break
+    return stroke, np.array(path)
+
+
+def _follow_once(
+    stroke: Stroke, device: Device, now: Floats, poses: Floats, period: float, forces: Floats
+) -> tuple[Stroke, Floats]:
+    """Advance fingertips by a period; return the stroke, as it is where one waits, and their poses (m, 7)."""
+    parts, count, after = list(stroke.parts), len(poses), poses.copy()
+    busy = [next((part for part in parts[first::count] if not part.left), None) for first in range(count)]
+    at = {part.image: poses[part.image % count] for part in busy if part}
+    for image, pose in sorted(at.items()):
+        part = replace(parts[image], samples=stroke.samples, held=stroke.held)
+        down = [at[other.image] for other in parts[:image] if other.image in at and other.phase in DOWN]
+        part = _yield(part, parts[:image], down, device, now, pose)
+        part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]))
+        if len(path) == 1 and not part.left:
+            return stroke, poses
+        parts[image], after[image % count] = part, path[-1]
+    if all(part.left for part in parts):  # for one more period, without the other fingertips
+        last = parts[-1]
+        return replace(stroke, parts=(), phase=LEAVING, image=last.image, reached=last.reached), after
+    return replace(stroke, parts=tuple(parts)), after
+
+
+def _yield(
+    part: Stroke, earlier: list[Stroke], down: list[Floats], device: Device, now: Floats, pose: Floats
+) -> Stroke:
+    """Return the stroke along an image, lifted where an earlier one is too near, of fingertips that are down.
+
+    Above, it comes as far along its path as it coincides with what an earlier one has gone along.
+    """
+    wide = 2.0 * max(device.finger.length, device.finger.width)
+    apart = min((math.dist(pose[:2], other[:2]) for other in down), default=math.inf)
+    if part.phase in (PRESSING, RISING, DRAGGING) and apart < TOO_NEAR * wide:
+        return replace(part, phase=YIELDING, standing=None, climb=0.0, pace=0.0)
+    if part.phase != YIELDING or pose[2] < find_safe(part, device, now) - NEAR:
+        return part
+
+    def is_same(other: Stroke, index: int) -> bool:
+        return math.dist(part.place(index), other.place(index)) < SAME * device.grid.layout.pitch
+
+    for other in earlier:
+        while part.reached < other.reached and is_same(other, part.reached):
+            if not is_same(other, part.reached + 1):
+                break
+            part = replace(_reach(part, device, part.reached + 1), phase=ABOVE)
+        if part.drawn and other.drawn and is_same(other, part.reached):
+            return leave(part)
+    return part if part.phase == ABOVE or apart < wide else replace(part, phase=PRESSING)
 
 
 def _is_uneven(stroke: Stroke, device: Device, pose: Floats, time: float = 0.0) -> bool:
@@ -154,23 +247,25 @@ def _is_uneven(stroke: Stroke, device: Device, pose: Floats, time: float = 0.0) 
     return near.size > 0 and bool(np.ptp(stroke.ground[near]) > UNEVEN)
 
 
-def find_safe(stroke: Stroke, device: Device) -> float:
-    """Return a height above all pins, m: those that stand, and those that the stroke has raised."""
+def find_safe(stroke: Stroke, device: Device, now: Floats) -> float:
+    """Return a height above all pins, m, `now` at heights (n,), m, and above what the stroke raises."""
     assert stroke.height is not None
     highest = float(stroke.height.max())
     # Before the fingertip is down for the first time nothing is raised, and not all of the path is known.
-    if stroke.brush.rises and (stroke.phase != ABOVE or stroke.image):
+    if len(stroke.images) > 1 and stroke.phase in (ABOVE, YIELDING):
+        highest = max(highest, float(now.max()))
+    elif stroke.brush.rises and stroke.phase != ABOVE:
         raised = max(sample.depth for sample in stroke.samples)
         highest = device.highest if stroke.accumulate else min(highest + raised, device.highest)
     return highest + CLEARANCE
 
 
 def cross(stroke: Stroke, place: Point, safe: float, period: float) -> tuple[Stroke, Point]:
-    """Rise to a safe height, m, then cross to the path's first place."""
+    """Rise to a safe height, m, then cross to the path's first place, or to where it is gone along next."""
     x, y, z = place
     if z < safe - NEAR:
         return stroke, (x, y, min(safe, z + DESCEND * period))
-    to_x, to_y = stroke.place(0)
+    to_x, to_y = stroke.place(stroke.reached)
     far, length = math.hypot(to_x - x, to_y - y), CROSS * period
     if far > length:
         return stroke, (x + (to_x - x) * length / far, y + (to_y - y) * length / far, z)
@@ -199,11 +294,8 @@ def _reach(stroke: Stroke, device: Device, reached: int) -> Stroke:
     return replace(stroke, reached=reached)
 
 
-def finish_image(stroke: Stroke) -> Stroke:
-    """Return the stroke with its next image begun, or with the wait for its pins, if valves drive any."""
-    if stroke.image + 1 < len(stroke.images):
-        begun = replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, first=0, climb=0.0, pace=0.0)
-        return replace(begun, ground=stroke.height, standing=None)
+def leave(stroke: Stroke) -> Stroke:
+    """Return the stroke that the fingertip has left, with the wait for its pins, if valves drive any."""
     return replace(stroke, phase=FINISHING if stroke.tracking else DONE, waited=0)
 
 
@@ -212,11 +304,13 @@ def _step(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None
     x, y, z = place
     if stroke.phase == ABOVE:
         return cross(stroke, place, way.safe, way.period)
-    if stroke.phase == LEAVING:
+    if stroke.phase in (LEAVING, YIELDING):
         # Pins that look for the fingertip are not to find it again.
         lift = max(DESCEND, OUTRUN * stroke.tracking.speed) if stroke.tracking else DESCEND
+        if stroke.phase == YIELDING:
+            return stroke, (x, y, max(z, min(way.safe, z + lift * way.period)))
         z = min(way.safe, z + lift * way.period)
-        return (finish_image(stroke) if z >= way.safe - NEAR else stroke), (x, y, z)
+        return (leave(stroke) if z >= way.safe - NEAR else stroke), (x, y, z)
     if stroke.brush in STAMPS:
         return _wait_for_stamp(stroke, way, place)
     if stroke.phase == PRESSING:

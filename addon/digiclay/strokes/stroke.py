@@ -22,8 +22,9 @@ Place = tuple[float, float]
 
 #: What the fingertip does: it waits for its turn, goes above the path's first place, presses there, rises
 #: with the blister (if its brush has one), goes along the path, leaves it, waits above until the valves have
-#: driven the pins to what the stroke is to leave; and the end.
-WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, FINISHING, DONE = range(8)
+#: driven the pins to what the stroke is to leave; and the end. An image yields to one before it that is too
+#: near: its fingertip lifts, and waits above.
+WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, FINISHING, DONE, YIELDING = range(9)
 #: Deepest press, and least one, m; also the greatest and the least height of a raise.
 DEEPEST, SHALLOWEST = 30e-3, 0.1e-3
 
@@ -155,7 +156,7 @@ class Stroke:
     #: The path, at least one place.
     samples: tuple[Sample, ...]
     brush: Brush = Brush.LOWER
-    #: The path itself, then its images. There is one finger: it goes along them one after the other.
+    #: The path itself, then its images.
     images: tuple[Image, ...] = ALONE
     #: Whether a path that comes back to where it was counts from what it has left there.
     accumulate: bool = False
@@ -163,6 +164,8 @@ class Stroke:
     stamp: HeightMap | None = None
     #: Whether the hand still draws.
     held: bool = True
+    #: The stroke along each image alone, while fingertips go along several at once.
+    parts: tuple[Stroke, ...] = ()
     #: What the fingertip does.
     phase: int = WAITING
     #: Index of the image that the fingertip is at, and of the sample it is at, or past.
@@ -197,14 +200,19 @@ class Stroke:
 
     @property
     def ahead(self) -> tuple[Floats, ...]:
-        """Places the fingertip has yet to come to, (k, 2), m: of the path it is at, and of those after it."""
+        """Places fingertips have yet to come to, (k, 2), m: along each image that is not finished."""
         path = [(sample.x, sample.y) for sample in self.samples]
-        left = [path[self.reached :], *([path] * (len(self.images) - self.image - 1))]
-        images = self.images[self.image :]
+        left = {part.image: part.reached for part in self.parts if not part.left}
+        left = left or {self.image: self.reached, **dict.fromkeys(range(self.image + 1, len(self.images)), 0)}
         return tuple(
-            np.array([image.place(*place) for place in places])
-            for image, places in zip(images, left, strict=True)
+            np.array([self.images[image].place(*place) for place in path[reached:]])
+            for image, reached in left.items()
         )
+
+    @property
+    def left(self) -> bool:
+        """Whether the fingertip has left the image that it was at."""
+        return self.phase in (FINISHING, DONE)
 
     @property
     def drawn(self) -> bool:

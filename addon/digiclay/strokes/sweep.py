@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.control.orders import FARTHEST, ORDER, Orders, Verb, place, repeat_order
-from .motion import DESCEND, DRAG, cross, drag, find_safe, finish_image
+from .motion import DESCEND, DRAG, cross, drag, find_safe
 from .nominal import Device, find_nominal, find_radius
 from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, Brush, Stroke
 
@@ -39,7 +39,8 @@ def sweep(
         x, y = pose[:2].tolist()
         rest = Orders(repeat_order(1, verb, x, y, radius))
         return _wait(stroke, pose, count, period, rest, arrived=arrived)
-    safe, path, rows = find_safe(stroke, device), [pose], []
+    assert stroke.height is not None
+    safe, path, rows = find_safe(stroke, device, stroke.height), [pose], []
     # So long a pin below the path is in the disc before its middle, and after it; at both ends as well.
     dwell = math.ceil(radius / (DRAG * period))
     while len(path) <= count and stroke.phase != FINISHING:
@@ -104,7 +105,9 @@ def _wait(
     # At the first look some pins pass their heights.
     if stroke.waited * period >= PATIENCE or (looks and arrived and stroke.arrived):
         last = stroke.image + 1 == len(stroke.images)
-        stroke = replace(stroke, phase=DONE) if last else finish_image(stroke)
+        # The valves sweep one image after the other.
+        begun = {} if last else {"image": stroke.image + 1, "reached": 0, "first": 0, "ground": stroke.height}
+        stroke = replace(stroke, phase=DONE if last else ABOVE, **begun)
         return stroke, np.array([pose, pose]), Orders(np.zeros((1, ORDER)))
     most = min(count, LOOK - stroke.waited % LOOK)
     stroke = replace(stroke, waited=stroke.waited + most, arrived=arrived if looks else stroke.arrived)

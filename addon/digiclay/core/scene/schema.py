@@ -211,6 +211,11 @@ class Scene:
         own = {name: parts.pop(name) for name in FINGER_SECTIONS if name in parts}
         return replace(self, fingers=tuple(replace(finger, **own) for finger in self.fingers), **parts)
 
+    def with_fingers(self, count: int) -> Scene:
+        """Return the scene with so many fingers: those it has, and further ones like the first."""
+        more = max(0, count - len(self.fingers))
+        return replace(self, fingers=(*self.fingers, *self.fingers[:1] * more)) if more else self
+
     @property
     def set_point(self) -> SetPoint | None:
         """Set point of the control; None without one."""

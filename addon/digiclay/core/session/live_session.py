@@ -34,6 +34,9 @@ SHORTEST = 1e-2
 #: Rounding errors of times count as whole periods when they are below this share of one.
 SLACK = 1e-6
 
+#: Where a fingertip of a recording stands that is not there, (7,): one that a stroke has for its images.
+AWAY = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
 Ticks = tuple[tuple[float, float], ...]
 
 
@@ -161,8 +164,8 @@ class Recording:
     first: int
     """Its period."""
     rows: Floats
-    """(capacity, 7 f + 5 + 1): Poses of the fingers at the end of each period, the order in it, see
-    `core.control.orders`, and the moment it was simulated in; row 0: the start."""
+    """(capacity, 7 f + 5 + 1): Poses of the fingers at the end of each period, AWAY: not there, the order in
+    it, see `core.control.orders`, and the moment it was simulated in; row 0: the start."""
     count: int
     """How many of the rows are in use."""
     saved: int = 0
@@ -200,7 +203,9 @@ class Recording:
         if end > len(rows):
             rows = np.empty((2 * end, self.rows.shape[1]))
             rows[: self.count] = self.rows[: self.count]
-        rows[self.count : end, : -ORDER - 1] = path.reshape(len(path), -1)
+        own = rows[self.count : end, : -ORDER - 1].reshape(len(path), -1, 7)
+        own[:], own[:, : path.shape[1]] = AWAY, path
+        rows[self.count : end, : -ORDER - 1] = own.reshape(len(path), -1)
         surfaces = self.surfaces
         rows[self.count : end, -ORDER - 1 : -1] = 0.0
         if orders is not None:
@@ -211,6 +216,14 @@ class Recording:
             given[placed, 0] = numbers[given[placed, 0].astype(np.intp)]
         rows[self.count : end, -1] = tick
         return replace(self, rows=rows, count=end, surfaces=surfaces)
+
+    def let_in(self, poses: Floats) -> Recording:
+        """Return the recording with fingertips at poses (f, 7) from its last row on."""
+        more = max(0, poses.size - (self.rows.shape[1] - ORDER - 1))
+        away = np.tile(AWAY, (len(self.rows), more // 7))
+        rows = np.concatenate([self.rows[:, : -ORDER - 1], away, self.rows[:, -ORDER - 1 :]], axis=1)
+        rows[self.count - 1, : poses.size] = poses.ravel()
+        return replace(self, rows=rows)
 
     def cut_at_tick(self, tick: int, period: int) -> Recording | None:
         """Return the recording as of a moment undo came back to, in `period`; None if that is another."""

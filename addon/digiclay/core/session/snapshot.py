@@ -171,6 +171,11 @@ def load(system: System, data: bytes) -> State:
     return State(header["period"], *bed, header["peak"], active, memory)
 
 
+def count_fingers(data: bytes) -> int:
+    """Return the number of fingers of a kept state; StateError when it is damaged."""
+    return len(_read(data).header["gathered"]["fingers"])
+
+
 def transfer_heights(system: System, data: bytes) -> State:
     """Return a session's beginning with the heights of a kept state: what is left when parts have changed."""
     kept = _read(data)

@@ -9,6 +9,7 @@ import io
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import groupby, islice
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..scene.toml_table import format_scene, resolve
 from . import snapshot
-from .live_session import Recording, simulate_path
+from .live_session import AWAY, Recording, simulate_path
 
 #: Waypoints that lie this near to the straight way between their neighbors are left out, m and 1.
 STRAIGHT = 1e-12
@@ -35,8 +36,9 @@ STRAIGHT = 1e-12
 PARTS = ("scene", "start", "poses", "end")
 #: What the number of a format's version stands for: 1, which is not written down, has poses (t + 1, 7) of one
 #: finger; 2 has (t + 1, f, 7); 3 has the array `SMOOTHING` besides, (t, 4), orders that smooth; 4 has orders
-#: (t, 5) and their surfaces (s, n) instead. A take without orders is written as 2, which older versions read.
-PLAIN, VERSION = 2, 4
+#: (t, 5) and their surfaces (s, n) instead; 5 has more fingers than the scene. A take with neither is written
+#: as 2, which older versions read.
+PLAIN, ORDERED, VERSION = 2, 4, 5
 SMOOTHING, ORDERS, SURFACES = "smoothing", "orders", "surfaces"
 #: Most parts a physics step is cut into when a take is simulated once more.
 MOST_PARTS = 64
@@ -55,7 +57,8 @@ class Take:
     start: bytes
     poses: Floats
     """(t + 1, f, 7): Fingers at the start, and at the end of each of t control periods: lowest point, m, and
-    unit quaternion."""
+    unit quaternion. Behind those of the scene are those that strokes had for their images, like the first
+    one: they are there in the periods between two poses that are not AWAY."""
     end: bytes
     """The states before and after, from `snapshot.dump`."""
     orders: Orders | None = None
@@ -64,7 +67,8 @@ class Take:
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
         kind, shape = self.poses.dtype, self.poses.shape
-        if shape[1:] != (fingers, 7) or len(self.poses) < 2 or kind != np.float64:
+        sized = len(shape) == 3 and shape[0] > 1 and shape[1] >= fingers and shape[2] == 7
+        if not sized or kind != np.float64:
             rule = f"must hold one control period at least, of {fingers} x 7 numbers, a pose a finger"
             raise ParameterError("Take", "poses", rule, f"an array of the shape {shape} of {kind}")
         sound = (np.abs(self.poses) <= FARTHEST) & (np.abs(self.poses[..., 3:]).max(2) > 0.1)[..., None]
@@ -88,6 +92,14 @@ class Take:
         return len(self.poses) - 1
 
     @property
+    def fingers(self) -> list[int]:
+        """Number of fingers in each period."""
+        own = len(self.scene.fingers)
+        there = (self.poses[:, own:] != AWAY).any(axis=2)
+        counts: list[int] = (own + (there[1:] & there[:-1]).sum(axis=1)).tolist()
+        return counts
+
+    @property
     def duration(self) -> float:
         """How long it lasts, s."""
         return self.periods * self.scene.simulation.control_period
@@ -95,8 +107,30 @@ class Take:
 
 def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
     """Simulate a take once more, or as another scene integrates it; a state is valid until the next one."""
-    system = assemble(scene or take.scene)
-    yield from simulate_path(system, snapshot.load(system, take.start), take.poses, take.orders)
+    return (state for _, state in islice(play(take, scene), 1, None))
+
+
+def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State]]:
+    """Yield system and state of a take, as `replay` has it, at its start and after each period."""
+    made = scene or take.scene
+
+    def change(system: System, state: State, count: int) -> tuple[System, State]:
+        if count == system.fingers:
+            return system, state
+        other, kept = assemble(made.with_fingers(count)), range(system.fingers)
+        places = [place if place in kept else None for place in range(count)]
+        return other, snapshot.change_fingers(system, other, state, places)
+
+    system = assemble(made.with_fingers(snapshot.count_fingers(take.start)))
+    state, first, end = snapshot.load(system, take.start), 0, take.end and snapshot.count_fingers(take.end)
+    yield system, state
+    for count, group in groupby(take.fingers):
+        system, state = change(system, state, count)
+        last = first + len(list(group))
+        orders = take.orders and replace(take.orders, rows=take.orders.rows[first:last])
+        path = take.poses[first : last + 1, :count]
+        for first, state in enumerate(simulate_path(system, state, path, orders), first + 1):  # noqa: B020
+            yield change(system, state, end or count) if first == take.periods else (system, state)
 
 
 def refine(scene: Scene, parts: int) -> Scene:
@@ -113,6 +147,7 @@ def to_scene(take: Take, name: str) -> Scene:
             f"The take {name!r} has strokes in which the valves drive pins by themselves, and a scene file "
             "holds the fingertip's path alone: record a take of the fingertip for export."
         )
+    whole = take.scene.with_fingers(take.poses.shape[1])
     system = assemble(take.scene)
     if not _is_at_rest(system, take.start):
         raise OutputError(
@@ -123,7 +158,7 @@ def to_scene(take: Take, name: str) -> Scene:
     lasting = replace(take.scene.simulation, duration=float(times[-1]))
     fingers = tuple(
         replace(finger, trajectory=_make_path(times, take.poses[:, number]))
-        for number, finger in enumerate(take.scene.fingers)
+        for number, finger in enumerate(whole.fingers)
     )
     return replace(take.scene, name=name, simulation=lasting, fingers=fingers)
 
@@ -159,6 +194,7 @@ def to_bytes(take: Take) -> bytes:
     """Write a take as numpy's ``.npz``"""
     written = io.BytesIO()
     orders = take.orders
+    several = take.poses.shape[1] > len(take.scene.fingers)
     ordered = {} if orders is None else {ORDERS: orders.rows, SURFACES: np.array(orders.surfaces)}
     np.savez(
         written,
@@ -166,7 +202,7 @@ def to_bytes(take: Take) -> bytes:
         start=np.frombuffer(take.start, np.uint8),
         poses=take.poses,
         end=np.frombuffer(take.end, np.uint8),
-        version=np.array(VERSION if ordered else PLAIN),
+        version=np.array(VERSION if several else ORDERED if ordered else PLAIN),
         **ordered,
     )
     return written.getvalue()
