@@ -14,7 +14,17 @@ from digiclay.press.pointer import CURVE_ITEMS, FULL_TILT, begin_button, find_le
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, drop_strokes, find_stroke, last_place, queue_stroke
-from digiclay.strokes.motion import APPROACH, CLEARANCE, DESCEND, DRAG, PRESS, TURN, begin, follow
+from digiclay.strokes.motion import (
+    APPROACH,
+    CLEARANCE,
+    DESCEND,
+    DRAG,
+    PRESS,
+    TURN,
+    begin,
+    follow,
+    follow_images,
+)
 from digiclay.strokes.nominal import Device
 from digiclay.strokes.pose import lean_finger, turn_image, turn_toward
 from digiclay.strokes.stroke import (
@@ -60,9 +70,21 @@ def path(
     stroke: Stroke, at: NDArray[np.float64] = AT, chunk: int = 4000, bed: NDArray[np.float64] = HEIGHT
 ) -> tuple[Stroke, NDArray[np.float64]]:
     """Let the finger go on as far as it is drawn, a chunk of periods at a time, without a blister."""
-    stroke, poses, part = begin(stroke, bed, at[3:], None), [at], at[None]
+    stroke, poses = lead(begin(stroke, bed, at[3:], None), at[None], chunk, bed)
+    return stroke, poses[:, 0]
+
+
+def lead(
+    stroke: Stroke, at: NDArray[np.float64], chunk: int = 4000, bed: NDArray[np.float64] = HEIGHT
+) -> tuple[Stroke, NDArray[np.float64]]:
+    """Let fingers at poses (m, 7) go on along a stroke that has begun; return their poses (t, m, 7)."""
+    poses, part, forces = [at], at[None], np.zeros(len(at))
     while not stroke.done and (len(part) > 1 or len(poses) == 1):
-        stroke, part = follow(stroke, DEVICE, bed, poses[-1], chunk, PERIOD)
+        if stroke.parts:
+            stroke, part = follow_images(stroke, DEVICE, bed, poses[-1], chunk, PERIOD, forces)
+        else:
+            stroke, part = follow(stroke, DEVICE, bed, poses[-1][0], chunk, PERIOD)
+            part = np.repeat(part[:, None], len(at), axis=1)
         poses += list(part[1:])
     return stroke, np.array(poses)
 
@@ -91,18 +113,58 @@ def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves: int)
 
 @pytest.mark.parametrize("shown", [1, 3, 11, 20], ids=lambda count: f"{count} of 21 places drawn first")
 @pytest.mark.parametrize("chunk", [1, 7, 4000], ids=lambda count: f"{count} periods at a time")
-def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(chunk: int, shown: int) -> None:
-    whole = release(line(images=make_images("X")))
-    part, first = path(replace(whole, samples=whole.samples[:shown], held=True), chunk=chunk)
+@pytest.mark.parametrize("fingers", [1, 2])
+@pytest.mark.parametrize("away", [0.0, 20e-3], ids=["from the axis", "apart"])
+def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away, fingers, chunk, shown):
+    whole, at = (
+        release(line(images=make_images("X", center=(-away, 0.0)))),
+        np.repeat(AT[None], fingers, axis=0),
+    )
+    part = begin(replace(whole, samples=whole.samples[:shown], held=True), HEIGHT, AT[3:], None)
+    part, first = lead(part, at, chunk)
     assert not part.done
-    assert part.image == 0  # its mirror image waits until the hand has let go
-    assert first[:, 0].max() <= whole.samples[shown - 1].x
-    poses = [*first]
-    stroke = replace(part, samples=whole.samples, held=False)
-    while not stroke.done:
-        stroke, more = follow(stroke, DEVICE, HEIGHT, poses[-1], chunk, PERIOD)
-        poses += list(more[1:])
-    np.testing.assert_array_equal(np.array(poses), path(whole)[1])
+    # Each goes along its image no further than the hand has drawn; with one finger the second one waits.
+    assert (first[:, 0, 0] + away).max() <= whole.samples[shown - 1].x + away
+    assert (-first[:, -1, 0] - away).max() <= whole.samples[shown - 1].x + away
+    assert fingers == 2 or part.parts[1].reached == 0
+    poses, stroke = [*first], replace(part, samples=whole.samples, held=False)
+    done, more = lead(stroke, poses[-1], chunk)
+    assert done.done
+    np.testing.assert_array_equal(
+        np.array([*poses, *more[1:]]), lead(begin(whole, HEIGHT, AT[3:], None), at)[1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("drawn", "images", "pressing", "longer"),
+    [
+        pytest.param([(20, 5), (26, 5)], make_images("XY"), 2, 120, id="two wait for two that are near"),
+        pytest.param([(20, 20), (26, 22)], make_images("XY"), 4, 1, id="apart all press"),
+        pytest.param([(0, -20), (0, 20)], make_images("X"), 1, 1, id="on the axis one presses"),
+        pytest.param([(0.7, -20), (0.7, 20)], make_images("X"), 1, 1, id="or within half a pitch"),
+        pytest.param([(0, 0), (0, 0)], make_images("RADIAL", 24), 1, 1, id="a click in the middle"),
+        pytest.param([(4, -28), (4, 28)], make_images("X"), 2, 120, id="beside the axis one is behind"),
+        pytest.param([(28, -20), (-28, 28)], make_images("X"), 2, 120, id="across the axis one gives way"),
+    ],
+)
+def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer):
+    places = 1e-3 * np.linspace(*np.array(drawn, float), 57)
+    stroke = begin(lay_path(start(1, 0.0, 0.0, 4e-3, images), places), HEIGHT, AT[3:], None)
+    alone = len(path(lay_path(start(1, 0.0, 0.0, 4e-3), places))[1])
+    done, poses = lead(stroke, np.repeat(AT[None], len(images), axis=0))
+    assert done.done
+    assert len(poses) - alone <= longer
+    down = poses[..., 2] < 40e-3
+    assert down.sum(axis=1).max() == pressing
+    # Wherever two press, three quarters of a finger are between them, but for the way while one lifts.
+    apart = np.linalg.norm(poses[:, :, None, :2] - poses[:, None, :, :2], axis=-1)
+    apart[~(down[:, :, None] & down[:, None])] = np.inf
+    apart[:, *np.diag_indices(len(images))] = np.inf
+    assert apart.min() > 0.75 * 20e-3 - 2.5e-3
+    pressed_at = poses[..., :2][poses[..., 2] < 36e-3 + 1e-9]
+    for image in images:
+        for place in places[[0, 20, -1]]:
+            assert np.linalg.norm(pressed_at - image.place(*place), axis=1).min() < 1.5e-3
 
 
 def test_the_finger_crosses_the_bed_above_all_pins() -> None:

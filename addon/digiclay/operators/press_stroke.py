@@ -77,8 +77,8 @@ class PressSettings:
         subtype="FACTOR", precision=2,
     )  # fmt: skip
     symmetry: choice(
-        "Symmetry", "Mirror images of a stroke, or turned ones. The device has one finger: "
-        "it forms them one after the other, as one undo step", items=brush.SYMMETRY_ITEMS, default="NONE",
+        "Symmetry", "Mirror images of a stroke, or turned ones: formed at the same time, as one undo step",
+        items=brush.SYMMETRY_ITEMS, default="NONE",
     )  # fmt: skip
     radial: integer("Radial Count", "Number of images", default=6, min=FEWEST, max=MOST)
     center_x: millimeters(

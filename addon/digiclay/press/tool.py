@@ -20,7 +20,7 @@ from ..device.instant import find_ellipsoid
 from ..overlay.picture import Color, Line, Words
 from ..roles import fingertip_of
 from ..sessions import running
-from ..sessions.sculpting import estimate_time
+from ..sessions.sculpting import estimate_time, list_pressing
 from ..settings import devices
 from ..strokes.nominal import find_radius
 from ..strokes.stroke import LOCKS, STAMPS, Brush, lay_ring, lay_square
@@ -226,15 +226,17 @@ def _shown_brush(bed: Any, settings: Any) -> Brush:
 
 
 def _trail(target: aim.Target) -> list[Floats]:
-    """Return what the fingertip has still to go along, and its rim where it is, on the pins; or nothing."""
+    """Return what fingertips have still to go along, and their rims where they are, on the pins; or none."""
     session = running.find(target.bed)
     if session is None or not session.strokes:
         return []
-    finger, pose, kind = find_ellipsoid(session.scene), session.pose, session.strokes[0].brush
-    depth = float(target.height.max()) - pose[2]
-    rim = pose[:2] + find_outline(finger, pose[3:], depth, kind, target.grid.layout)
-    first, *later = [path for stroke in session.strokes for path in stroke.ahead]
-    ways = [close(rim), np.concatenate([pose[None, :2], first]), *later]
+    finger, top, kind = find_ellipsoid(session.scene), float(target.height.max()), session.strokes[0].brush
+    ways = [path for stroke in session.strokes for path in stroke.ahead]
+    if not session.strokes[0].parts:
+        ways[0] = np.concatenate([session.poses[:1, :2], ways[0]])
+    for pose in session.poses[list_pressing(session)]:
+        rim = find_outline(finger, pose[3:], top - pose[2], kind, target.grid.layout)
+        ways.append(close(pose[:2] + rim))
     return [drape(target.grid, target.height, way) for way in ways if len(way) > 1]
 
 

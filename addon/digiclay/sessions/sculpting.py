@@ -319,9 +319,10 @@ def change_scene(
     )  # fmt: skip
 
     def change(moment: live_session.Moment) -> live_session.Moment:
-        kept = _change_fingers(scene, plain, moment.snapshot, was, numbers)
+        had = name_fingers(was, len(moment.poses))
+        kept = _change_fingers(scene, plain, moment.snapshot, had, numbers)
         assert kept is not None
-        return replace(moment, snapshot=kept, poses=match_poses(moment.poses, was, others, numbers))
+        return replace(moment, snapshot=kept, poses=match_poses(moment.poses, had, others, numbers))
 
     plain = assemble(scene) if images else other.system
     if numbers != was:

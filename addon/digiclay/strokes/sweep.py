@@ -106,8 +106,8 @@ def _wait(
     if stroke.waited * period >= PATIENCE or (looks and arrived and stroke.arrived):
         last = stroke.image + 1 == len(stroke.images)
         # The valves sweep one image after the other.
-        begun = {} if last else {"image": stroke.image + 1, "reached": 0, "first": 0, "ground": stroke.height}
-        stroke = replace(stroke, phase=DONE if last else ABOVE, **begun)
+        later = replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, first=0, ground=stroke.height)
+        stroke = replace(stroke, phase=DONE) if last else later
         return stroke, np.array([pose, pose]), Orders(np.zeros((1, ORDER)))
     most = min(count, LOOK - stroke.waited % LOOK)
     stroke = replace(stroke, waited=stroke.waited + most, arrived=arrived if looks else stroke.arrived)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from digiclay.overlay import views
 from digiclay.recorded import takes
 from digiclay.roles import fingertips_of
 from digiclay.sessions import running, sculpting
+from digiclay.strokes.stroke import make_images
 
 from tests.blender.at_hand import looked, select
 from tests.blender.session.live import Clock, exact, only_bed, shown, started, waits
@@ -266,3 +268,66 @@ def test_the_state_of_two_is_continued_by_three_and_by_one(pair: Any, clock: Clo
     started(pair)
     assert running.find(pair).numbers == (2,)
     np.testing.assert_array_equal(running.find(pair).state.row(0), formed)
+
+
+def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(
+    pair: Any, clock: Clock, tmp_path: Path
+) -> None:
+    started(pair)
+    move(pair, {1: 46.0, 2: 46.0})
+    clock.tick(3)
+    running.put(sculpting.set_recording(running.find(pair), True))
+    images = make_images("RADIAL", 4)
+
+    def draw() -> None:
+        session, number = sculpting.queue_stroke(running.find(only_bed()), 12e-3, 8e-3, 3e-3, images)
+        running.put(sculpting.change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
+
+    def press_down() -> None:
+        for _ in range(60):
+            clock.tick()
+            if (running.find(only_bed()).state.finger_forces() > 0.01).sum() == 4:
+                return
+        raise AssertionError("The fingertips do not press")
+
+    draw()
+    press_down()
+    session = running.find(pair)
+    assert (len(session.poses), beds.read_numbers(pair)) == (5, (1, 2, 33, 34, 35))
+    assert [number for number, _ in views.read_session(pair, session, COLORS).fingers] == [1, 2]
+    bpy.ops.ed.undo_push(message="In its middle")
+    in_the_middle = shown(pair).copy()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "middle.blend"), copy=True)
+    for _ in range(200):
+        clock.tick()
+        if not running.find(pair).strokes:
+            break
+    assert (len(running.find(pair).poses), beds.read_numbers(pair)) == (2, (1, 2))
+    assert clock.tick() == []
+    table = running.find(pair).state.row(0).reshape(13, 13)
+    np.testing.assert_allclose(table, np.rot90(table), rtol=0, atol=2e-6)
+    assert table.min() < 37.1e-3
+    bpy.ops.ed.undo_push(message="Done")
+    bpy.ops.ed.undo()
+    looked()
+    clock.tick(handlers.STALE)
+    bed = only_bed()
+    session = running.find(bed)
+    assert (session.numbers, len(session.poses), session.strokes) == ((1, 2), 2, ())
+    np.testing.assert_allclose(shown(bed), in_the_middle, rtol=0, atol=1e-3)
+    # It goes on from there, and stops in the middle of another one.
+    draw()
+    press_down()
+    handlers.end("was stopped")
+    take = takes.read(bed)
+    assert max(take.fingers) == 5
+    assert started(bed) is None
+    assert (running.find(bed).numbers, len(running.find(bed).poses)) == ((1, 2), 2)
+    handlers.end("was stopped")
+    bpy.ops.digiclay.take_replay()
+    assert beds.read_numbers(bed) in ((1, 2), (1, 2, 33, 34, 35))
+    bpy.ops.digiclay.bake(source="TAKE")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "middle.blend"))
+    looked()
+    started(only_bed())
+    np.testing.assert_allclose(shown(only_bed()), in_the_middle, rtol=0, atol=1e-6)

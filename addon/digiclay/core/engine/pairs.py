@@ -72,7 +72,9 @@ class HandSelection(Selection):
     def release(self, state: State) -> Flags:
         """Put the active cells back; the pulp of a fingertip out of reach has aged since they were taken."""
         active, near, touch = state.active, state.active.near, self.cell.touch
-        if near and active.reach is not None and isinstance(touch, HandTouch):
+        # Of cells taken over from another number of fingertips no disc tells whose pulps have aged: none has.
+        known = active.reach is not None and any_true(np.asarray(active.reach[2]) >= 0.0)
+        if near and known and isinstance(touch, HandTouch):
             rows = [own.pulp.rows for own in touch.each]
             apart = ~find_pairs(active)
             waited = (state.period - (active.until - KEPT)) * self.period

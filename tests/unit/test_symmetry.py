@@ -1,0 +1,231 @@
+"""Symmetric press strokes in a session: all images at once, in the time of one, and nothing is lost."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+import pytest
+from digiclay.core.base.arrays import Floats
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout
+from digiclay.core.session import snapshot
+from digiclay.core.session.take import Take, from_bytes, make_take, play, to_bytes
+from digiclay.sessions import sculpting
+from digiclay.sessions.running import Running
+from digiclay.settings.devices import make_scene
+from digiclay.strokes.stroke import ALONE, Brush, Image, lay_path, make_images
+
+from tests.hand import finish, heights
+
+#: Pins on a side, their distance, m, and the height at which the fingertip waits, m.
+COUNT, PITCH, ABOVE = 41, 1.5e-3, 46e-3
+
+
+def begin(method: str = "virtual_master", fingers: int = 1) -> Running:
+    """Return a session that is recorded, of fingertips of which only the first one is near the bed."""
+    scene = make_scene("paper", Layout(COUNT, COUNT, PITCH), method, 0.5).with_fingers(fingers)
+    poses = np.array([[0.3 * number, 0.0, ABOVE, *LEVEL] for number in range(fingers)])
+    return sculpting.set_recording(sculpting.begin_session(7, "Bed", scene, poses)[0], True)
+
+
+def queue(
+    session: Running, path: Floats, images: tuple[Image, ...], brush: Brush = Brush.LOWER, held: bool = False
+) -> Running:
+    """Queue a stroke of 4 mm along a path, mm, for a hand that holds it or has let it go."""
+    places = 1e-3 * np.asarray(path, float)
+    session, number = sculpting.queue_stroke(session, *places[0], 4e-3, images, brush)
+    session = sculpting.change_stroke(session, number, partial(lay_path, points=places))
+    return sculpting.change_stroke(session, number, lambda stroke: replace(stroke, held=held))
+
+
+def line(start: tuple[float, float], end: tuple[float, float]) -> Floats:
+    """Return a path that a hand has drawn, mm."""
+    return np.linspace(start, end, 30)
+
+
+def go_on(session: Running, periods: int) -> Running:
+    """Simulate so many periods of the strokes."""
+    end = session.state.period + periods
+    while session.state.period < end:
+        session = sculpting.follow_finger(session, session.poses, 1)
+    return session
+
+
+def keep(session: Running) -> Take:
+    """Return what a session has recorded, read from bytes."""
+    assert session.recording is not None
+    take = make_take(session.scene, session.recording, session.snapshot)
+    assert take is not None
+    return from_bytes(to_bytes(take))
+
+
+def is_replayed(take: Take) -> bool:
+    """Tell whether a take comes to its end bit for bit."""
+    *_, (system, last) = play(take)
+    return snapshot.dump(system, last) == take.end
+
+
+#: A path that stays apart from its images, and from the pins' rows, mm.
+APART = line((15.5, 8.0), (21.0, 11.0))
+#: Images on whole pins, how they turn a table of pins, and the pins by which their center is off the middle.
+TURNED = {
+    "four turns": (make_images("RADIAL", 4), np.rot90, (0, 0)),
+    "four turns about another place": (make_images("RADIAL", 4, (3e-3, -1.5e-3)), np.rot90, (-1, 2)),
+    "two turns": (make_images("RADIAL", 2), lambda table: np.rot90(table, 2), (0, 0)),
+    "x": (make_images("X"), np.fliplr, (0, 0)),
+    "y of another axis": (make_images("Y", center=(0.0, 3e-3)), np.flipud, (2, 0)),
+    "a diagonal": (make_images("Y", angle=math.pi / 4), np.transpose, (0, 0)),
+    "both": (make_images("XY"), np.fliplr, (0, 0)),
+}
+
+
+@cache
+def alone(method: str, brush: Brush) -> int:
+    """Return the control periods of the path without images."""
+    return finish(queue(begin(method), APART, ALONE, brush)).state.period
+
+
+@pytest.mark.parametrize(
+    ("method", "brush", "images"),
+    [
+        ("virtual_master", Brush.LOWER, "four turns"),
+        ("virtual_master", Brush.LOWER, "both"),
+        ("virtual_master", Brush.RAISE, "a diagonal"),
+        ("hybrid", Brush.RAISE, "four turns about another place"),
+        ("hybrid", Brush.LOWER, "y of another axis"),
+        ("cell_states", Brush.LOWER, "two turns"),
+        ("plastic", Brush.LOWER, "x"),
+    ],
+)
+def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(method, brush, images):
+    made, turn, (row, column) = TURNED[images]
+    session = finish(queue(begin(method), APART, made, brush))
+    # One period more, without the fingertips of the images; noise of the valves may take another look.
+    assert session.state.period - alone(method, brush) in (1, 5)
+    table = 1e3 * heights(session).reshape(COUNT, COUNT) - 40.0
+    part = np.roll(table, (-row, -column), (0, 1))[5:-5, 5:-5]
+    # Valves place pins to 1 µm; pins that only give way differ by the order in which fingertips press them.
+    np.testing.assert_allclose(part, turn(part), rtol=0, atol=0.03 if method == "plastic" else 2e-3)
+    assert np.abs(part).max() > 2.5
+    assert (session.poses.shape, session.system.fingers, len(session.gestures)) == ((1, 7), 1, 1)
+    take = keep(session)
+    assert take.poses.shape == (session.state.period + 1, len(made), 7)
+    assert is_replayed(take)
+
+
+#: Images that meet: method, path, mm, images, and greatest time, as a multiple of that of one.
+MEETING = {
+    "on the axis one fingertip presses": ("hybrid", line((0, -15), (0, 15)), make_images("X"), 1.1),
+    "a click in the middle is one": ("virtual_master", line((0, 0), (0, 0)), make_images("RADIAL", 6), 1.05),
+    "across the axis one follows": ("virtual_master", line((-18, -9), (18, 9)), make_images("X"), 1.8),
+    "from the axis one follows": ("hybrid", line((0, -9), (18, 9)), make_images("X"), 1.8),
+    "rays follow each other": ("hybrid", line((0, 0), (18, 4)), make_images("RADIAL", 4), 4.0),
+    "side by side by half a finger": ("virtual_master", line((2.5, -9), (2.5, 9)), make_images("X"), 1.7),
+    "many": ("hybrid", line((24, 0), (24, 1)), make_images("RADIAL", 24), 3.0),
+}
+
+
+@pytest.mark.parametrize("name", MEETING)
+def test_images_that_meet_give_way_and_all_of_them_form(name: str) -> None:
+    method, path, images, longest = MEETING[name]
+    brush = Brush.RAISE if method == "hybrid" else Brush.LOWER
+    usual = finish(queue(begin(method), path, ALONE, brush)).state.period
+    session, force = queue(begin(method), path, images, brush), 0.0
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.poses, 8)
+        force = max(force, float(session.state.finger_forces().max()))
+    assert session.state.period < longest * usual
+    assert force < 1.0  # one alone: 0.2 N; a fingertip that runs into another's ridge: 40 N
+    formed = np.abs(heights(session) - 40e-3)
+    for image in images:
+        places = np.array([image.place(*place) for place in 1e-3 * path])
+        assert formed[session.system.grid.at(*places.T)].min() > 3e-3
+    assert is_replayed(keep(session))
+
+
+@pytest.mark.parametrize("fingers", [1, 10])
+def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay(fingers: int) -> None:
+    session = begin(fingers=fingers)
+    stood, most = session.poses.copy(), 0
+    session = queue(session, line((24, 0), (24, 0)), make_images("RADIAL", 24))
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.poses, 8)
+        most = max(most, session.system.fingers)
+    assert most == min(fingers + 23, 32)
+    np.testing.assert_array_equal(session.poses[1:], stood[1:])
+    angle = np.arange(24) * math.pi / 12
+    assert (
+        heights(session)[session.system.grid.at(24e-3 * np.cos(angle), 24e-3 * np.sin(angle))].max() < 37e-3
+    )
+
+
+def middle() -> Running:
+    """Return a session in the middle of a radial stroke, with four fingertips in the pins."""
+    session = go_on(queue(begin(), APART, make_images("RADIAL", 4)), 70)
+    assert session.system.fingers == 4
+    assert session.state.finger_forces().min() > 0.01
+    return session
+
+
+def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_symmetry_goes_on() -> None:
+    session = sculpting.rewind(middle())
+    assert (session.poses.shape, session.system.fingers, session.strokes) == ((1, 7), 1, ())
+    np.testing.assert_array_equal(heights(session), 40e-3)
+    session = finish(queue(session, APART, make_images("X")))
+    session = go_on(finish(queue(session, APART[::-1], make_images("RADIAL", 3), Brush.RAISE)), 3)
+    take = keep(session)
+    assert (take.poses.shape[1], max(take.fingers), min(take.fingers)) == (4, 3, 1)
+    assert is_replayed(take)
+
+
+def test_a_recording_begins_and_ends_in_the_middle_of_a_stroke() -> None:
+    session = sculpting.set_recording(middle(), True)
+    session = go_on(session, 20)
+    assert set(keep(session).fingers) == {4}
+    assert is_replayed(keep(session))
+    # Dropped, the stroke ends there, and so do its fingertips.
+    dropped = sculpting.drop_strokes(session)
+    assert (dropped.system.fingers, dropped.poses.shape) == (1, (1, 7))
+    assert is_replayed(keep(dropped))
+
+
+@pytest.mark.parametrize("change", ["settings", "a second fingertip", "both"])
+def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change: str) -> None:
+    session = middle()
+    scene, numbers = session.scene, session.numbers
+    if change != "a second fingertip":
+        scene = replace(scene, control=replace(scene.control, force_gain=0.9 * scene.control.force_gain))
+    if change != "settings":
+        scene, numbers = scene.with_fingers(2), (1, 2)
+    force = go_on(middle(), 1).state.finger_forces()
+    poses = np.array([[0.0, 0.0, ABOVE, *LEVEL]] * len(numbers))
+    session, lost = sculpting.change_scene(session, scene, numbers, poses)
+    assert (lost, session.numbers, session.names[len(numbers) :]) == ("", numbers, (33, 34, 35))
+    session = go_on(session, 1)
+    # The pulps of the images' fingertips relax on: ones that begin anew would press 2.6 times as hard.
+    pressing = session.state.finger_forces()[sculpting.list_pressing(session)]
+    np.testing.assert_allclose(pressing, force, rtol=0.1)
+    done = finish(session)
+    table = 1e3 * heights(done).reshape(COUNT, COUNT)
+    np.testing.assert_allclose(table, np.rot90(table), rtol=0, atol=2e-3)
+    assert done.system.fingers == len(numbers)
+    back = done
+    while back.gestures:  # a change is where another one begins
+        back = sculpting.rewind(back)
+        assert back.system.fingers == len(numbers)
+    np.testing.assert_allclose(heights(back), 40e-3, rtol=0, atol=1e-9)
+
+
+def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke() -> None:
+    session = middle()
+    again, lost = sculpting.begin_session(
+        7, "Bed", session.scene, session.poses[:1], session.snapshot, 0, session.numbers, session.names
+    )
+    assert (lost, again.system.fingers) == ("", 1)
+    np.testing.assert_array_equal(heights(again), heights(session))
+    # Undo comes back to it as well.
+    back = sculpting.restore(again, session.snapshot, session.poses, 1, session.names)
+    np.testing.assert_array_equal(heights(back), heights(session))

@@ -1,0 +1,121 @@
+"""Draws symmetric strokes on a turned and shifted bed, one after the other without a pause, by X events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+from tests.window.hand_strokes import (
+    act,
+    brush,
+    done,
+    finish,
+    hand,
+    line,
+    note,
+    on_the_screen,
+    prepare,
+    reset,
+    to,
+)
+
+#: Ends of a stroke that stays apart from its images, of one across the mirror's axis, and of one on it, mm.
+APART = ((27.0, 9.0), (27.0, 21.0))
+ACROSS = ((-27.0, -9.0), (27.0, 12.0))
+ALONG = ((0.0, -24.0), (0.0, 24.0))
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what a hand does."""
+    yield from prepare(blender, "TOP", bed="paper")
+    bed = blender.beds()[0]
+    bed.rotation_euler[2], bed.location[0], bed.location[1] = 0.4, 0.3, -0.2
+    blender.evaluate()
+    yield None
+    blender.call(bpy.ops.view3d.view_all)
+    yield from act(
+        blender, to(on_the_screen(blender, 0.0, 0.0)), "click 1"
+    )  # the first press starts the session
+    settings = brush(blender)
+    settings.radial = 4
+    for name, symmetry, way in (
+        ("one", "NONE", APART), ("radial", "RADIAL", APART), ("mirrored", "X", APART),
+        ("across alone", "NONE", ACROSS), ("across", "X", ACROSS),
+        ("along alone", "NONE", ALONG), ("along", "X", ALONG),
+    ):  # fmt: skip
+        yield from begin(blender)
+        settings.symmetry = symmetry
+        process = line(blender, *way, 0.3, 125)
+        yield from blender.until(lambda: is_pressing(blender))
+        blender.shot(f"symmetry_{name}")
+        yield from finish(blender, process)
+        write_down(blender, name)
+    blender.shot("symmetry_formed")
+    yield from impatient(blender)
+
+
+def is_pressing(blender: Any) -> bool:
+    """Tell whether a fingertip is in the pins, or the stroke is done already."""
+    (session,) = blender.sessions()
+    return not session.strokes or bool((session.state.finger_forces() > 0.01).any())
+
+
+def begin(blender: Any) -> Iterator[float | None]:
+    """Have a bed at rest, and record from now on."""
+    yield from reset(blender)
+    bpy.ops.ed.undo_push(message="Reset")
+    blender.call(bpy.ops.digiclay.take_record)
+    yield from blender.settle()
+
+
+def write_down(blender: Any, name: str) -> None:
+    """Note the heights, the periods of the last stroke up to the last order, and the recorded fingertips."""
+    note(blender, name)
+    (session,) = blender.sessions()
+    recording = session.recording
+    ordered = np.flatnonzero(recording.orders.rows.any(axis=1))
+    blender.SEEN[name] |= {
+        "periods": int(ordered[-1]) + 1 - (session.gestures[-1].period - recording.first),
+        "fingers": recording.path.shape[1],
+        "left": session.system.fingers,
+    }
+
+
+def impatient(blender: Any) -> Iterator[float | None]:
+    """Draw three strokes at once, one of another symmetry; undo the last; Esc in the middle of a fourth."""
+    settings = brush(blender)
+    yield from begin(blender)
+    settings.symmetry = "RADIAL"
+    first = line(blender, *APART, 0.2, 125)
+    yield from blender.until(lambda: first.poll() is not None)
+    settings.symmetry = "Y"
+    second = line(blender, (-27.0, 15.0), (-12.0, 15.0), 0.2, 125)
+    yield from blender.until(lambda: second.poll() is not None)
+    settings.symmetry = "X"
+    yield from finish(blender, line(blender, (6.0, 30.0), (15.0, 30.0), 0.2, 125))
+    note(blender, "three")
+    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "key ctrl+z")
+    note(blender, "two")
+    settings.symmetry = "RADIAL"
+    process = line(blender, (9.0, 9.0), (15.0, 9.0), 0.2, 125, last="sleep 2")
+    yield from blender.until(lambda: any(one.system.fingers == 4 for one in blender.sessions()))
+    yield from act(blender, "key Escape sleep 0.2")
+    hand("mouseup 1")
+    yield from finish(blender, process)
+    note(blender, "escaped")
+    # The recording is kept, replayed and baked.
+    blender.call(bpy.ops.digiclay.take_keep)
+    yield from blender.settle()
+    (session,) = blender.sessions()
+    blender.SEEN["at the end"] = session.poses.shape
+    yield from act(blender, "key Escape")
+    yield from blender.stopped()
+    bed = blender.beds()[0]
+    take = blender.part("recorded.takes").read(bed)
+    blender.SEEN["take"] = [max(take.fingers), min(take.fingers)]
+    blender.call(bpy.ops.digiclay.take_replay)  # in steps of its own
+    yield from done(blender, hand("sleep 0.1"))
+    note(blender, "replayed")

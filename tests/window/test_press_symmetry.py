@@ -1,0 +1,57 @@
+"""Symmetric strokes form at the same time, drawn without a pause on a turned bed in a real window."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.window.blender_window import FORMED, Seen, down
+
+PLAYED = {"script": "press_symmetry.py", "size": (800, 560), "by_hand": True}
+
+
+@pytest.mark.parametrize(
+    ("name", "alone", "fingers", "longer"),
+    [
+        pytest.param("radial", "one", 4, 1.05, id="four turned images"),
+        pytest.param("mirrored", "one", 2, 1.05, id="two mirrored ones"),
+        pytest.param("across", "across alone", 2, 1.7, id="across the axis one gives way to the other"),
+        pytest.param("along", "along alone", 2, 1.05, id="on the axis one presses"),
+    ],
+)
+def test_images_take_about_as_many_periods_as_one(seen: Seen, name, alone, fingers, longer):
+    # The hand does not draw exactly as before: some periods more or less.
+    assert seen[name]["periods"] <= longer * seen[alone]["periods"] + 8
+    assert (seen[name]["fingers"], seen[name]["left"]) == (fingers, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "turns"),
+    [
+        ("radial", [np.rot90]),
+        ("mirrored", [np.fliplr]),
+        ("across", [np.fliplr]),
+        ("along", [np.fliplr]),
+        ("two", []),
+    ],
+)
+def test_images_are_alike_on_a_turned_bed(seen: Seen, name, turns):
+    formed = down(seen, name)
+    assert formed.max() > FORMED
+    for turn in turns:  # the valves place pins to 1 µm; heights are noted to as much
+        np.testing.assert_allclose(formed, turn(formed), rtol=0, atol=3e-3)
+
+
+def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_one(seen: Seen) -> None:
+    three, two = down(seen, "three"), down(seen, "two")
+    assert (three[22, [14, 16, 10, 8]] > FORMED).all()
+    assert two[22, [14, 16, 10, 8]].max() < FORMED
+    for row, column in ((17, 5), (7, 5), (17, 21), (21, 7), (7, 3), (3, 17)):
+        assert two[row, column] > FORMED, (row, column)
+    np.testing.assert_allclose(down(seen, "escaped"), two, rtol=0, atol=3e-3)
+
+
+def test_what_is_recorded_is_replayed(seen: Seen) -> None:
+    assert seen["at the end"] == [1, 7]
+    assert seen["take"] == [4, 1]
+    np.testing.assert_allclose(down(seen, "replayed"), down(seen, "escaped"), rtol=0, atol=1e-3)
