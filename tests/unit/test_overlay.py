@@ -65,12 +65,12 @@ WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
         ("N: beyond",),
     ),
     "several fingertips": (
-        {"fingers": ((1, DARK), (4, LIGHT)), "finger_force": np.full((1001, 2), [1.9, 0.25]),
+        {"fingers": ((1, DARK), (4, LIGHT)), "hardest": 1.9, "finger_force": np.full((1001, 2), [1.9, 0.25]),
          "force": np.full(1001, 2.15)},
         ("Total force  2.15 N | set point 0.40 N each", "1: 1.90 N | 4: 0.25 N"), ("N: beyond",),
     ),
     "one of several that presses beyond its model": (
-        {"fingers": ((1, DARK), (4, LIGHT)), "finger_force": np.full((1001, 2), [2.5, 0.0]),
+        {"fingers": ((1, DARK), (4, LIGHT)), "hardest": 2.5, "finger_force": np.full((1001, 2), [2.5, 0.0]),
          "force": np.full(1001, 2.5)},
         ("Total force  2.5 N: beyond 2 N",), (),
     ),

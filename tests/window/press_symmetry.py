@@ -36,9 +36,11 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.evaluate()
     yield None
     blender.call(bpy.ops.view3d.view_all)
-    yield from act(
-        blender, to(on_the_screen(blender, 0.0, 0.0)), "click 1"
-    )  # the first press starts the session
+    yield from blender.rounds()
+    blender.shot("symmetry_begun")
+    # The first press starts the session.
+    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0), 0.3), "click 1 sleep 0.3")
+    yield from blender.until(lambda: bool(blender.sessions()))
     settings = brush(blender)
     settings.radial = 4
     for name, symmetry, way in (

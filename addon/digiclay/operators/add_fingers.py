@@ -17,6 +17,7 @@ from ..ui_text import localize
 from .action import action
 from .add_bed import select_only
 from .poll_messages import linked, no_bed
+from .ready_view import reveal
 
 #: Distance that new fingertips keep from others, m: the masters of nearer ones would disturb each other.
 APART = 18e-3
@@ -33,8 +34,9 @@ def add_fingertip(operator: Any, context: Any) -> None:
     bed = bed_of(context)
     parts.find_free_number(bed)
     x, y = _find_place(bed, np.zeros((1, 2)))
-    (tip,) = _add(bed, np.array([[x, y, 0.0]]))
+    (tip,) = made = _add(bed, np.array([[x, y, 0.0]]))
     select_only(context, tip)
+    reveal(context, bed, made)
 
 
 @action(
@@ -55,8 +57,9 @@ def add_hand(operator: Any, context: Any) -> None:
     palm.location = np.array([x, y, _find_top(bed)]) * bridge.SCALE
     palm.location.z += 2.0 * devices.read_finger(bed.digiclay).height * bridge.SCALE
     context.view_layer.update()
-    _add(bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm)
+    made = _add(bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm)
     select_only(context, palm)
+    reveal(context, bed, made)
 
 
 def _find_place(bed: Any, places: Floats) -> Floats:

@@ -1,5 +1,6 @@
 """3D view in use: found, turned so that all of a bed is seen in it, and lit so that its relief is."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -61,12 +62,13 @@ def frame(context: Any, bed: Any) -> None:
         looking.update()
     context.view_layer.update()
     axes, parallel = np.array(looking.view_rotation.to_matrix()), looking.view_perspective == "ORTHO"
-    lens, corners = np.diag(np.array(looking.window_matrix))[:2], _list_corners(bed)
+    lens = np.diag(np.array(looking.window_matrix))[:2]
+    corners = _list_corners(
+        [(view.housing_of(bed), bed), (bed, bed), *_list_balls(fingertips_of(bed).values())]
+    )
     if parallel:
         lens = lens * looking.view_distance
-    scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
-    room = find_free_room(area, region, {"UI": SIDEBAR * scale})
-    free, taken = 2.0 * np.reshape([room, find_compact_box(room, scale, corner)], (2, 2, 2)) / size - 1.0
+    free, taken = 2.0 * _find_room(context, area, region, SIDEBAR) / size - 1.0
     middle, back = corners.mean(axis=0), axes[:, 2]
     half = np.abs(corners - middle)[:, :2].max(axis=0)
     for farther in FARTHER:
@@ -82,6 +84,28 @@ def frame(context: Any, bed: Any) -> None:
             break
     looking.update()
     detail.follow()
+
+
+def reveal(context: Any, bed: Any, tips: Iterable[Any]) -> None:
+    """Show a bed whole, as `frame` does, if some of its fingertips would be out of the view in use."""
+    shown = find_view(context)
+    if shown is None or shown[1].data.view_perspective == "CAMERA":
+        return
+    context.view_layer.update()
+    (free, taken), region = _find_room(context, *shown), shown[1]
+    corners = _list_corners(_list_balls(tips))
+    clip = np.column_stack([corners, np.ones(len(corners))]) @ np.array(region.data.perspective_matrix).T
+    places = 0.5 * (clip[:, :2] / clip[:, 3:] + 1.0) * [region.width, region.height]
+    seen = (clip[:, 3] > 0.0) & ((places >= free[0]) & (places <= free[1])).all(axis=1)
+    if not (seen & ~((places > taken[0]) & (places < taken[1])).all(axis=1)).all():
+        frame(context, bed)
+
+
+def _find_room(context: Any, area: Any, region: Any, sidebar: float = 0.0) -> Floats:
+    """Return the free part of a view and the overlay's box in it, (2, 2, 2), pixels, beside a `sidebar`."""
+    scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
+    room = find_free_room(area, region, {"UI": sidebar * scale})
+    return np.reshape([room, find_compact_box(room, scale, corner)], (2, 2, 2))
 
 
 def find_eye(
@@ -121,10 +145,13 @@ def place_eye(points: Floats, lens: Floats, room: Floats, parallel: bool, farthe
     return np.array([*np.clip(middle, least - high * z / lens, most - low * z / lens), z])
 
 
-def _list_corners(bed: Any) -> Floats:
-    """Return the corners (k, 3) of the boxes about housing, pins and fingertip, world."""
-    things = [(view.housing_of(bed), bed), (bed, bed)]
-    things += [(tip[BALL], tip[BALL]) for tip in fingertips_of(bed).values() if tip.get(BALL)]
+def _list_balls(tips: Iterable[Any]) -> list[tuple[Any, Any]]:
+    """Return the ellipsoids of fingertips, each as the shape and as the object that places it."""
+    return [(tip[BALL], tip[BALL]) for tip in tips if tip.get(BALL)]
+
+
+def _list_corners(things: list[tuple[Any, Any]]) -> Floats:
+    """Return the corners (k, 3) of the boxes about shapes of placed objects, world."""
     boxes = []
     for shape, placed in things:
         matrix = np.array(placed.matrix_world)

@@ -59,6 +59,8 @@ class Readings:
     top: float | None = None
     #: Whether the contact law does not hold now, by `core.model.touch`.
     beyond: bool = False
+    #: Largest force of several fingertips now, N; None of one, whose force is the total.
+    hardest: float | None = None
     #: Numbers and colors of several fingertips, and the force of each, (t, f), N.
     fingers: tuple[tuple[int, Color], ...] = ()
     finger_force: Floats = field(default_factory=lambda: np.empty((0, 0)))
@@ -194,8 +196,7 @@ def _count_columns(width: float) -> int:
 
 def _tell_force(readings: Readings) -> str:
     """Return the text of the total force now."""
-    hardest = float(readings.finger_force[-1].max()) if readings.finger_force.size else None
-    return force_message(float(readings.force[-1]), beyond=readings.beyond, hardest=hardest)
+    return force_message(float(readings.force[-1]), beyond=readings.beyond, hardest=readings.hardest)
 
 
 def _draw_heights(readings: Readings, pen: Pen, top: float) -> None:

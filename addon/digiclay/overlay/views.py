@@ -103,6 +103,7 @@ def read_session(
         colors=tuple(colors[mode] for mode in Mode),
         seconds=bed.digiclay_display.seconds,
         top=view.read_setting(bed, TOP_FORCE, None) if view.shows_force(bed) else None,
+        hardest=float(session.state.finger_forces().max()) if session.system.fingers > 1 else None,
         beyond=exceeds_law(session.system, session.state, session.pose),
     )
 
