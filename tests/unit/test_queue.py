@@ -38,6 +38,7 @@ def begin(name: str) -> Running:
 #: more than `motion.FIRM`, at which the fingertip waits for the pins.
 DRAWN = {
     "a mirrored ring": [(Brush.RAISE, 3e-3, lay_ring((4e-3, 0.0), (12e-3, 5e-3)), "X")],
+    "across the mirror": [(Brush.RAISE, 3e-3, np.linspace([-12e-3, -7e-3], [15e-3, 8e-3], 20), "X")],
     "a valley from the flank of another one": [
         (Brush.RAISE, 12e-3, np.array([[11.5e-3, 4.9e-3], [-10.5e-3, 0.2e-3]]), "NONE"),
         (Brush.LOWER, 8e-3, np.array([[-17.1e-3, 8.0e-3], [1.1e-3, 8.2e-3]]), "NONE"),

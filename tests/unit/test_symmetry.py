@@ -69,7 +69,7 @@ def is_replayed(take: Take) -> bool:
 
 
 #: A path that stays apart from its images, and from the pins' rows, mm.
-APART = line((15.5, 8.0), (21.0, 11.0))
+APART = line((18.0, 7.8), (21.0, 8.4))
 #: Images on whole pins, how they turn a table of pins, and the pins by which their center is off the middle.
 TURNED = {
     "four turns": (make_images("RADIAL", 4), np.rot90, (0, 0)),
@@ -120,11 +120,11 @@ def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(metho
 MEETING = {
     "on the axis one fingertip presses": ("hybrid", line((0, -15), (0, 15)), make_images("X"), 1.1),
     "a click in the middle is one": ("virtual_master", line((0, 0), (0, 0)), make_images("RADIAL", 6), 1.05),
-    "across the axis one follows": ("virtual_master", line((-18, -9), (18, 9)), make_images("X"), 1.8),
-    "from the axis one follows": ("hybrid", line((0, -9), (18, 9)), make_images("X"), 1.8),
-    "rays follow each other": ("hybrid", line((0, 0), (18, 4)), make_images("RADIAL", 4), 4.0),
-    "side by side by half a finger": ("virtual_master", line((2.5, -9), (2.5, 9)), make_images("X"), 1.7),
-    "many": ("hybrid", line((24, 0), (24, 1)), make_images("RADIAL", 24), 3.0),
+    "across the axis one follows": ("virtual_master", line((-18, -9), (18, 9)), make_images("X"), 2.1),
+    "from the axis one follows": ("hybrid", line((0, -9), (18, 9)), make_images("X"), 2.1),
+    "rays follow each other": ("hybrid", line((0, 0), (18, 4)), make_images("RADIAL", 4), 4.2),
+    "side by side by half a finger": ("virtual_master", line((2.5, -9), (2.5, 9)), make_images("X"), 2.1),
+    "many": ("hybrid", line((24, 0), (24, 1)), make_images("RADIAL", 24), 8.0),
 }
 
 

@@ -7,8 +7,8 @@ Depth counts from the surface as it was when the finger began, or when its pass 
 draw the fingertip after them. No Blender in here.
 
 Each image of a path has a fingertip, as far as there are any, and all go at once. Of two that come near each
-other the one of the later image lifts, and comes down again behind the other one; where images coincide, one
-of them is gone along.
+other the one of the later image lifts, and waits above until the other one is away; where images coincide,
+one of them is gone along.
 
 A brush that raises presses until the blister starts, and rises to its height there. Every brush then goes
 along at its height, up and down over what is formed.
@@ -68,7 +68,8 @@ FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3
-#: An image that is at another one, in largest diameters of the fingertip, yields; in pitches, is the same.
+#: An image so near to another one that blisters overlap yields; without blisters, in largest diameters of the
+#: fingertip. One that is so near, in pitches, is the same.
 TOO_NEAR, SAME = 0.75, 0.5
 #: Phases in which it touches, or is about to.
 DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
@@ -218,9 +219,10 @@ def _yield(
 
     Above, it comes as far along its path as it coincides with what an earlier one has gone along.
     """
-    wide = 2.0 * max(device.finger.length, device.finger.width)
-    apart = min((math.dist(pose[:2], other[:2]) for other in down), default=math.inf)
-    if part.phase in (PRESSING, RISING, DRAGGING) and apart < TOO_NEAR * wide:
+    wide = TOO_NEAR * max(device.finger.length, device.finger.width)
+    least = 2.0 * (part.tracking.radius if part.tracking else wide)
+    near = any(math.dist(pose[:2], other[:2]) < least for other in down)
+    if near and part.phase in (PRESSING, RISING, DRAGGING):
         return replace(part, phase=YIELDING, standing=None, climb=0.0, pace=0.0)
     if part.phase != YIELDING or pose[2] < find_safe(part, device, now) - NEAR:
         return part
@@ -235,7 +237,7 @@ def _yield(
             part = replace(_reach(part, device, part.reached + 1), phase=ABOVE)
         if part.drawn and other.drawn and is_same(other, part.reached):
             return leave(part)
-    return part if part.phase == ABOVE or apart < wide else replace(part, phase=PRESSING)
+    return part if near or part.phase == ABOVE else replace(part, phase=PRESSING)
 
 
 def _is_uneven(stroke: Stroke, device: Device, pose: Floats, time: float = 0.0) -> bool:
