@@ -69,14 +69,14 @@ def is_replayed(take: Take) -> bool:
 
 
 #: A path that stays apart from its images, and from the pins' rows, mm.
-APART = line((18.0, 7.8), (21.0, 8.4))
+APART = line((20.0, 8.5), (23.0, 9.5))
 #: Images on whole pins, how they turn a table of pins, and the pins by which their center is off the middle.
 TURNED = {
     "four turns": (make_images("RADIAL", 4), np.rot90, (0, 0)),
     "four turns about another place": (make_images("RADIAL", 4, (3e-3, -1.5e-3)), np.rot90, (-1, 2)),
     "two turns": (make_images("RADIAL", 2), lambda table: np.rot90(table, 2), (0, 0)),
     "x": (make_images("X"), np.fliplr, (0, 0)),
-    "y of another axis": (make_images("Y", center=(0.0, 3e-3)), np.flipud, (2, 0)),
+    "y of another axis": (make_images("Y", center=(0.0, -3e-3)), np.flipud, (-2, 0)),
     "a diagonal": (make_images("Y", angle=math.pi / 4), np.transpose, (0, 0)),
     "both": (make_images("XY"), np.fliplr, (0, 0)),
 }
@@ -160,6 +160,14 @@ def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay(fi
     assert (
         heights(session)[session.system.grid.at(24e-3 * np.cos(angle), 24e-3 * np.sin(angle))].max() < 37e-3
     )
+
+
+@pytest.mark.parametrize("brush", [Brush.SMOOTH, Brush.LOCK])
+def test_what_the_valves_do_alone_takes_no_further_fingertips(brush: Brush) -> None:
+    session = queue(begin("hybrid"), line((8, 8), (9, 8)), make_images("XY"), brush)
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.poses, 16)
+        assert session.system.fingers == 1
 
 
 def middle() -> Running:

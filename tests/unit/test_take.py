@@ -120,7 +120,7 @@ def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: Path) -> None
     [
         (np.zeros((1, 1, 7)), "must hold one control period at least"),
         (np.zeros((3, 1, 6)), "must hold one control period at least"),
-        (np.zeros((3, 2, 7)), "of 1 x 7 numbers, a pose a finger"),
+        (np.zeros((3, 0, 7)), "of 1 x 7 numbers, a pose a finger"),
         (np.full((3, 1, 7), np.nan), "must be finite numbers"),
     ],
 )
@@ -205,7 +205,7 @@ def rows_with(at: int, **columns: float) -> Floats:
         ({"surfaces": np.array(0.04)}, "damaged and cannot be read"),
         ({"surfaces": np.empty((0, 121))}, "got row"),
         ({"surfaces": None}, "damaged and cannot be read"),
-        ({"version": np.array(5)}, "its version must be at most 4"),
+        ({"version": np.array(6)}, "its version must be at most 5"),
     ],
 )
 def test_hostile_orders_and_a_version_yet_to_come_are_refused_in_one_line(parts, said) -> None:

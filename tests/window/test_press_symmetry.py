@@ -44,8 +44,9 @@ def test_images_are_alike_on_a_turned_bed(seen: Seen, name, turns):
 
 def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_one(seen: Seen) -> None:
     three, two = down(seen, "three"), down(seen, "two")
+    # The last one alone has pins in the middle of a row beside the bed's edge.
     assert (three[22, [14, 16, 10, 8]] > FORMED).all()
-    assert two[22, [14, 16, 10, 8]].max() < FORMED
+    assert (two[22, [14, 16, 10, 8]] < FORMED).any()
     for row, column in ((17, 5), (7, 5), (17, 21), (21, 7), (7, 3), (3, 17)):
         assert two[row, column] > FORMED, (row, column)
     np.testing.assert_allclose(down(seen, "escaped"), two, rtol=0, atol=3e-3)

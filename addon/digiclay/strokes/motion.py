@@ -23,7 +23,7 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.model.fingertip import Fingertip
-from .nominal import Device, find_nominal, find_undersides, returns
+from .nominal import LIMITS, Device, find_nominal, find_undersides, returns
 from .pose import lean_finger, turn_image, turn_toward
 from .stroke import (
     ABOVE,
@@ -130,7 +130,7 @@ def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | Non
     begun = replace(stroke, height=height, ground=height, phase=ABOVE, tracking=tracking, turn=turn)
     if tracking is None and stroke.brush.needs_blister:
         return replace(begun, phase=LEAVING, images=stroke.images[:1])
-    if stroke.brush in STAMPS or len(stroke.images) == 1:
+    if stroke.brush not in LIMITS or len(stroke.images) == 1:
         return begun
     return replace(begun, parts=tuple(replace(begun, image=image) for image in range(len(stroke.images))))
 

@@ -204,6 +204,7 @@ class Recording:
             rows = np.empty((2 * end, self.rows.shape[1]))
             rows[: self.count] = self.rows[: self.count]
         own = rows[self.count : end, : -ORDER - 1].reshape(len(path), -1, 7)
+        path = path.reshape(len(path), -1, 7)
         own[:], own[:, : path.shape[1]] = AWAY, path
         rows[self.count : end, : -ORDER - 1] = own.reshape(len(path), -1)
         surfaces = self.surfaces
