@@ -208,6 +208,7 @@ def test_the_panel_says_when_a_bed_is_no_longer_as_its_layout(field, value, bed)
     assert properties.rebuild_reason(bed) == ""
     setattr(bed.digiclay.layout, field, value)
     if field == "rows":
+        assert properties.rebuild_reason(bed) == "The bed has 48 pins, not 64"
         bed.digiclay.layout.columns = 6  # exchanged: another bed of as many pins
     assert properties.rebuild_reason(bed) == "The pins differ from the parameters of Layout"
     with pytest.raises(ParameterError, match="press Rebuild"):

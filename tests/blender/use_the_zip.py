@@ -62,14 +62,8 @@ def main() -> None:
     chosen.run_own_methods = True
     bed.digiclay.chosen_method = "mine"
     seen["own method"] = part("settings.properties").scene_of(bed).method
-    own_run = [
-        "run",
-        "tap",
-        "--method",
-        f"{FOLDER / 'own' / 'mine.py'}:Mine",
-        "--out",
-        str(FOLDER / "own run"),
-    ]
+    own = f"{FOLDER / 'own' / 'mine.py'}:Mine"
+    own_run = ["run", "tap", "--method", own, "--out", str(FOLDER / "own run")]
     seen["own run"] = command([*own_run, "--quiet", "--no-errors"])
     known = part("core.control.methods").list_added
     addon_utils.disable(EXTENSION)  # the preferences stay, as at the end of Blender

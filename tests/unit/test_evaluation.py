@@ -17,6 +17,8 @@ from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, count_tr
 from digiclay.core.base.errors import OutputError
 from digiclay.core.batch.packing import extend_path
 from digiclay.core.engine.simulation import simulate_period
+from digiclay.core.model.fingertip import Fingertip, compute_reach
+from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.columns import begin, make_batch
 from digiclay.core.scene.scene_source import Setting, find
@@ -168,6 +170,17 @@ def test_points_of_one_structure_run_together_and_others_alone(varied, setting, 
     parts = make_bundles(some(*varied, settings=settings), errors=errors)
     assert (indices(parts.batches), indices(parts.alone)) == (batches, alone)
     assert said is None or parts.describe() == [said]
+
+
+def test_the_reach_of_many_fingers_is_that_of_each():
+    poses = np.zeros((3, 2, 7))
+    poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
+    windows = trace_finger(Fingertip(), poses).windows
+    alone = [compute_reach(window, 0.04) for window in windows]
+    together = np.array(compute_reach(np.array(windows).T, np.full(3, 0.04))).T
+    np.testing.assert_allclose(together[:2], alone[:2], rtol=1e-12)
+    # The last one is far above the bed.
+    assert (alone[2], together[2, 2] < 0.0) == (None, True)
 
 
 @pytest.mark.parametrize("errors", [False, True])
