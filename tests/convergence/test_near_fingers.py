@@ -23,6 +23,8 @@ from benchmarks.several_fingers import TURN, measure_near
         ("hybrid", "up beside down, 12", 2.0, 1.5),
         ("hybrid", "approach and part, 6", TURN, 1.5),
         ("cell_states", "parallel, 18", TURN, 1.1),
+        # Not yet as alone: the fingertip that sinks beside the hill is felt late.
+        ("cell_states", "up beside down, 18", TURN, 1.2),
     ],
 )
 def test_no_finger_is_stolen_by_another_one_that_comes_near(

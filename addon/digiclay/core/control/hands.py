@@ -119,6 +119,9 @@ class HandControl:
                 under[under > height + REACHED] = np.inf
             owner[pressed] = self._find_new(basis, force, find_lowest(under), who)
             shares = self._share(under, owner[pressed], height)
+            if self._predicts:
+                # What a finger that is not found yet presses would draw the estimates of the others to it.
+                shares[:, owner[pressed] == NOBODY] = 0.0
         located = self.locate_each(memory.fingers, touched, owner, pressed, shares)
         discs = [disc for _, disc in located]
         return Hands(tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs)), discs
@@ -165,7 +168,8 @@ class HandControl:
         basis, height = seen.quadratic_basis[:, double], seen.height[double]
         under, blisters = self._predict_under(memory, basis), self._find_blisters(memory)
         x, y, radius, ground, top = blisters.T[..., None]
-        inside = np.hypot(basis[1] - x, basis[2] - y) <= radius
+        # Only undersides that are predicted tell where a blister would press a pin.
+        inside = self._predicts & (np.hypot(basis[1] - x, basis[2] - y) <= radius)
         tops = np.where(inside, np.maximum(top, ground), -np.inf)
         low, second = np.partition(under, 1, axis=0)[:2]
         harms = tops > np.where(under == low, second, low)
@@ -176,7 +180,7 @@ class HandControl:
 
     def _share(self, under: Floats, owner: Cells, height: Floats) -> Floats:
         """Return the shares of fingers in the forces of pins, (f, q), by the undersides over them, m."""
-        shares = np.where(owner == np.arange(len(self.runs))[:, None], 1.0, 0.0)
+        shares = np.where((owner == np.arange(len(self.runs))[:, None]) | (owner == NOBODY), 1.0, 0.0)
         if self._predicts:
             (both,) = (np.count_nonzero(under < height, axis=0) > 1).nonzero()
             depths = np.maximum(height[both] - under[:, both], 0.0)
