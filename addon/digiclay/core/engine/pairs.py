@@ -39,7 +39,8 @@ class HandSelection(Selection):
         # How far along its path the set serves is worked out once.
         path, last = periods.get("path", (None, 0))
         if path is not finger.path:
-            last = finger.number + count_inside(active, finger.path.windows[finger.number :])
+            windows = finger.path.windows[finger.number : finger.number + KEPT]
+            last = finger.number + count_inside(active, windows)
             periods["path"] = finger.path, last
         return state if finger.number < last else super().update(state, finger, control)
 
@@ -58,16 +59,19 @@ class HandSelection(Selection):
     ) -> tuple[Cells, int]:
         """Return the near cells, then the moving and the controlled ones, and the number of near ones."""
         near = self._cover(reach)
-        others = np.union1d(active.cells[moving], self._cover(control))
-        return np.concatenate([near, np.setdiff1d(others, near, assume_unique=True)]), near.size
+        (first,) = near.nonzero()
+        others = self._cover(control)
+        others[active.cells[moving]] = True
+        others[first] = False
+        return np.concatenate([first, *others.nonzero()]), first.size
 
-    def _cover(self, discs: Discs | None) -> Cells:
-        """Return the cells in some disc, in ascending order."""
-        if discs is None:
-            return np.empty(0, np.intp)
-        rows = np.transpose(discs).tolist()
-        cells = [self.grid.disc(*disc) for disc in rows if disc[2] >= 0.0]
-        return np.unique(np.concatenate(cells)) if cells else np.empty(0, np.intp)
+    def _cover(self, discs: Discs | None) -> Flags:
+        """Return which cells are in some disc, (n,)."""
+        inside = np.zeros(self.grid.count, np.bool_)
+        for x, y, radius in [] if discs is None else np.transpose(discs).tolist():
+            if radius >= 0.0:
+                inside[self.grid.disc(x, y, radius)] = True
+        return inside
 
     def release(self, state: State) -> Flags:
         """Put the active cells back; the pulp of a fingertip out of reach has aged since they were taken."""
