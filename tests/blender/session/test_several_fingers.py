@@ -277,23 +277,23 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(
     move(pair, {1: 46.0, 2: 46.0})
     clock.tick(3)
     running.put(sculpting.set_recording(running.find(pair), True))
-    images = make_images("RADIAL", 4)
+    images = make_images("RADIAL", 2)
 
     def draw() -> None:
-        session, number = sculpting.queue_stroke(running.find(only_bed()), 12e-3, 8e-3, 3e-3, images)
+        session, number = sculpting.queue_stroke(running.find(only_bed()), 14e-3, 8e-3, 3e-3, images)
         running.put(sculpting.change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
 
     def press_down() -> None:
         for _ in range(60):
             clock.tick()
-            if (running.find(only_bed()).state.finger_forces() > 0.01).sum() == 4:
+            if (running.find(only_bed()).state.finger_forces() > 0.01).sum() == 2:
                 return
         raise AssertionError("The fingertips do not press")
 
     draw()
     press_down()
     session = running.find(pair)
-    assert (len(session.poses), beds.read_numbers(pair)) == (5, (1, 2, 33, 34, 35))
+    assert (len(session.poses), beds.read_numbers(pair)) == (3, (1, 2, 33))
     assert [number for number, _ in views.read_session(pair, session, COLORS).fingers] == [1, 2]
     bpy.ops.ed.undo_push(message="In its middle")
     in_the_middle = shown(pair).copy()
@@ -305,7 +305,7 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(
     assert (len(running.find(pair).poses), beds.read_numbers(pair)) == (2, (1, 2))
     assert clock.tick() == []
     table = running.find(pair).state.row(0).reshape(13, 13)
-    np.testing.assert_allclose(table, np.rot90(table), rtol=0, atol=2e-6)
+    np.testing.assert_allclose(table, np.rot90(table, 2), rtol=0, atol=2e-6)
     assert table.min() < 37.1e-3
     bpy.ops.ed.undo_push(message="Done")
     bpy.ops.ed.undo()
@@ -320,12 +320,12 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(
     press_down()
     handlers.end("was stopped")
     take = takes.read(bed)
-    assert max(take.fingers) == 5
+    assert max(take.fingers) == 3
     assert started(bed) is None
     assert (running.find(bed).numbers, len(running.find(bed).poses)) == ((1, 2), 2)
     handlers.end("was stopped")
     bpy.ops.digiclay.take_replay()
-    assert beds.read_numbers(bed) in ((1, 2), (1, 2, 33, 34, 35))
+    assert beds.read_numbers(bed) == (1, 2)
     bpy.ops.digiclay.bake(source="TAKE")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "middle.blend"))
     looked()
