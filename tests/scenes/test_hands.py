@@ -207,6 +207,32 @@ def test_fingers_that_come_and_go_leave_the_others_what_they_have(method: str) -
     assert np.isfinite(again).all()
 
 
+@pytest.mark.parametrize("later", [False, True], ids=["both from the start", "one comes later"])
+def test_where_blisters_overlap_each_pin_has_the_ground_it_had_before_the_first_one(later: bool) -> None:
+    made = [scene("virtual_master", *[FINGER] * count) for count in (1, 2)]
+    one, two = (assemble(replace(own, control=replace(own.control, ground="cell"))) for own in made)
+    # 27 mm apart at first, or 13 mm, and dragged towards each other on a bias until they are 11 mm apart.
+    time = np.arange(240)[:, None] * PERIOD + two.instants
+    poses = np.zeros((*time.shape, 2, 7))
+    for finger, side in enumerate((-1.0, 1.0)):
+        gone = np.clip(time - 0.5, 0.0, 0.7)
+        start = 6.5e-3 if later else 13.5e-3
+        poses[:, :, finger, 0] = side * (start - (start - 5.5e-3) / 0.7 * gone)
+        poses[:, :, finger, 1] = 3e-3 - 9e-3 * gone
+        poses[:, :, finger, 2] = REST + 4e-3 - np.minimum(20e-3 * time, 9.5e-3)
+        poses[:, :, finger, 3] = 1.0
+    state, targets = begin(two), []
+    if later:
+        state, _ = follow(one, poses[:100, :, :1])
+        state = snapshot.change_fingers(one, two, state, [0, None])
+    for finger in trace_fingers(two, poses[100:] if later else poses):
+        state = advance(two, state, finger)
+        targets.append(state.row(two.rows.target))
+    # They sink 5.5 mm, less the indentation: no pin is commanded deeper, and none is raised.
+    assert 34.2e-3 < np.min(targets) < 36e-3
+    assert np.max(targets) <= REST + 0.2e-3
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("first", [replace(FINGER, relaxation=None), LONG], ids=["elastic", "two filters"])
 def test_a_finger_with_more_filters_than_the_others_comes_and_goes(first: Finger, method: str) -> None:

@@ -226,6 +226,11 @@ class VirtualMasterControl(BatchControl):
         """State rows a cell needs."""
         return self.ground.rows
 
+    @property
+    def pin_rows(self) -> range:
+        """Rows of the pin itself, whichever of several blisters it is in: its ground before the first."""
+        return range(self.rows)
+
     def find_batch_class(self, count: int) -> type[VirtualMasterControl]:
         """Return the class of the controller of a batch of so many runs."""
         name = "VirtualMasterBatch" if count < MANY else "VirtualMasterColumns"
