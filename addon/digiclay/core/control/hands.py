@@ -67,7 +67,9 @@ class Columns:
         self.inside = inside
         self.finger, self.flat = inside.nonzero()
         self.double, self.copies = find_copies(self.flat)
-        self._places = basis
+        # Of cells in several columns: the fingers these are of, (c, g), and their places, (2, g), m.
+        self.named, self.places = self.finger[self.copies], basis[1:3, self.double]
+        self._basis = basis
 
     @cached_property
     def padded(self) -> tuple[Flags, Cells, Floats]:
@@ -76,7 +78,7 @@ class Columns:
         present = np.arange(sizes.max())[:, None] < sizes
         cells = np.zeros(present.shape, np.intp)
         cells.T[present.T] = self.flat
-        basis = self._places[:, cells]
+        basis = self._basis[:, cells]
         basis[:, ~present] = OUTSIDE
         return present, cells, basis
 
@@ -131,9 +133,10 @@ class HandControl:
         columns = self.arrange("all", seen)
         double, shares = columns.double, np.ones((len(self.runs), seen.force.size))
         owner = np.full(double.size, NOBODY)
-        # What stands in one column alone is no other finger's.
-        if double.size:
-            owner, shares[:, double] = self._claim(memory, seen, double)
+        # What stands in one column alone is no other finger's; nor is what is free, if no underside is known.
+        told = np.flatnonzero(self._predicts | (seen.force[double] != 0.0))
+        if told.size:
+            owner[told], shares[:, double[told]] = self._claim(memory, seen, double[told])
         fingers, given = self.command_each(memory.fingers, seen, shares, columns)
         memory = memory._replace(fingers=tuple(fingers))
         chosen = np.empty(seen.target.size, np.intp)
@@ -166,15 +169,19 @@ class HandControl:
         fingertip, and not the other way round, it is the other's alone: it cannot be high for the one.
         """
         basis, height = seen.quadratic_basis[:, double], seen.height[double]
-        under, blisters = self._predict_under(memory, basis), self._find_blisters(memory)
-        x, y, radius, ground, top = blisters.T[..., None]
+        under = self._predict_under(memory, basis)
+        owner = find_lowest(under)
+        shares = self._share(under, owner, height)
         # Only undersides that are predicted tell where a blister would press a pin.
-        inside = self._predicts & (np.hypot(basis[1] - x, basis[2] - y) <= radius)
+        if not self._predicts:
+            return owner, shares
+        x, y, radius, ground, top = self._find_blisters(memory)[..., None]
+        inside = np.hypot(basis[1] - x, basis[2] - y) <= radius
         tops = np.where(inside, np.maximum(top, ground), -np.inf)
         low, second = np.partition(under, 1, axis=0)[:2]
         harms = tops > np.where(under == low, second, low)
         harms &= ~(harms | np.isinf(under)).all(axis=0)
-        shares = np.where(harms, HIDDEN, self._share(under, find_lowest(under), height))
+        shares = np.where(harms, HIDDEN, shares)
         claimed = (seen.force[double] != 0.0) | (tops > low).any(axis=0)
         return np.where(claimed, find_lowest(np.where(harms, np.inf, under)), NOBODY), shares
 
@@ -195,9 +202,9 @@ class HandControl:
         return hasattr(self.runs[0], "predict_under")
 
     def _find_blisters(self, memory: Hands) -> Floats:
-        """Return the blisters of all fingers, (f, 5), as `find_blister` does."""
+        """Return the blisters of all fingers, (5, f), as `find_blister` does."""
         followed = zip(self.runs, memory.fingers, strict=True)
-        return np.array([find_blister(run, own) for run, own in followed])
+        return np.array([find_blister(run, own) for run, own in followed]).T
 
     def _predict_under(self, memory: Hands, basis: Floats) -> Floats:
         """Return the undersides of fingers over pins, (f, q), m; infinite where one is not near."""
@@ -216,9 +223,9 @@ class HandControl:
 
     def _estimate_under(self, memory: Hands, square: Floats) -> Floats:
         """Return undersides of fingers at squared distances, (f, q), m², from the tops of blisters, m."""
-        tops = np.nan_to_num([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
-        size = np.array(self.sizes)[:, None]
-        reduced = square / size**2
+        tops = np.array([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
+        size = self.capture[:, None] / CAPTURE
+        reduced = square / (size * size)
         under = STEEP * np.maximum(reduced - JOIN, 0.0) - np.sqrt(np.maximum(1.0 - reduced, 1.0 - JOIN))
         heights: Floats = tops + size * (1.0 + under)
         return heights
@@ -250,18 +257,19 @@ class HandControl:
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
     ) -> Cells:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
-        copies = columns.copies
-        fingers, (x, y) = columns.finger[copies], seen.quadratic_basis[1:3, columns.double]
-        at_x, at_y, radius, ground, _ = self._find_blisters(memory)[fingers].transpose(2, 0, 1)
-        apart = np.hypot(x - at_x, y - at_y)
-        inside = apart <= radius
+        copies, fingers, (x, y) = columns.copies, columns.named, columns.places
+        at_x, at_y, radius, ground, _ = self._find_blisters(memory).take(fingers, axis=1)
+        square = (x - at_x) ** 2
+        square += (y - at_y) ** 2
+        inside = square <= radius * np.abs(radius)
         # Outside of all blisters pins are led, or left as they are.
-        aside = np.where(target[copies] == seen.target[columns.double], -1.0, -0.5)
-        off = np.where(inside, np.abs(target[copies] - ground), aside)
+        asked = target.take(copies)
+        aside = np.where(asked == seen.target.take(columns.double), -1.0, -0.5)
+        off = np.where(inside, np.abs(asked - ground), aside)
         # Under a fingertip its own blister is obeyed, and where it presses before all.
-        under = inside & (apart <= UNDER * self.capture[fingers])
-        off = np.where(under, 1.0 - apart, off)
-        off = np.where(owner == fingers, 2.0, off)
+        inside &= square <= (UNDER * self.capture).take(fingers) ** 2
+        off = np.where(inside, 1.0 - square, off)
+        off[owner == fingers] = 2.0
         chosen: Cells = np.take_along_axis(copies, off.argmax(axis=0)[None], 0)[0]
         return chosen
 
