@@ -30,11 +30,12 @@ LIT = "digiclay_lit"
 
 
 def find_view(context: Any) -> tuple[Any, Any] | None:
-    """Return area and region of the 3D view in use: the context's, or the first of its window."""
+    """Return area and region of the 3D view in use: the context's, or the first of its window; drawn ones."""
     window = None if bpy.app.background else context.window
     areas = [context.area, *(window.screen.areas if window is not None else ())]
     area = next((area for area in areas if area is not None and area.type == "VIEW_3D"), None)
-    return area and (area, next(region for region in area.regions if region.type == "WINDOW"))
+    regions = area.regions if area else ()
+    return next(((area, one) for one in regions if one.type == "WINDOW" and one.data), None)
 
 
 def light(context: Any) -> None:

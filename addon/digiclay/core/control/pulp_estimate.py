@@ -183,10 +183,10 @@ def find_tops(
     lowest, highest = reach.ends.take(level, 1).tolist()
     tried = []
     for guess, ends in zip(guesses, pairwise(sections.find_bounds(level)), strict=True):
-        least, most = lowest[slice(*ends)], highest[slice(*ends)]
         # A pin on its way to the others does not widen the range.
-        middle = sorted(least)[len(least) // 2]
-        low, high = max(min(least), middle - LAGGING), min(max(most), middle + LAGGING)
+        least, most = sorted(lowest[slice(*ends)]), sorted(highest[slice(*ends)])
+        low = max(least[0], least[len(least) // 2] - LAGGING)
+        high = min(most[-1], most[len(most) // 2] + LAGGING)
         tops = (high - low) * SHARES
         tops += min(max(guess, low), high)
         np.maximum(tops, low, out=tops)
