@@ -271,6 +271,14 @@ def test_fingers_that_jump_and_meet_leave_finite_numbers(method: str | None) -> 
     assert ((state.row(0) >= 0.0) & (state.row(0) <= system.cell.actuator.stroke)).all()
 
 
+@pytest.mark.filterwarnings("error")
+def test_where_the_law_of_two_fingers_begins_at_a_depth_a_pin_above_both_is_nobodys() -> None:
+    late = replace(FINGER, contact=replace(FINGER.contact, offset=1e-3))
+    system = assemble(scene("hybrid", late, late))
+    _, forces = follow(system, press(system, [(-3e-3, 1e-3), (3e-3, -1e-3)], (3e-3, 2e-3), 300))
+    assert 0.05 < forces[-1].min() < forces.max() < 2.0
+
+
 def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors() -> None:
     path = FINGER.trajectory
     shifted = [replace(one, position=(one.position[0], 40e-3, one.position[2])) for one in path.waypoints]

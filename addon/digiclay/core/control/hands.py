@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 
 from ..base.arrays import Cells, Flags, Floats, find_copies
 from ..model.control_interface import Commands, Controller, Measurement
@@ -36,6 +35,8 @@ BEYOND = 1e3
 OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
 #: Share of a pin that a finger does not see.
 HIDDEN = -1.0
+#: Replaces zero in 0/0.
+TINY = float(np.finfo(float).tiny)
 #: No finger.
 NOBODY = -1
 NO_DISC: Disc = (0.0, 0.0, -1.0)
@@ -191,10 +192,16 @@ class HandControl:
         if self._predicts:
             (both,) = (np.count_nonzero(under < height, axis=0) > 1).nonzero()
             depths = np.maximum(height[both] - under[:, both], 0.0)
-            laws = [run.pulp.touch.contact for run in self.runs]
-            tension = np.array([law.tension(depth) for law, depth in zip(laws, depths, strict=True)])
-            shares[:, both] = tension / tension.sum(axis=0)
+            for run, own in self._alike:
+                depths[own] = run.pulp.touch.contact.tension(depths[own])
+            # Where the law begins at a depth, none may press.
+            shares[:, both] = depths / np.maximum(depths.sum(axis=0), TINY)
         return shares
+
+    @cached_property
+    def _alike(self) -> list[tuple[Any, list[int]]]:
+        """Controllers, and which fingers have each: fingers that are alike have one."""
+        return [(run, [i for i, one in enumerate(self.runs) if one is run]) for run in set(self.runs)]
 
     @property
     def _predicts(self) -> bool:
@@ -214,8 +221,8 @@ class HandControl:
         far = ~(apart <= self.capture[:, None] ** 2)
         rank = self._estimate_under(memory, apart)
         if self._predicts:
-            for run in set(self.runs):
-                own = [i for i, one in enumerate(memory.fingers) if one.place and self.runs[i] is run]
+            for run, alike in self._alike:
+                own = [i for i in alike if memory.fingers[i].place]
                 if own:
                     rank[own] = run.predict_under([memory.fingers[i] for i in own], basis)
         np.putmask(rank, far, np.inf)
@@ -391,29 +398,28 @@ class HandInGroups(HandControl):
         `cells` (m,), those of each `finger` one after the other, with the `force` shown of each. What changes
         of the controllers' rows is kept as soon as the next fingers are asked for.
         """
-        counts, rows = np.bincount(finger, minlength=len(self.runs)), int(self.runs[0].rows)
+        counts = np.bincount(finger, minlength=len(self.runs))
         groups: dict[Any, list[int]] = {}
         for i, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
             alike = run.sort(own) if counts[i] and hasattr(run, "sort") else None
             groups.setdefault(i if alike is None else (run, alike), []).append(i)
-        # The rows lie apart by the width of the set; of one index numpy makes four times as much as of two.
-        whole, width = seen.own, seen.own.strides[0] // seen.own.itemsize
-        flat = as_strided(whole, (max(width * (len(whole) - 1) + whole.shape[1], 0),), (whole.itemsize,))
-        places = (width * np.arange(rows))[:, None] + (width * rows * finger + cells)
+        columns = np.split(cells, np.cumsum(counts)[:-1])
+        rows_of = np.split(seen.own, len(self.runs))
         for group in groups.values():
             chosen: Any = slice(None) if len(group) == len(memory) else np.isin(finger, group)
-            at, own = cells[chosen], places[:, chosen]
+            at, sections = cells[chosen], Sections(counts[group].tolist())
             part = Measurement(
                 seen.quadratic_basis.take(at, 1),
                 seen.height[at],
                 force[chosen],
                 seen.target[at],
                 seen.mode[at],
-                flat.take(own),
+                np.concatenate([rows_of[i].take(columns[i], 1) for i in group], axis=1),
                 seen.cells[at],
             )
-            yield group, chosen, part, Sections(counts[group].tolist())
-            flat[own] = part.own
+            yield group, chosen, part, sections
+            for i, own in zip(group, sections.cut(part.own), strict=True):
+                rows_of[i][:, columns[i]] = own
 
 
 def find_lowest(under: Floats) -> Cells:
