@@ -20,7 +20,8 @@ from benchmarks.several_fingers import TURN, measure_near
         ("hybrid", "up beside down, 15", TURN, 1.1),
         # Both land in one period.
         ("hybrid", "up beside down, 15", 2.0, 1.1),
-        ("hybrid", "up beside down, 12", 2.0, 1.5),
+        # As alone in some turns, and not yet 1.5 in others: pins between them change hands.
+        ("hybrid", "up beside down, 12", 2.0, 2.0),
         ("hybrid", "approach and part, 6", TURN, 1.5),
         ("cell_states", "parallel, 18", TURN, 1.1),
         # Not yet as alone: the fingertip that sinks beside the hill is felt late.

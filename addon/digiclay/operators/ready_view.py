@@ -30,12 +30,11 @@ LIT = "digiclay_lit"
 
 
 def find_view(context: Any) -> tuple[Any, Any] | None:
-    """Return area and region of the 3D view in use: the context's, or the first of its window; drawn ones."""
+    """Return area and region of the 3D view in use: the context's, or the first of its window."""
     window = None if bpy.app.background else context.window
     areas = [context.area, *(window.screen.areas if window is not None else ())]
     area = next((area for area in areas if area is not None and area.type == "VIEW_3D"), None)
-    regions = area.regions if area else ()
-    return next(((area, one) for one in regions if one.type == "WINDOW" and one.data), None)
+    return area and (area, next(region for region in area.regions if region.type == "WINDOW"))
 
 
 def light(context: Any) -> None:
@@ -90,7 +89,8 @@ def frame(context: Any, bed: Any) -> None:
 def reveal(context: Any, bed: Any, tips: Iterable[Any]) -> None:
     """Show a bed whole, as `frame` does, if some of its fingertips would be out of the view in use."""
     shown = find_view(context)
-    if shown is None or shown[1].data.view_perspective == "CAMERA":
+    # In background mode a view has no data.
+    if shown is None or not shown[1].data or shown[1].data.view_perspective == "CAMERA":
         return
     context.view_layer.update()
     (free, taken), region = _find_room(context, *shown), shown[1]

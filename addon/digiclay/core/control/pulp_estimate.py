@@ -133,8 +133,6 @@ class PulpEstimate:
 
 #: Heights of the top that are tried, about a guess, as shares of what pins can reach, 0.5 mm on a level bed.
 SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])
-#: How far from most of the pins level with the top the others may be that widen the range, m.
-LAGGING = 2e-3
 
 
 class Reach(NamedTuple):
@@ -183,18 +181,16 @@ def find_tops(
     lowest, highest = reach.ends.take(level, 1).tolist()
     tried = []
     for guess, ends in zip(guesses, pairwise(sections.find_bounds(level)), strict=True):
-        # A pin on its way to the others does not widen the range.
-        least, most = sorted(lowest[slice(*ends)]), sorted(highest[slice(*ends)])
-        low = max(least[0], least[len(least) // 2] - LAGGING)
-        high = min(most[-1], most[len(most) // 2] + LAGGING)
+        low, high = min(lowest[slice(*ends)]), max(highest[slice(*ends)])
         tops = (high - low) * SHARES
         tops += min(max(guess, low), high)
         np.maximum(tops, low, out=tops)
         tried.append(np.minimum(tops, high, out=tops))
     spread = sections.spread(tried)
     depths = reach.form_heights(spread if spread.ndim == 2 else spread[:, None])
-    np.maximum(depths, reach.ends[0], out=depths)
-    np.minimum(depths, reach.ends[1], out=depths)
+    least, most = reach.ends
+    np.maximum(depths, least, out=depths)
+    np.minimum(depths, most, out=depths)
     depths -= under
     found = []
     for force, tops, own in zip(wanted, tried, sections.cut(pulp.predict_force(depths, lost)), strict=True):
