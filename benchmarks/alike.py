@@ -88,8 +88,6 @@ TURNS = ((0.0, (0.0, 0.0)), (17.0, (0.4e-3, 0.7e-3)))
 AMOUNTS, HANDS = (2e-3, 4e-3, 8e-3, 15e-3), ((60.0, 1), (24.0, 5), (7.0, 1))
 #: How far from the path pins are whose heights count as those of the stroke, m.
 CORE = 1.5e-3
-#: Rows of a session's trace that a tick adds at most.
-ROWS = 20
 #: What Raise and Lower do in the cases.
 KINDS: dict[str, dict[str, Any]] = {
     "lowered 6 mm": {"brush": "lower", "depth": 6e-3}, "raised 8 mm": {"brush": "raise", "height": 8e-3},
@@ -124,7 +122,7 @@ class Played:
     raw: Floats
     """(n,): Before the valves finished the last stroke, m."""
     force: float
-    """Greatest total force on the fingertip, N."""
+    """Greatest total force on a fingertip, N."""
     time: float
     """Simulated until all is formed, s."""
     strokes: tuple[PointerStroke, ...]
@@ -161,7 +159,10 @@ def play(scene: Scene, strokes: tuple[PointerStroke, ...]) -> Played:
     session, force, rest = begin(scene), 0.0, scene.actuator.rest_height
     raw = session.state.row(0)
     for after in play_strokes(session, strokes):
-        session, force = after, max(force, float(after.trace.force[-ROWS:].max(initial=0.0)))
+        # A trace has the total of the fingertips; what each of several feels is seen at the end of a tick.
+        one, since = len(session.poses) == len(after.poses) == 1, after.state.period - session.state.period
+        felt = after.trace.force[-since:] if one and since else after.state.finger_forces()
+        session, force = after, max(force, float(felt.max(initial=0.0)))
         if session.strokes and session.strokes[0].phase != FINISHING:
             raw = session.state.row(0).copy()
     time = session.state.period * session.system.period
