@@ -403,10 +403,13 @@ class HandInGroups(HandControl):
         for i, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
             alike = run.sort(own) if counts[i] and hasattr(run, "sort") else None
             groups.setdefault(i if alike is None else (run, alike), []).append(i)
-        columns = np.split(cells, np.cumsum(counts)[:-1])
-        rows_of = np.split(seen.own, len(self.runs))
-        for group in groups.values():
-            chosen: Any = slice(None) if len(group) == len(memory) else np.isin(finger, group)
+        ends = np.cumsum(counts)
+        columns, rows_of = np.split(cells, ends[:-1]), np.split(seen.own, len(self.runs))
+        for first, *more in groups.values():
+            group = [first, *more]
+            chosen: Any = slice(ends[first] - counts[first], ends[first])
+            if more:
+                chosen = slice(None) if len(group) == len(memory) else np.isin(finger, group)
             at, sections = cells[chosen], Sections(counts[group].tolist())
             part = Measurement(
                 seen.quadratic_basis.take(at, 1),
