@@ -84,6 +84,12 @@ def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
         refused(["run", "my.toml", "--out", "o", "--quiet"], "o holds other things than a run")
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder here that takes no files")
+@pytest.mark.timeout(20)
+def test_a_folder_of_the_system_that_takes_no_files_is_refused(refused):
+    refused(["run", "my.toml", "--out", "/proc/o", "--quiet"], "/proc/o cannot be made")
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it():
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")

@@ -97,6 +97,8 @@ def _find_start_in_windows(pid: int) -> float | None:
 
 #: Seconds between two attempts.
 PAUSE = 0.05
+#: How often a folder may be gone when a file is to be made in it: more often it takes none, as /proc.
+MOST_MISSED = 100
 #: A record without a name is one that is being written, unless it is older than this, s.
 BEING_WRITTEN = 10.0
 #: What a drive says that has no locks, such as some network drives.
@@ -145,12 +147,16 @@ def _wait_for(attempt: Callable[[], Taken | None], patience: float) -> Taken | N
 
 def _take(path: Path) -> int | None:
     """Open and lock a file; None when another process holds it."""
+    missed = 0
     while True:
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
         try:
             file = os.open(path, flags, 0o666)
         except FileNotFoundError:  # the process that made the folder has just removed it
             path.parent.mkdir(parents=True, exist_ok=True)
+            missed += 1
+            if missed > MOST_MISSED:
+                raise
             continue
         try:
             if not _lock(file):
