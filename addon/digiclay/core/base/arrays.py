@@ -22,6 +22,8 @@ Indices = NDArray[np.int64]
 #: Corners of triangles (f, 3), numbers of vertices.
 Faces = NDArray[np.int32]
 
+#: Smallest normal number: keeps 0 / 0 from being NaN.
+TINY = float(np.finfo(float).tiny)
 #: Shapes for which one set of `Constants` is kept.
 MOST_SHAPES = 64
 

@@ -2,9 +2,9 @@
 
 What is measured of a pin is its force, not which finger presses it. So each pressed pin belongs to one of
 the fingers that are followed, the one whose underside is lowest there; where none is near a new one begins.
-Each controller sees the pins around its finger, without the forces on those of the others. Of two that
-command a pin, that of the fingertip above it is obeyed, elsewhere the one that moves it farthest off its
-ground.
+Each controller sees the pins around its finger, without the forces on those of the others; of a pin that two
+press each sees its share, where the method predicts undersides. Of two that command a pin, that of the
+fingertip above it is obeyed, elsewhere the one that moves it farthest off its ground.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Cells, Flags, Floats, find_copies
+from ..base.arrays import TINY, Cells, Flags, Floats, find_copies
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.fingertip import JOIN
 from ..model.layout import RELATIVE_TOLERANCE, Disc
@@ -35,8 +35,6 @@ BEYOND = 1e3
 OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
 #: Share of a pin that a finger does not see.
 HIDDEN = -1.0
-#: Replaces zero in 0/0.
-TINY = float(np.finfo(float).tiny)
 #: No finger.
 NOBODY = -1
 NO_DISC: Disc = (0.0, 0.0, -1.0)

@@ -6,7 +6,7 @@ near the rim decides in plain numbers, as that of a single run does: all come ou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +30,8 @@ from .virtual_master import (
 )
 
 #: Rows of the masters' numbers.
-PHASE, X, Y, HEIGHT, OPENING, REFERENCE, EDGE, FROM_X, FROM_Y, TOWARD_X, TOWARD_Y, FELT, ALONE, LOSSES = (
-    range(14)
-)
+PHASE, X, Y, HEIGHT, OPENING, REFERENCE, EDGE = range(7)
+FROM_X, FROM_Y, TOWARD_X, TOWARD_Y, FELT, ALONE, LOSSES = range(7, 14)
 #: Phases as plain numbers: numpy takes an enumeration's member ten times as long.
 AWAY, SPRUNG, SHAPED = float(IDLE), float(SPRINGING), float(SHAPING)
 #: Share of the travel that settles a direction below which no rounding reaches it.
@@ -79,13 +78,15 @@ class Masters(Sequence[Master]):
         return self.numbers.shape[1]
 
     def __getitem__(self, run: Any) -> Any:
-        phase, x, y, height, opening, reference, edge, *way, felt, alone, losses = self.numbers[
-            :, run
-        ].tolist()
-        counts = int(alone), int(losses)
-        return Master(Phase(phase), x, y, height, opening, reference, edge, Heading(*way), felt, *counts)
+        phase, *place, from_x, from_y, toward_x, toward_y, felt, alone, losses = self.numbers[:, run].tolist()
+        heading = Heading(from_x, from_y, toward_x, toward_y)
+        return Master._make((Phase(phase), *place, heading, felt, int(alone), int(losses)))
 
-    def put(self, runs: Flags, masters: Iterator[Master]) -> None:
+    def copy(self) -> Masters:
+        """Return masters that share no array with these."""
+        return Masters(self.numbers.copy())
+
+    def put(self, runs: Flags, masters: list[Master]) -> None:
         """Replace those of some runs (b,), in place."""
         for run, master in zip(runs.nonzero()[0].tolist(), masters, strict=True):
             self.numbers[:, run] = _list(master)
@@ -97,9 +98,9 @@ def _list(master: Master) -> tuple[Any, ...]:
 
 
 def gather(memory: Sequence[Master]) -> Masters:
-    """Return masters side by side, in a new array."""
+    """Return masters side by side: those of a list, or as they are."""
     if isinstance(memory, Masters):
-        return Masters(memory.numbers.copy())
+        return memory
     return Masters(np.array([_list(master) for master in memory]).T)
 
 
@@ -124,7 +125,7 @@ class VirtualMasterColumns(VirtualMasterControl):
 
     def follow(self, memory: Any, *sums: Any) -> Any:
         """VM Locate: see `VirtualMasterControl.follow`."""
-        masters, gains = gather(memory), self.parameters
+        masters, gains = gather(memory).copy(), self.parameters
         numbers, felt = masters.numbers, gains.felt_force
         total, _, _, near, near_x, near_y = np.array(sums)
         none, idle = total < felt, numbers[PHASE] == AWAY
@@ -137,7 +138,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         np.copyto(numbers[X], x, where=goes)
         np.copyto(numbers[Y], y, where=goes)
         np.copyto(numbers[ALONE], 0.0, where=goes)
-        masters.put(others, iter(alone))
+        masters.put(others, alone)
         return masters
 
     def is_new(self, memory: Any) -> bool:
@@ -146,7 +147,7 @@ class VirtualMasterColumns(VirtualMasterControl):
 
     def lead(self, memory: Any, force: Any, surface: Any, noise: Any = 0.0) -> Any:
         """VM Control and VM Model: see `VirtualMasterControl.lead`."""
-        masters, gains, cell = gather(memory), self.parameters, self.model
+        masters, gains, cell = memory.copy(), self.parameters, self.model
         numbers = masters.numbers
         phase, x, y, height, opening = numbers[:5]
         (at_x, at_y, reach), noises = self.rim, np.broadcast_to(noise, len(masters))
@@ -167,7 +168,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         after = np.where(springs, SPRUNG, SHAPED), risen, e * opening + f * command, risen
         for row, values in zip((PHASE, HEIGHT, OPENING, FELT), after, strict=True):
             np.copyto(numbers[row], values, where=goes)
-        masters.put(others, iter(alone))
+        masters.put(others, alone)
         return masters
 
     def find_disc(self, memory: Any) -> Any:
@@ -192,7 +193,7 @@ class VirtualMasterColumns(VirtualMasterControl):
 
     def set_edge(self, memory: Any, level: Any, count: Any) -> Any:
         """Put masters into surfaces: see `VirtualMasterControl.set_edge`."""
-        masters, cells = gather(memory), np.array(count)
+        masters, cells = memory.copy(), np.array(count)
         edge = level / np.maximum(cells, 1)
         edge = np.minimum(np.maximum(edge, 0.0), self.actuator.stroke)
         np.copyto(masters.numbers[EDGE], edge, where=cells > 0)

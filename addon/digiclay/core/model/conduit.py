@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import TINY, Floats
 from ..base.quantity import Parameters, quantity
 from .interfaces import Flow
 from .valve import Fluid, Orifice
@@ -22,10 +22,6 @@ class Conduit(Parameters):
     def resistance(self, fluid: Fluid) -> float:
         """Return ΔP/Q = 128 μ L_c / (π D_c⁴), Pa s/m³ (equation 8)."""
         return 128.0 * fluid.dynamic_viscosity * self.length / (math.pi * self.diameter**4)
-
-
-#: Keeps a shut valve without a drop from a division by 0.
-TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)

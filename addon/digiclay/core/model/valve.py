@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import TINY, Floats
 from ..base.quantity import Parameters, quantity, refuse_overrides
 from .interfaces import Flow
 
@@ -99,7 +99,7 @@ class Orifice(Flow):
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return the secant conductance Q/ΔP, m³/(s Pa), of openings K, either sign, under drops, Pa."""
-        root = np.sqrt(np.abs(drop)) + np.finfo(float).tiny
+        root = np.sqrt(np.abs(drop)) + TINY
         laminar: Floats = self.laminar_conductance(opening)
         return np.minimum(laminar, self.turbulent * np.abs(opening) / root)
 

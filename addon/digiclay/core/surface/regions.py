@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Faces, Floats
+from ..base.arrays import TINY, Faces, Floats
 from .formed import measure_areas
 
 #: The contour keeps this share of an edge away from both its ends, so that no triangle is without area.
@@ -70,7 +70,7 @@ def divide(region: Region, nearer: Floats, gap: float = 0.0) -> tuple[Region | N
     """Return the parts of a region where a value at its points, (k,), is above `gap`, and below -`gap`."""
     values = np.column_stack([region.position, region.former, region.off])
     # What is at 0 is on one side by a trifle, or triangles along the contour would be on none.
-    nearer = np.where(nearer == 0.0, -np.finfo(float).tiny, nearer)
+    nearer = np.where(nearer == 0.0, -TINY, nearer)
     parts: list[Region | None] = []
     for side in (nearer, -nearer):
         some = region.faces[(side > gap)[region.faces].any(axis=1)]
