@@ -161,7 +161,7 @@ def _draw_head(readings: Readings, pen: Pen, top: float) -> None:
 def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
     now = _tell_force(readings) if readings.force.size else ""
-    words = "set point {:.2f} N each" if readings.fingers else "set point {:.2f} N"
+    words = "set point {:.2f} N each" if readings.hardest is not None else "set point {:.2f} N"
     asked = "" if readings.set_point is None else localize(words, readings.set_point)
     top = pen.row(top, localize("Total force  {}", now), asked)
     recent = readings.force[readings.time >= readings.window[0]]
@@ -248,7 +248,7 @@ def _draw_brief(readings: Readings, pen: Pen, top: float) -> None:
     now = localize("no force yet")
     if readings.force.size:
         now = _tell_force(readings)
-    words = "{:.2f} N each" if readings.fingers else "of {:.2f} N"
+    words = "{:.2f} N each" if readings.hardest is not None else "of {:.2f} N"
     asked = "" if readings.set_point is None else localize(words, readings.set_point)
     top = pen.row(top, now, asked)
     time = float(readings.time[-1]) if readings.time.size else 0.0
