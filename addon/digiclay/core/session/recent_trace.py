@@ -83,7 +83,10 @@ def measure_total_force(system: System, state: State) -> float:
 
 
 def exceeds_law(system: System, state: State, pose: Floats) -> bool:
-    """Return whether the contact law does not hold, of the fingertip at a pose (7,): `touch.is_beyond`."""
+    """Return whether the contact law does not hold, `touch.is_beyond`, of the fingertip at a pose (7,).
+
+    Of several the forces alone are judged, not how deep they are.
+    """
     if system.cell.touch is None:
         return False
     if system.fingers > 1:
