@@ -23,6 +23,7 @@ from digiclay.core.studies.axes import (
     MOST,
     Point,
     Record,
+    find_numbers,
     find_quantity,
     find_value,
     place_points,
@@ -110,15 +111,15 @@ def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -
             load(path, [*settings, Setting(varied.key, word, "--vary")])
         return varied
     factor, measured = UNITS.get(varied.unit, (0.0, "")) if varied.unit else (1.0, declared.unit)
-    value = find_value(scene, varied.key, "")
-    whole = isinstance(value, int)
+    numbers = find_numbers(scene, varied.key)
+    whole = any(isinstance(value, int) for value in numbers)
     for end in (varied.low, varied.high):
         rule = declared.broken_rule(end * factor)
         if measured != declared.unit:
             rule = f"must be in {declared.unit or 'no unit'} or a multiple of it"
         elif whole and end != int(end):
             rule = "must have whole numbers at LOW and HIGH"
-        elif value == "":
+        elif not numbers:
             rule = "must have words as its values: A,B"
         if rule:
             raise ParameterError(f"--vary {varied.key}", "", rule, f"{end:g} {varied.unit}".strip())
@@ -189,8 +190,9 @@ class Subject:
         left = evaluation.total - len(records)
         if record is not None and left and not quiet:
             time = format_duration(left * record["figures"]["run_time"])
-            runs = f"{left} runs: about {time} of one core if each is run by itself, less in batches"
-            print(runs, flush=True)
+            # Several fingers are in no batch.
+            less = " if each is run by itself, less in batches" if len(self.scene.fingers) == 1 else ""
+            print(f"{left} runs: about {time} of one core{less}", flush=True)
         return record
 
     def write_table(

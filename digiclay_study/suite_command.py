@@ -98,7 +98,10 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
         for method in methods
         for seed in seeds
     }  # fmt: skip
-    sensors = next(iter(scenes.values())).sensors
+    first_scene = next(iter(scenes.values()))
+    if not first_scene.fingers:
+        raise ParameterError("scene", "fingers", "must be at least 1", "0")
+    sensors = first_scene.sensors
     if repeats > 1 and not (sensors and sensors.noisy):
         raise ParameterError("--repeats", "", "must be 1 without noise", str(repeats))
     points: list[Point] = []

@@ -33,6 +33,25 @@ class SoftPad(OwnMethod):
         return memory, Orders(height=np.where(down, cells.height - self.step, cells.target))
 '''
 
+COPY = f"""{HEAD}
+from digiclay.core.control import virtual_master
+
+@dataclass(frozen=True)
+class MethodOne(virtual_master.VirtualMaster):
+    blister = {{}}
+
+    def build(self, device):
+        return virtual_master.build(self, device)
+"""
+#: A memory as of a controller that follows a fingertip, and none.
+PLACED = (
+    PAD.replace(
+        "    def command",
+        "    def begin(self, device):\n        return Kept()\n\n    def command",
+    )
+    + "\nclass Kept(NamedTuple):\n    place: float = 0.5\n"
+)
+
 
 def write_method(folder: Path, text: str = PAD, name: str = "pad.py") -> Path:
     """Write the file of a method, and return it."""

@@ -1,6 +1,7 @@
 """Scenes of several fingers: what the samples form, and every command that takes such a scene or its run."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -8,11 +9,16 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
+from digiclay.core.model.touch import MOST_FORCE
 from digiclay.core.scene.recorder import write
-from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
 from digiclay.core.session.finished_run import HISTORY, read_run
 from digiclay.core.session.run_scene import Result, run, save
+from digiclay.core.studies.omissions import propose_omissions
+from digiclay.plugins.method_loader import load_method
 
+from tests.own_methods import COPY, PAD, PLACED, forgotten, small, write_method
 from tests.scene_files import folder_with, rows
 
 WAY = """trajectory.waypoints = [
@@ -74,6 +80,8 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name: str
         ([*SHAPED, "scene"], ("history.npz",)),
         ([*SHAPED, "press"], ("history.npz",)),
         ([*GAINS, "--out", "out", "--workers", "2"], ("sweep.csv",)),
+        (["sweep", "my.toml", "--vary", "finger.2.contact.share=0.2,0.3", "--out", "out"], ("sweep.csv",)),
+        (["run", "my.toml", "--budget", "300um", "--set", "contact.stiffness=300", "--out", "out"], ()),
     ],
     ids=lambda part: " ".join(part[:1]),
 )  # fmt: skip
@@ -81,6 +89,41 @@ def test_a_command_takes_a_scene_of_two_fingers(command, made, tmp_path, monkeyp
     folder = folder_with(TWO, tmp_path, monkeypatch)
     assert main(command) == 0
     assert set(made) <= {path.name for path in (folder / "out").glob("*")}
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ([*SHAPED[:-2], "--finger", "press"], "formed by the first of 2 fingers alone"),
+        (["compare", "my.toml", "--speed", "--out", "out"], "Followed, the first of the fingers alone: "),
+        (["compare", "my.toml", "--out", "out"], "Of 2 fingers the worst; metrics.json has each."),
+    ],
+)
+def test_a_command_says_what_it_takes_of_several_fingers(command, said, tmp_path, monkeypatch, capsys):
+    folder = folder_with(TWO, tmp_path, monkeypatch)
+    assert main(command) == 0
+    assert said in capsys.readouterr().out
+    found = json.loads((folder / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert ("fingers" in found) == (command[0] == "compare")
+    if command[0] == "compare":
+        for method, each in found["fingers"].items():
+            largest = max(one["max_total_force"] for one in each)
+            assert found["methods"][method]["max_total_force"] == largest
+
+
+def test_rows_are_beyond_a_finger_where_one_is_and_not_where_all_together_are():
+    made = load(find("pinch_crease"), [Setting("control", "absent"), Setting("relaxation", "absent")])
+    done = run(replace(made, simulation=replace(made.simulation, duration=1.0)))
+    marked, each = done.history["beyond_a_finger"], done.history["finger_force"]
+    # Pressed 3 mm deep into pins that hold, each finger alone comes to more than 2 N, both together before.
+    np.testing.assert_array_equal(marked, (each > MOST_FORCE).any(axis=1))
+    assert (each.sum(axis=1)[~marked] > MOST_FORCE).any()
+
+
+def test_a_budget_leaves_out_the_relaxation_of_all_fingers():
+    made = load(find("pinch_crease"))
+    texts = {one.kind: one for one in propose_omissions(made, 1e-3)}
+    assert texts["relaxation"].leave_out(made).list_parts("relaxation") == (None, None)
 
 
 def test_describe_names_the_finger_of_a_part_and_counts_all_rows(tmp_path, monkeypatch, capsys):
@@ -123,3 +166,34 @@ def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(broke
         OutputError, match=rf"{broken} must have the shape \(21, 2.*of its scene \(got \(21, 1"
     ):
         read_run(tmp_path, "fingertip", "finger_force")
+
+
+@pytest.mark.parametrize(
+    ("code", "word", "like"),
+    [(COPY, "one.py:MethodOne", "virtual_master"), (PAD, "pad.py:SoftPad", ""), (PLACED, "p.py:SoftPad", "")],
+)
+def test_a_method_of_ones_own_takes_several_fingers(code, word, like, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_method(tmp_path, code, word.partition(":")[0])
+    longer = "simulation.duration=0.5"
+    with forgotten():
+        own = run(with_two(small(load_method(word), longer)))
+    assert all(one["contact_share"] > 0.0 for one in own.metrics["fingers"])
+    assert np.ptp(own.history["height"]) > 1e-4
+    if like:  # a controller a finger; what they sum goes in another order
+        built_in = run(with_two(small(like, longer)))
+        np.testing.assert_allclose(own.history["height"], built_in.history["height"], rtol=0, atol=1e-9)
+        assert own.metrics["losses"] == built_in.metrics["losses"]
+
+
+def with_two(scene: Scene) -> Scene:
+    """Return a scene with its fingertip twice, 18 mm apart and 3 mm aside."""
+    (finger,) = scene.fingers
+    path = finger.trajectory
+    ways = (
+        tuple(replace(at, position=(side, side / 6, at.position[2])) for at in path.waypoints)
+        for side in (-9e-3, 9e-3)
+    )
+    return replace(
+        scene, fingers=tuple(replace(finger, trajectory=replace(path, waypoints=way)) for way in ways)
+    )

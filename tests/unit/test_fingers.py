@@ -24,6 +24,7 @@ from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.run_scene import Result, run
 from digiclay.core.session.snapshot import START
 from digiclay.core.session.take import Take, from_bytes, to_bytes
+from digiclay.core.studies.axes import find_value
 from digiclay.overlay.sections import force_message
 
 from tests.assemble import sample, under
@@ -62,7 +63,7 @@ def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(text):
     assert resolve(parse_tables(format_scene(made))) == made
 
 
-def test_a_setting_names_the_only_finger_of_a_list_as_any_other_and_none_of_two(tmp_path):
+def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path):
     beside = ONE.replace("[[finger]]", "").replace("[finger.", "[")
     assert scene(ONE) == scene(beside)
     assert "[[finger]]" not in format_scene(scene(ONE))
@@ -70,9 +71,38 @@ def test_a_setting_names_the_only_finger_of_a_list_as_any_other_and_none_of_two(
     file.write_text(BED + ONE, encoding="utf-8")
     (finger,) = load(file, [Setting("fingertip.length", "0.009"), Setting("relaxation", "absent")]).fingers
     assert (finger.fingertip.length, finger.relaxation) == (9e-3, None)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "lengths"),
+    [
+        ("fingertip.length", "0.009", (9e-3, 9e-3)),  # of all
+        ("finger.2.fingertip.length", "0.009", (14e-3, 9e-3)),
+        ("finger #1.fingertip.length", "0.009", (9e-3, 10e-3)),  # as describe and messages write it
+        ("finger.1.fingertip", "{}", (10e-3, 10e-3)),
+        ("finger.3.fingertip.length", "9 mm", "3 must be a number from 1 to 2 here"),
+        ("finger.fingertip.length", "9 mm", "fingertip must be a number from 1 to 2 here"),
+        ("finger.2.fingertip.lenght", "9 mm", "finger #2.fingertip.lenght must be a known key"),
+        ("fingertip.length", "-9 mm", "finger #1.fingertip.length must be above 0 m"),
+        ("finger.2.control.force_gain", "3", "finger #2.control must be a known key"),
+        ("finger.2.fingertip.length", "nan", "finger #2.fingertip.length must be a finite number"),
+    ],
+)
+def test_a_setting_is_of_all_fingers_or_of_the_one_it_names(key, value, lengths, tmp_path):
+    file = tmp_path / "two.toml"
     file.write_text(BED + TWO, encoding="utf-8")
-    with pytest.raises(SceneError, match=r"^--set: fingertip must be left out where there is \[\[finger\]\]"):
-        load(file, [Setting("fingertip.length", "9 mm")])
+    settings = [Setting(key, value), Setting("control.dead_band", "9 um", "--vary")]
+    if isinstance(lengths, tuple):
+        made = load(file, settings)
+        assert tuple(part.length for part in made.list_parts("fingertip")) == lengths
+        own = tuple(dict.fromkeys(lengths))
+        assert find_value(made, "fingertip.length", "differs") == (own[0] if len(own) == 1 else "differs")
+        assert find_value(made, "finger.2.fingertip.length", "") == lengths[1]
+    else:
+        with pytest.raises(SceneError, match=f"^--(set|vary): {lengths}") as refused:
+            load(file, settings)
+        # Of a value out of bounds the option that has it is known.
+        assert str(refused.value).startswith("--set") or "must be above" not in lengths
 
 
 @pytest.mark.parametrize(

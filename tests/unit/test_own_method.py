@@ -22,7 +22,7 @@ from digiclay.core.session.run_scene import run
 from digiclay.plugins import method_loader
 from digiclay.plugins.method_loader import load_method
 
-from tests.own_methods import HEAD, PAD, forgotten, refused, small, write_method
+from tests.own_methods import COPY, HEAD, PAD, forgotten, refused, small, write_method
 from tests.timeouts import TIMEOUT
 
 
@@ -89,18 +89,6 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
     ])  # fmt: skip
     with pytest.raises(MethodError, match=r"one installed package \(got one:Pad, two:Pad\)"):
         load_method("pad")
-
-
-COPY = f"""{HEAD}
-from digiclay.core.control import virtual_master
-
-@dataclass(frozen=True)
-class MethodOne(virtual_master.VirtualMaster):
-    blister = {{}}
-
-    def build(self, device):
-        return virtual_master.build(self, device)
-"""
 
 
 def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here: Path) -> None:

@@ -92,6 +92,21 @@ def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here: Path)
     assert all(row["index"] for row in rows(here / "out" / "indices.csv"))
 
 
+@pytest.mark.parametrize(("fingers", "batches"), [(1, True), (2, False)])
+def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(fingers, batches, here, capsys):
+    bed, _, path = SCENE.partition("[trajectory]")
+    fingers_of = "".join(f"[[finger]]\n[finger.trajectory]{path}" for _ in range(fingers))
+    (here / "my.toml").write_text(bed + fingers_of, encoding="utf-8")
+    ranges = ["--vary", "control.position_gain=100:1000", "--vary", "contact.stiffness=200:300"]
+    options = ["--samples", "4", "--workers", "1", "--metric", "rfd", "--out", "out"]
+    assert main(["study", "my.toml", *ranges, *options]) == 0
+    said = capsys.readouterr().out
+    assert "16 runs: about" in said
+    assert (("less in batches" in said), ("16 points run in 1 stack" in said)) == (batches, batches)
+    # Each of the fingers has the stiffness of its point.
+    assert len({row["contact.stiffness (N/m)"] for row in rows(here / "out" / "points.csv")}) > 8
+
+
 def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is_omitted_and_told(
     whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -115,6 +115,12 @@ def test_a_mistake_is_one_line_and_leaves_nothing(words: str, said: str, here: P
     assert left(here) == []
 
 
+def test_a_scene_without_a_finger_has_no_suite(here: Path, refused: Any) -> None:
+    (here / "my.toml").write_text("finger = []\nsimulation.duration = 1\n", encoding="utf-8")
+    refused(["compare", "my.toml", "--suite"], "scene.fingers must be at least 1 (got 0)")
+    assert left(here) == []
+
+
 def test_a_method_of_one_s_own_enters_by_one_option(here: Path) -> None:
     write_method(here)
     with forgotten():

@@ -31,7 +31,9 @@ from digiclay.core.metrics.summary import (
     measure_surface_under,
     measure_touchdown,
     perceive,
+    split_fingers,
     sum_cells,
+    take_worst,
 )
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
@@ -410,3 +412,55 @@ def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
     assert measure_surface_under(sum_cells(HISTORY), TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)
     nothing = {**HISTORY, "force": np.zeros((2, 2)), "total_force": np.zeros(2)}
     assert measure_surface_under(sum_cells(nothing), TIP[:2]).size == 0
+
+
+def of_two(places: tuple[float, float], force: dict[int, float], own: tuple[float, float]) -> dict[str, Any]:
+    """Return a bed of 1 x 5 pins under two fingers on its row; forces by pin and of each finger, N."""
+    position = make_grid(Layout(rows=1, columns=5)).positions
+    one = history(TIME * 0.0) | {"position": position}
+    for name in ("height", "force", "command", "mode"):
+        one[name] = np.zeros((len(TIME), 5), one[name].dtype)
+    for cell, value in force.items():
+        one["force"][:, cell] = value
+    one["fingertip"] = np.tile([0.0, 0.0, 0.04, 1.0, 0.0, 0.0, 0.0], (len(TIME), 2, 1))
+    one["fingertip"][:, :, 0] = places
+    one["finger_force"] = np.tile(own, (len(TIME), 1))
+    return one | {"total_force": one["finger_force"].sum(axis=1)}
+
+
+@pytest.mark.parametrize(
+    ("places", "force", "own", "lags"),
+    [
+        ((-6e-3, 6e-3), {0: 0.3, 4: 0.1}, (0.3, 0.1), (0.0, 0.0)),  # apart
+        ((-3e-3, 3e-3), {1: 0.2, 2: 0.2, 3: 0.2}, (0.3, 0.3), (1.5e-3, 1.5e-3)),  # the middle pin is of both
+        ((0.0, 0.0), {2: 0.6}, (0.4, 0.2), (0.0, 0.0)),  # in one place
+        ((3e-3, 4e-3), {3: 0.3}, (0.2, 0.1), (0.0, 1e-3)),  # all that one presses is nearer to the other
+        ((3e-3, 4e-3), {3: 0.3}, (0.3, 0.0), (0.0, None)),  # and it presses nothing
+    ],
+)
+def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_are(
+    places, force, own, lags
+) -> None:
+    for mirror in (1, -1):
+        given = of_two(places, force, own)
+        given["fingertip"][:, :, 0] *= mirror
+        given["force"] = given["force"][:, ::mirror]
+        each = [compute_metrics(one, None) for one in split_fingers(given)]
+        # Rounding.
+        assert [one["max_total_force"] for one in each] == pytest.approx(own, abs=1e-15)
+        assert [one["lag_mean"] for one in each] == [lag and pytest.approx(lag, abs=1e-12) for lag in lags]
+
+
+@pytest.mark.parametrize(
+    ("name", "each", "worst"),
+    [
+        ("rfd", (0.1, 0.3, None), 0.3),
+        ("rfd", (None, None, None), None),
+        ("contact_share", (0.9, 0.0, 0.5), 0.0),
+        ("ridge_offset", (1e-4, -3e-3, 2e-4), -3e-3),
+        ("settling_time", (0.2, 0.4, 0.3), 0.4),
+        ("settling_time", (0.2, None, 0.3), None),
+    ],
+)
+def test_the_worst_of_several_fingers_is_told(name, each, worst) -> None:
+    assert take_worst([{name: value} for value in each]) == {name: worst}

@@ -116,6 +116,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     measured: dict[str, Metrics] = {}
     forces: dict[str, tuple[Any, Any, Any]] = {}
     beyond: dict[str, str] = {}
+    each: dict[str, list[Metrics]] = {}
     with allow_interrupt(), write_folder(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
             with Bar(sys.stderr, method, scene.simulation.control_period, quiet=arguments.quiet) as bar:
@@ -125,15 +126,19 @@ def carry_out(arguments: argparse.Namespace) -> int:
             wanted = find_set_point(scene.set_point, sum_cells(worst).following)
             forces[method] = worst["time"], worst["total_force"], wanted
             beyond[method] = done.metrics.get("beyond_a_finger", "")
+            each |= {method: done.metrics["fingers"]} if "fingers" in done.metrics else {}
         units = {name: metric.unit for name, metric in {**RUN_METRICS, **SPEEDS}.items()}
         content = {"scene": scene.name, "methods": measured, "units": units, "beyond_a_finger": beyond}
+        content |= {"fingers": each} if each else {}
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
         several = len(scene.fingers) > 1
         called = "force of the worst finger" if several else "total force"
         save(comparison(measured, forces, scene.name, called), folder / "compare.png")
     notes = [f"{method}: {words}" for method, words in beyond.items() if words]
-    notes += [f"Followed: {Criterion()}."] if arguments.speed else []
+    alone = ", the first of the fingers alone" if several else ""
+    notes += [f"Followed{alone}: {Criterion()}."] if arguments.speed else []
+    notes += [f"Of {len(scene.fingers)} fingers the worst; metrics.json has each."] if several else []
     say(arguments, *table(measured), *notes, f"written to {out}")
     return 0
 

@@ -10,7 +10,7 @@ from ..core.base.quantity import Parameters, Quantity, list_quantities
 from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
-from ..core.scene.schema import FINGER_SECTIONS, SECTIONS, Scene
+from ..core.scene.schema import SECTIONS, Scene
 from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
 from ..core.shapes.fitting import fit_shape
 from .arguments import add_scene, command, scene_of
@@ -59,11 +59,9 @@ def list_parameters(scene: Scene) -> Iterator[str]:
 
 def _list_parts(scene: Scene, section: str) -> list[tuple[str, Any]]:
     """Return the different parts of a section, and the numbers of their fingers where several differ."""
-    if section not in FINGER_SECTIONS:
-        return [("", scene.section(section))]
     owners: dict[Any, list[str]] = {}
-    for number, finger in enumerate(scene.fingers, 1):
-        owners.setdefault(getattr(finger, section), []).append(str(number))
+    for number, part in enumerate(scene.list_parts(section), 1):
+        owners.setdefault(part, []).append(str(number))
     return [(", ".join(numbers) if len(owners) > 1 else "", part) for part, numbers in owners.items()]
 
 

@@ -68,6 +68,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
         scene, laid = _laid(scene)
         say(arguments, laid.describe())
         if arguments.finger != "scene":
+            if len(scene.fingers) > 1:
+                say(arguments, f"formed by the first of {len(scene.fingers)} fingers alone")
+                scene = replace(scene, fingers=scene.fingers[:1])
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
         result = simulate(arguments, scene, path, stop)

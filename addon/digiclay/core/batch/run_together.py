@@ -25,7 +25,6 @@ from ..scene.assembly import assemble
 from ..scene.columns import Batch, begin, make_batch
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
-from ..session import run_scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_scene import Ended, Result, evaluate, report
@@ -269,9 +268,6 @@ def _run(
     errors: bool = False,
 ) -> Iterator[tuple[int, Outcome]]:
     """Yield the numbers of the scenes as they come to their ends, and what an observer makes of them."""
-    if any(len(scene.fingers) != 1 for scene in scenes):
-        yield from _run_one_by_one(scenes, stopped, errors=errors)
-        return
     systems: dict[int, System] = {}
     for number, scene in enumerate(scenes):
         try:
@@ -300,29 +296,15 @@ def _run(
             yield run, result
 
 
-def _run_one_by_one(
-    scenes: Sequence[Scene], stopped: Callable[[], bool] | None, *, errors: bool
-) -> Iterator[tuple[int, Outcome]]:
-    """Yield what becomes of scenes of several fingers, of which each is a batch of its own."""
-    for number, scene in enumerate(scenes):
-        try:
-            result = run_scene.run(scene, stopped=stopped)
-            if stopped and stopped():
-                return
-            yield number, (result.estimate_errors(stopped=stopped) or result) if errors else result
-        except DigiclayError as error:
-            yield number, error
-
-
 def run_together(
     scenes: Sequence[Scene], *, stopped: Callable[[], bool] | None = None
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes from rest to their ends, all at once.
 
-    The scenes are of one `packing.describe_structure`. When `stopped`, asked after each control period, says
-    True, the runs that are not done are given up. Yields the number of a scene at its end, and what
-    `run_scene.run` would return or raise; the history is valid until the next result is asked for, and the
-    run time is a share, see `run_together.Instant`.
+    The scenes are of one finger each, and of one `packing.describe_structure`. When `stopped`, asked after
+    each control period, says True, the runs that are not done are given up. Yields the number of a scene at
+    its end, and what `run_scene.run` would return or raise; the history is valid until the next result is
+    asked for, and the run time is a share, see `run_together.Instant`.
     """
     return _run(scenes, Histories, stopped)
 

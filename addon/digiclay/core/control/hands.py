@@ -439,4 +439,4 @@ def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float, flo
 
 def follows_finger(controller: Controller) -> bool:
     """Tell whether a controller follows one fingertip, and several need one each."""
-    return hasattr(controller.begin(), "place")
+    return hasattr(controller, "blister") and hasattr(controller.begin(), "place")

@@ -322,19 +322,29 @@ def measure_touchdown(
 
 
 def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """Give the history of each finger; a pin's force counts for the nearest, where two press it."""
+    """Give the history of each finger; a pin's force counts for the nearest, where two press it.
+
+    Where two are equally near it counts for both, and for a finger without any the nearest that is pressed.
+    """
     if "finger_force" not in history:
         yield history
         return
     common = {name: values for name, values in history.items() if name != "finger_force"}
     tips, (x, y) = history["fingertip"], history["position"].T
-    owner, least = np.zeros(history["force"].shape, np.int8), np.full(history["force"].shape, np.inf)
+    pressed, least = history["force"] > 0.0, np.full(history["force"].shape, np.inf)
+
+    def square(finger: int) -> Floats:
+        apart: Floats = (x - tips[:, finger, :1]) ** 2 + (y - tips[:, finger, 1:2]) ** 2
+        return apart
+
     for finger in range(tips.shape[1]):
-        apart = (x - tips[:, finger, :1]) ** 2 + (y - tips[:, finger, 1:2]) ** 2
-        owner[apart < least] = finger
-        np.minimum(least, apart, out=least)
+        np.minimum(least, square(finger), out=least)
     for finger, total in enumerate(history["finger_force"].T):
-        own = owner == finger
+        own = square(finger) <= least
+        lacking = np.flatnonzero((total > 0.0) & ~(own & pressed).any(axis=1))
+        if lacking.size:
+            away = np.where(pressed[lacking], square(finger)[lacking], np.inf)
+            own[lacking, away.argmin(axis=1)] = True
         force = np.where(own, history["force"], 0.0)
         found = force.sum(axis=1)
         # All of a finger together are exact.
@@ -343,12 +353,16 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         yield {**common, **rows, "total_force": total, "fingertip": tips[:, finger]}
 
 
-def take_largest(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:
-    """Return the largest of each metric of the fingers: a sum would hide that one is lost."""
-    return {
-        name: max((value for one in each if (value := one[name]) is not None), default=None)
-        for name in each[0]
-    }
+def take_worst(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:
+    """Return the worst of each metric of the fingers: a sum would hide that one is lost."""
+    worst: dict[str, float | None] = {}
+    for name in each[0]:
+        values = [value for one in each if (value := one[name]) is not None]
+        pick = min if name == "contact_share" else max
+        worst[name] = pick(values, key=abs, default=None)
+        if name == "settling_time" and len(values) < len(each):  # one never does
+            worst[name] = None
+    return worst
 
 
 def find_worst_finger(
@@ -380,11 +394,11 @@ def compute_cell_area(position: ArrayLike) -> float | None:
 def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
     """Return every metric of a session by the keys of `METRICS`, SI; None without a basis, never a NaN.
 
-    `history`: the arrays of ``history.npz``; of several fingers see `take_largest`. Raises ParameterError
+    `history`: the arrays of ``history.npz``; of several fingers see `take_worst`. Raises ParameterError
     when the history has no rows.
     """
     if "finger_force" in history:
-        return take_largest([compute_metrics(own, set_point) for own in split_fingers(history)])
+        return take_worst([compute_metrics(own, set_point) for own in split_fingers(history)])
     time = np.asarray(history["time"], dtype=np.float64)
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")

@@ -11,8 +11,8 @@ from ..base.errors import ParameterError, SceneError
 from ..control.methods import list_methods
 from ..files.run_folder import find_file, list_files
 from ..files.tables import LARGEST, ReadParts, parse_tables
-from .schema import Scene
-from .toml_table import ABSENT, merge_one_finger, resolve
+from .schema import FINGER_SECTIONS, Scene
+from .toml_table import ABSENT, FINGERS, merge_one_finger, resolve
 
 #: Where the sample scenes are.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
@@ -35,7 +35,7 @@ class Setting(NamedTuple):
     """Change of a scene file by an option of the command line."""
 
     key: str
-    """Section and key, ``valve.stroke``."""
+    """Section and key, ``valve.stroke``; of a finger ``finger.2.contact.law``, of all ``contact.law``."""
     value: str
     """TOML; a text needs no quotes."""
     option: str = "--set"
@@ -70,7 +70,8 @@ def make_scene(
     except ParameterError as error:
         if settings:
             make_scene(path, table)  # a file that is wrong by itself is reported first
-        blamed = [one.option for one in settings if one.key == f"{error.owner}.{error.field}"]
+        key = ".".join(split_key(f"{error.owner}.{error.field}"))
+        blamed = [one.option for one in settings if f".{key}".endswith(f".{'.'.join(split_key(one.key))}")]
         own = path.name if path.parent == SAMPLES else str(path)
         origin = (blamed or [one.option for one in settings] or [own])[-1]
         raise SceneError(f"{origin}: {error}") from None
@@ -110,15 +111,33 @@ def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:
     """Return the tables of a scene file with settings in them."""
     whole = dict(table)
-    for key, value, _ in settings:
-        *groups, last = key.split(".")
-        inner = whole
-        for group in groups:
-            own = inner.get(group)
-            inner[group] = dict(own) if isinstance(own, dict) else {}
-            inner = inner[group]
-        inner[last] = _read_value(value)
+    for key, text, _ in settings:
+        keys, value = split_key(key), _read_value(text)
+        fingers = whole.get(FINGERS) if keys[0] in FINGER_SECTIONS else None
+        if isinstance(fingers, list) and all(isinstance(finger, dict) for finger in fingers):
+            whole[FINGERS] = [_replace(finger, keys, value) for finger in fingers]
+        else:
+            whole = _replace(whole, keys, value)
     return whole
+
+
+def split_key(key: str) -> list[str]:
+    """Return the parts of a key; ``finger #2.contact`` is ``finger.2.contact``."""
+    return key.replace(" #", ".").split(".")
+
+
+def _replace(table: Any, keys: Sequence[str], value: Any) -> Any:
+    """Return a table with a value at nested keys; those of a list are numbers from 1 on."""
+    if not keys:
+        return value
+    key, *rest = keys
+    if isinstance(table, list):
+        if not (key.isascii() and key.isdecimal() and 0 < int(key) <= len(table)):
+            raise ParameterError(key, "", f"must be a number from 1 to {len(table)} here", repr(key))
+        place = int(key) - 1
+        return [*table[:place], _replace(table[place], rest, value), *table[place + 1 :]]
+    own = table if isinstance(table, dict) else {}
+    return {**own, key: _replace(own.get(key), rest, value)}
 
 
 @lru_cache(maxsize=1024)

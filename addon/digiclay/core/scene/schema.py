@@ -202,9 +202,14 @@ class Scene:
         """Return the paths of the fingers as something that has poses."""
         return tuple(finger.trajectory.trajectory() for finger in self.fingers)
 
+    def list_parts(self, name: str) -> tuple[Any, ...]:
+        """Return the content of a section, of each finger where fingers have it; None for an omitted part."""
+        owners = self.fingers if name in FINGER_SECTIONS else (self,)
+        return tuple(getattr(owner, name, None) for owner in owners)
+
     def section(self, name: str) -> Any:
         """Return the content of a section in the scene file of one finger; None for an omitted part."""
-        return getattr(require_one(self.fingers) if name in FINGER_SECTIONS else self, name, None)
+        return require_one(self.list_parts(name))
 
     def with_sections(self, **parts: Any) -> Scene:
         """Return the scene with other parts, by the names of sections; those of fingers in all of them."""

@@ -18,7 +18,7 @@ from ..base.errors import explain_os_error
 from ..engine.simulation import begin, periods
 from ..engine.system import System
 from ..metrics.metric_table import ERRORS, METRICS, RUN
-from ..metrics.summary import compute_metrics, split_fingers, take_largest
+from ..metrics.summary import compute_metrics, split_fingers, take_worst
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
 from ..scene.assembly import assemble
@@ -144,7 +144,7 @@ def evaluate(
         each.append(compute_metrics(own, scene.set_point))
         if system.cell.touch is not None and finger.fingertip:
             depths.append(find_indentations(finger.fingertip, own))
-    metrics: dict[str, Any] = take_largest(each)
+    metrics: dict[str, Any] = take_worst(each)
     if system.fingers > 1:
         metrics["fingers"] = each
     if depths:
@@ -152,7 +152,8 @@ def evaluate(
         metrics["max_indentation"] = float(depth.max())
         metrics["beyond_a_finger"] = describe_excess(metrics["max_total_force"], metrics["max_indentation"])
         if metrics["beyond_a_finger"]:
-            history["beyond_a_finger"] = is_beyond(history["total_force"], depth)
+            pressing = history.get("finger_force", history["total_force"][:, None])
+            history["beyond_a_finger"] = is_beyond(pressing.max(axis=1), depth)
     return replace(report(scene, ended, metrics, versions), history=history)
 
 

@@ -12,8 +12,9 @@ import numpy as np
 from ..base.errors import ParameterError, SceneError
 from ..base.quantity import Parameters, Quantity, list_quantities
 from ..files.tables import ReadParts
-from ..scene.scene_source import Setting, load, make_scene, read_table
+from ..scene.scene_source import Setting, load, make_scene, read_table, split_key
 from ..scene.schema import Scene
+from ..scene.toml_table import FINGERS
 
 #: Result of a point: its ``figures``, or the ``error`` it ended in.
 Record = dict[str, Any]
@@ -208,16 +209,30 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
     return columns
 
 
+def _find_parts(scene: Scene, key: str) -> tuple[list[Any], str]:
+    """Return the parts that have a parameter, of one finger or all, and its name; `key`: as of a setting."""
+    first, *rest = split_key(key)
+    if first == FINGERS and len(rest) == 3:
+        parts = enumerate(scene.list_parts(rest[1]), 1)
+        return [part for number, part in parts if str(number) == rest[0]], rest[2]
+    return list(scene.list_parts(first)), ".".join(rest)
+
+
 def find_quantity(scene: Scene, key: str) -> Quantity | None:
-    """Return how a parameter of a scene is declared; None where it is not. `key`: section and key."""
-    section, _, name = key.partition(".")
-    part = scene.section(section)
-    return list_quantities(part).get(name) if isinstance(part, Parameters) else None
+    """Return how a parameter of a scene is declared; None where it is not."""
+    parts, name = _find_parts(scene, key)
+    known = (list_quantities(part).get(name) for part in parts if isinstance(part, Parameters))
+    return next(known, None)
+
+
+def find_numbers(scene: Scene, key: str) -> list[Any]:
+    """Return the values of a parameter that are numbers, each once: fingers may have their own."""
+    parts, name = _find_parts(scene, key)
+    values = dict.fromkeys(getattr(part, name, None) for part in parts if name)
+    return [value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
 
 
 def find_value(scene: Scene, key: str, word: str) -> Any:
-    """Return what a scene made of a word, if it is a number; else the word. `key`: section and key."""
-    section, _, name = key.partition(".")
-    value = getattr(scene.section(section), name, None) if name else None
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return value if number else word
+    """Return what a scene made of a word, if it is a number, the same for all fingers; else the word."""
+    numbers = find_numbers(scene, key)
+    return numbers[0] if len(numbers) == 1 else word

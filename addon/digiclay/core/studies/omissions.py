@@ -103,7 +103,7 @@ def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
             text = f"physics steps of {step * 1e3:g} ms, not {simulation.physics_step * 1e3:g} ms"
             yield Omission("steps", text, partial(_change, section="simulation", physics_step=step))
     for section, text in PARTS.items():
-        if scene.section(section) is not None:
+        if any(part is not None for part in scene.list_parts(section)):
             yield Omission(section, text, partial(_change, section=section))
     for band in (share * budget for share in BANDS):
         if getattr(scene.control, "dead_band", math.inf) < band:
