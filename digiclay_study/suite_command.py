@@ -98,10 +98,9 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
         for method in methods
         for seed in seeds
     }  # fmt: skip
-    first_scene = next(iter(scenes.values()))
-    if not first_scene.fingers:
+    if not all(scene.fingers for scene in scenes.values()):
         raise ParameterError("scene", "fingers", "must be at least 1", "0")
-    sensors = first_scene.sensors
+    sensors = next(iter(scenes.values())).sensors
     if repeats > 1 and not (sensors and sensors.noisy):
         raise ParameterError("--repeats", "", "must be 1 without noise", str(repeats))
     points: list[Point] = []

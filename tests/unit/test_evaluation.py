@@ -22,6 +22,7 @@ from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.columns import begin, make_batch
 from digiclay.core.scene.scene_source import Setting, find
+from digiclay.core.session.run_scene import run
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import (
     RUNS,
@@ -170,6 +171,34 @@ def test_points_of_one_structure_run_together_and_others_alone(varied, setting, 
     parts = make_bundles(some(*varied, settings=settings), errors=errors)
     assert (indices(parts.batches), indices(parts.alone)) == (batches, alone)
     assert said is None or parts.describe() == [said]
+
+
+#: A contact of 14 ms, within a step of 20 ms.
+BLIP = "".join(f"{{ time = {time}, position = [0, 0, {height}] }}, " for time, height in (
+    (0, 0.041), (0.103, 0.041), (0.11, 0.0385), (0.117, 0.041), (0.2, 0.041)
+))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("step", "errors", "doubted"), [("20 ms", True, True), ("20 ms", False, False), ("1 ms", True, False)]
+)
+def test_errors_of_points_whose_contact_a_step_may_hide_are_doubted(step, errors, doubted):
+    ways = (
+        "simulation.control_period=20 ms",
+        f"simulation.physics_step={step}",
+        f"trajectory.waypoints=[{BLIP}]",
+    )
+    settings = [Setting(*way.split("=", 1)) for way in (*ways, "trajectory.interpolation=linear")]
+    points = some("control.force_gain=1:4:4", settings=settings)
+    said = make_bundles(points, errors=errors).describe()
+    assert (said[1:] != [], len(said)) == (doubted, 1 + doubted)
+    if doubted:
+        assert said[1].startswith("4 points with errors as told or more: within a step the fingertip leaves")
+    (done,) = [run(point.scene).estimate_errors() for point in points[:1] if point.scene]
+    assert (done.metrics["errors_in_doubt"] != "") == (step == "20 ms")
+    assert (done.metrics["errors_in_doubt"] in done.summary(), "or more" in done.summary()) == (
+        True, step == "20 ms"
+    )  # fmt: skip
 
 
 def test_the_reach_of_many_fingers_is_that_of_each():

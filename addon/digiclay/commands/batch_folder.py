@@ -139,6 +139,7 @@ class Folder:
                 for name, fact in FACTS.items()
             ),
             ("not to be trusted", metrics.get("beyond_a_finger", "")),
+            ("errors", metrics.get("errors_in_doubt", "")),
             ("start of its process", _format(timing.get("start_up"), 1.0, "s")),
             ("whole job", format_duration(took)),
         ]

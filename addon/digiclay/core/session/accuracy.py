@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..engine.state import State
 from ..engine.system import System
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Disc, Grid
-from ..model.trajectory import interpolate_poses, sample_poses
+from ..model.trajectory import Path, interpolate_poses, sample_poses
 from ..scene.assembly import assemble
 from ..scene.schema import Scene, Simulation
 
@@ -38,6 +38,8 @@ SHARE = 4.0 / 3.0
 #: Control periods of a live session's stretch, and from the end of one to the start of the next. A period of
 #: the reference takes three times one of the session: one is done in so many, so that no tick is slow.
 STRETCH, PAUSE, SPREAD = 20, 180, 4
+#: How far the fingertip may leave the straight way within a step before the error estimate is in doubt, m.
+BENT = 0.1e-3
 #: Parts of a physics step in which a path is looked at, and steps looked at together.
 PARTS, BLOCK = 16, 4096
 
@@ -151,17 +153,26 @@ def estimate_errors(
     return Errors.estimate(largest)
 
 
-def measure_bends(scene: Scene) -> float:
-    """Return how far fingertips leave the straight way within a physics step, m.
+def describe_bends(scene: Scene) -> str:
+    """Return what makes the estimated errors of a run doubtful, or ``""``.
 
-    A contact that begins and ends there is seen neither by the run nor, in full, by its reference.
+    A contact that begins and ends within a step is seen neither by the run nor, in full, by its reference.
     """
-    step, largest = scene.simulation.physics_step, 0.0
-    count = math.ceil(scene.simulation.duration / step)
+    paths, simulation = tuple(finger.trajectory for finger in scene.fingers), scene.simulation
+    bend = _measure_bends(paths, simulation.physics_step, simulation.duration)
+    rule = f"or more: within a step the fingertip leaves the straight way by {bend * 1e3:.2g} mm"
+    return f"{rule}, which asks for a shorter simulation.physics_step" if bend > BENT else ""
+
+
+@lru_cache(maxsize=1)  # points of a sweep have one path
+def _measure_bends(paths: tuple[Path, ...], step: float, duration: float) -> float:
+    """Return how far fingertips leave the straight way within a physics step, m."""
+    trajectories, largest = [path.trajectory() for path in paths], 0.0
+    count = math.ceil(duration / step)
     for first in range(0, count, BLOCK):
         steps = min(BLOCK, count - first)
         times = (first + np.arange(steps * PARTS + 1) / PARTS) * step
-        place = sample_poses(scene.trajectories(), times)[..., :3]
+        place = sample_poses(trajectories, times)[..., :3]
         ways = np.stack([place[part : part + steps * PARTS : PARTS] for part in range(PARTS)])
         part = np.arange(PARTS)[:, None, None, None] / PARTS
         straight = ways[0] + part * (place[PARTS::PARTS] - ways[0])

@@ -25,15 +25,13 @@ from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT, format_scene
-from .accuracy import Errors, estimate_errors, has_every_command, measure_bends
+from .accuracy import Errors, describe_bends, estimate_errors, has_every_command
 from .memory_limit import check_memory
 
 History = dict[str, NDArray[Any]]
 
 #: Metrics of every run with a history.
 RUN_METRICS = {**METRICS, **{name: RUN[name] for name in ("losses", "run_time", "real_time_factor")}}
-#: How far the fingertip may leave the straight way within a step before the error estimate is in doubt, m.
-BENT = 0.1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,12 +76,7 @@ class Result:
         if "height_error" in self.metrics:
             height, force = self.metrics["height_error"] * 1e6, self.metrics["force_error"] * 1e3
             errors = f", height error about {height:.2g} µm, force error about {force:.2g} mN"
-            bend = measure_bends(self.scene)
-            if bend > BENT:
-                errors += (
-                    f" (or more: within a step the fingertip leaves the straight way by {bend * 1e3:.2g} mm, "
-                    "which asks for a shorter simulation.physics_step)"
-                )
+            errors += f" ({doubt})" if (doubt := self.metrics.get("errors_in_doubt")) else ""
         beyond = self.metrics.get("beyond_a_finger")
         warning = f"; {beyond}" if beyond else ""
         speed = f"{self.run_time:.2g} s ({factor:.3g} x real time)"
@@ -97,8 +90,9 @@ class Result:
     def with_errors(self, errors: Errors) -> Result:
         """Return the result with its estimated errors among the metrics."""
         added = {f"{name}_error": value for name, value in errors._asdict().items()}
-        units = {name: ERRORS[name].unit for name in added}
-        return replace(self, metrics={**self.metrics, **added, "units": {**self.metrics["units"], **units}})
+        units = {**self.metrics["units"], **{name: ERRORS[name].unit for name in added}}
+        doubt = {"errors_in_doubt": describe_bends(self.scene)}
+        return replace(self, metrics={**self.metrics, **added, **doubt, "units": units})
 
     def estimate_errors(
         self,

@@ -12,7 +12,7 @@ from ..batch.packing import Findings, describe_structure
 from ..batch.run_together import measure_together
 from ..metrics.metric_table import ERRORS, METRICS, RUN
 from ..scene.schema import Scene
-from ..session.accuracy import make_reference
+from ..session.accuracy import describe_bends, make_reference
 from ..session.run_scene import Result, run
 from .axes import Measure, Point, Record
 from .series import Results, describe_error
@@ -63,7 +63,7 @@ class Bundles:
     batches: tuple[tuple[Point, ...], ...]
     #: Of one point each.
     alone: tuple[tuple[Point, ...], ...]
-    #: Why some run alone, one line a reason.
+    #: Why some run alone, and what makes errors doubtful, one line a reason.
     why: tuple[str, ...]
 
     @property
@@ -116,7 +116,9 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
         reason = f"fewer than {LEAST} have the same bed, parts and steps"
         why[reason if few else "they have too many rows to keep for many at once"] += len(group)
     alone.sort(key=lambda point: point.index)
-    return Bundles(tuple(batches), tuple((point,) for point in alone), _explain(why))
+    doubts = Counter(describe_bends(point.scene) for point in points if errors and point.scene)
+    notes = tuple(f"{_count(doubts[text], 'point')} with errors as told {text}" for text in doubts if text)
+    return Bundles(tuple(batches), tuple((point,) for point in alone), (*_explain(why), *notes))
 
 
 def _limit_runs(scene: Scene | None) -> int:
