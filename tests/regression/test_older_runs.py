@@ -31,7 +31,9 @@ TOLERANCES = {"force": 1e-11, "total_force": 1e-10, "height": 1e-13, "command": 
 #: What says when, where and how quickly a run was made.
 CIRCUMSTANCES = ("run_time", "real_time_factor", "versions")
 #: Metrics that an older version did not have.
-ADDED = {"force_oscillation", "rfd_jnd_least", "rfd_jnd_most", "ridge_unevenness_touch"}
+ADDED = {
+    "force_oscillation", "rfd_jnd_least", "rfd_jnd_most", "ridge_unevenness_touch", "errors_in_doubt",
+}  # fmt: skip
 
 
 def scene_of(name: str) -> Scene:

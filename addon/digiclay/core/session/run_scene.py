@@ -91,7 +91,7 @@ class Result:
         """Return the result with its estimated errors among the metrics."""
         added = {f"{name}_error": value for name, value in errors._asdict().items()}
         units = {**self.metrics["units"], **{name: ERRORS[name].unit for name in added}}
-        doubt = {"errors_in_doubt": describe_bends(self.scene)}
+        doubt = {"errors_in_doubt": text} if (text := describe_bends(self.scene)) else {}
         return replace(self, metrics={**self.metrics, **added, **doubt, "units": units})
 
     def estimate_errors(
