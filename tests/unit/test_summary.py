@@ -436,6 +436,7 @@ def of_two(places: tuple[float, float], force: dict[int, float], own: tuple[floa
         ((0.0, 0.0), {2: 0.6}, (0.4, 0.2), (0.0, 0.0)),  # in one place
         ((3e-3, 4e-3), {3: 0.3}, (0.2, 0.1), (0.0, 1e-3)),  # all that one presses is nearer to the other
         ((3e-3, 4e-3), {3: 0.3}, (0.3, 0.0), (0.0, None)),  # and it presses nothing
+        ((-6e-3, 6e-3), {}, (0.0, 0.0), (None, None)),  # none does
     ],
 )
 def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_are(

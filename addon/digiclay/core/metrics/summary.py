@@ -330,8 +330,10 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         yield history
         return
     common = {name: values for name, values in history.items() if name != "finger_force"}
-    tips, (x, y) = history["fingertip"], history["position"].T
-    pressed, least = history["force"] > 0.0, np.full(history["force"].shape, np.inf)
+    felt = (history["force"] > 0.0) | (history["mode"] == Mode.FORCE_FOLLOW)
+    cells = np.flatnonzero(felt.any(axis=0))  # of a large bed they are few
+    tips, (x, y), given = history["fingertip"], history["position"][cells].T, history["force"][:, cells]
+    pressed, least = given > 0.0, np.full(given.shape, np.inf)
 
     def square(finger: int) -> Floats:
         apart: Floats = (x - tips[:, finger, :1]) ** 2 + (y - tips[:, finger, 1:2]) ** 2
@@ -341,15 +343,15 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         np.minimum(least, square(finger), out=least)
     for finger, total in enumerate(history["finger_force"].T):
         own = square(finger) <= least
-        lacking = np.flatnonzero((total > 0.0) & ~(own & pressed).any(axis=1))
+        lacking = np.flatnonzero((total > 0.0) & pressed.any(axis=1) & ~(own & pressed).any(axis=1))
         if lacking.size:
             away = np.where(pressed[lacking], square(finger)[lacking], np.inf)
             own[lacking, away.argmin(axis=1)] = True
-        force = np.where(own, history["force"], 0.0)
-        found = force.sum(axis=1)
+        found = (own * given).sum(axis=1)
         # All of a finger together are exact.
-        force *= np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
-        rows = {"force": force, "mode": np.where(own, history["mode"], np.int8(Mode.REST))}
+        scale = np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
+        rows = {name: np.zeros_like(history[name]) for name in ("force", "mode")}  # at rest
+        rows["force"][:, cells], rows["mode"][:, cells] = own * given * scale, own * history["mode"][:, cells]
         yield {**common, **rows, "total_force": total, "fingertip": tips[:, finger]}
 
 
