@@ -286,7 +286,7 @@ def without(scene: Scene, term: str) -> Scene | None:
         simulation = replace(scene.simulation, physics_step=scene.simulation.control_period)
         return None if simulation == scene.simulation else replace(scene, simulation=simulation)
     section = TERMS[term]
-    return None if scene.section(section) is None else scene.with_sections(**{section: None})
+    return scene.with_sections(**{section: None}) if any(scene.list_parts(section)) else None
 
 
 def measure_terms(arguments: argparse.Namespace, steps: Steps) -> Report:
