@@ -33,6 +33,8 @@ STEEP = 0.5 / (1.0 - JOIN) ** 0.5
 #: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
 BEYOND = 1e3
 OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
+#: How near a pressed pin two undersides must be for both to be able to press it, m.
+UNCLEAR = 0.2e-3
 #: Share of a pin that a finger does not see.
 HIDDEN = -1.0
 #: No finger.
@@ -119,10 +121,11 @@ class HandControl:
             if self._predicts:
                 under[under > height + REACHED] = np.inf
             owner[pressed] = self._find_new(basis, force, find_lowest(under), who)
-            shares = self._share(under, owner[pressed], height)
+            shares, known = self._share(under, owner[pressed], height, touched.own[:, pressed])
             if self._predicts:
                 # What a finger that is not found yet presses would draw the estimates of the others to it.
                 shares[:, owner[pressed] == NOBODY] = 0.0
+                shares[:, ~known] = HIDDEN
         located = self.locate_each(memory.fingers, touched, owner, pressed, shares)
         discs = [disc for _, disc in located]
         return Hands(tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs)), discs
@@ -170,7 +173,7 @@ class HandControl:
         basis, height = seen.quadratic_basis[:, double], seen.height[double]
         under = self._predict_under(memory, basis)
         owner = find_lowest(under)
-        shares = self._share(under, owner, height)
+        shares, _ = self._share(under, owner, height, seen.own[:, double])
         # Only undersides that are predicted tell where a blister would press a pin.
         if not self._predicts:
             return owner, shares
@@ -184,17 +187,24 @@ class HandControl:
         claimed = (seen.force[double] != 0.0) | (tops > low).any(axis=0)
         return np.where(claimed, find_lowest(np.where(harms, np.inf, under)), NOBODY), shares
 
-    def _share(self, under: Floats, owner: Cells, height: Floats) -> Floats:
-        """Return the shares of fingers in the forces of pins, (f, q), by the undersides over them, m."""
+    def _share(self, under: Floats, owner: Cells, height: Floats, own: Floats) -> tuple[Floats, Flags]:
+        """Return the shares of fingers in the forces of pins, (f, q), and of which pins they are known.
+
+        By the undersides over them, m, and the rows of the controllers (r, q): of a pin that two may press
+        each has its share in the forces predicted; where none is predicted, nobody knows who presses it.
+        """
         shares = np.where((owner == np.arange(len(self.runs))[:, None]) | (owner == NOBODY), 1.0, 0.0)
+        known = np.ones(height.size, np.bool_)
         if self._predicts:
-            (both,) = (np.count_nonzero(under < height, axis=0) > 1).nonzero()
-            depths = np.maximum(height[both] - under[:, both], 0.0)
-            for run, own in self._alike:
-                depths[own] = run.pulp.touch.contact.tension(depths[own])
-            # Where the law begins at a depth, none may press.
-            shares[:, both] = depths / np.maximum(depths.sum(axis=0), TINY)
-        return shares
+            (both,) = (np.count_nonzero(under < height + UNCLEAR, axis=0) > 1).nonzero()
+            forces = np.maximum(height[both] - under[:, both], 0.0)
+            rows = own[:, both].reshape(len(self.runs), int(self.runs[0].rows), both.size)
+            for run, alike in self._alike:
+                forces[alike] = run.predict_force(forces[alike], rows[alike])
+            total = forces.sum(axis=0)
+            known[both] = total > 0.0
+            shares[:, both] = np.where(known[both], forces / np.maximum(total, TINY), shares[:, both])
+        return shares, known
 
     @cached_property
     def _alike(self) -> list[tuple[Any, list[int]]]:
@@ -355,6 +365,7 @@ class HandInGroups(HandControl):
             seen = self.arrange("touched", touched).inside & free & followed
         parts[:, pressed] = shares
         seen[:, pressed] |= (owner[pressed] != NOBODY) & (shares > 0.0)
+        seen[:, pressed] &= shares != HIDDEN
         located: dict[int, tuple[Any, Disc | None]] = {}
         finger, cells = seen.nonzero()
         for group, _, part, sections in self._divide(

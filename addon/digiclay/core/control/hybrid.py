@@ -234,6 +234,10 @@ class HybridControl:
             aims.append((x, y, z) if master.phase is IDLE else (master.x, master.y, master.height))
         return self.finger.find_underside(aims, [own.estimate for own in memories], basis, SHARED)
 
+    def predict_force(self, depth: Floats, own: Floats) -> Floats:
+        """Return the forces of fingertips on pins, (f, m), N, at depths (f, m), m, by rows (f, r, m)."""
+        return self.pulp.predict_force(depth, self.pulp.predict_loss(own[:, self._at.pulp]))
+
     def command_all(
         self, memories: list[Follower], seen: Measurement, sections: Whole = WHOLE
     ) -> tuple[list[Follower], Commands]:
