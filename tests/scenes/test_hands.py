@@ -180,6 +180,19 @@ def test_a_third_finger_that_hovers_over_two_that_meet_changes_nothing(method: s
 
 
 @pytest.mark.parametrize("method", [None, *METHODS])
+def test_the_order_of_the_fingers_changes_nothing(method: str | None) -> None:
+    unlike, order = (FINGER, SOFT, LONG), [2, 0, 1]
+    first, second = (assemble(scene(method, *[unlike[i] for i in own])) for own in ([0, 1, 2], order))
+    poses = press(first, [(-10e-3, 1e-3), (6e-3, -4e-3), (2e-3, 9e-3)], (6e-3, -9e-3), 240)
+    # Two go up, so that pins around change hands.
+    poses[100:, :, :, 2] += np.linspace(0.0, 1e-3, 140)[:, None, None] * (10.0, 3.0, 0.0)
+    (state, forces), (other, swapped) = follow(first, poses), follow(second, poses[:, :, order])
+    # Rounding alone: forces and shares are added in another order.
+    np.testing.assert_allclose(swapped, forces[:, order], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(other.row(0), state.row(0), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("method", [None, *METHODS])
 def test_a_session_of_three_fingers_goes_on_from_a_kept_state_to_the_same_bits(method: str | None) -> None:
     system = assemble(scene(method, FINGER, LONG, FINGER))
     poses = press(system, [(-9e-3, 1e-3), (8e-3, -4e-3), (30e-3, 2e-3)], (6e-3, -9e-3), 220)

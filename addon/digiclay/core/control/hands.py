@@ -277,10 +277,10 @@ class HandControl:
         square = (x - at_x) ** 2
         square += (y - at_y) ** 2
         inside = square <= radius * np.abs(radius)
-        # Outside of all blisters pins are led, or left as they are.
+        # Outside of all blisters pins are led, or left as they are; of two the nearer one is obeyed.
         asked = target.take(copies)
         aside = np.where(asked == seen.target.take(columns.double), -1.0, -0.5)
-        off = np.where(inside, np.abs(asked - ground), aside)
+        off = np.where(inside, np.abs(asked - ground), aside - square)
         # Under a fingertip its own blister is obeyed, and where it presses before all.
         inside &= square <= (UNDER * self.capture).take(fingers) ** 2
         off = np.where(inside, 1.0 - square, off)
@@ -441,7 +441,7 @@ def find_lowest(under: Floats) -> Cells:
 
 def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float, float]:
     """Return where a blister is, x, y and radius, m, below 0: none; the heights of its ground and top, m."""
-    x, y = memory.place or (0.0, 0.0)
+    x, y = memory.place or (BEYOND, BEYOND)
     # That of a method without a master reaches from the pressed cells on.
     radius = run.blister.radius + getattr(run.parameters, "jump", 0.0)
     top = getattr(memory, "top", getattr(memory, "height", memory.edge))
