@@ -29,8 +29,8 @@ PLACES = [(x, y) for y in (-18.0, 18.0) for x in (0.0, 15.0, -15.0, 30.0, -30.0)
 METHODS = ("", "virtual_master", "cell_states", "hybrid")
 #: Speed of all drags and rises, mm/s; height of a lifted, a sunk and a pressing fingertip, mm.
 DRAG, RISE, UP, DOWN, PRESSED = 10.0, 6.0, 48.0, 34.0, 38.5
-#: Heights of a fingertip that lands, at times, mm and s.
-LANDING = (0.0, 43.0), (0.5, PRESSED), (1.2, PRESSED)
+#: Beginning of the way of a fingertip that lands at 0, 0: time, x, y, z, s and mm.
+LANDING = (0.0, 0, 0, 43.0), (0.5, 0, 0, PRESSED), (1.2, 0, 0, PRESSED)
 #: All cases are turned and shifted, rad and m: along the rows of pins symmetry would hide faults.
 TURN, SHIFT = 0.3, (0.7e-3, -0.4e-3)
 #: From when on the force is judged, s: then all fingertips have touched down.
@@ -76,10 +76,10 @@ CASES: dict[str, list[Way]] = {
     },
     **{
         f"sinks beside a drag, {d}": [
-            [*((t, 0, 0, z) for t, z in LANDING), (1.9, 0, 5, PRESSED - 1), (4.5, 0, 5, PRESSED - 1)],
-            [*((t, -5, 18, z) for t, z in LANDING), *((t, -0.8 * d, 5 + 0.6 * d, 33.0) for t in (2.7, 4.5))],
+            [*LANDING, (1.9, 0, 5, PRESSED - 1), (5.0, 0, 5, PRESSED - 1)],
+            [*((t, -5, 18, z) for t, _, _, z in (*LANDING, (1.9, 0, 0, PRESSED))), (3.4, *at), (5.0, *at)],
         ]
-        for d in (15, 12, 10)
+        for d, at in ((d, (-0.8 * d, 5 + 0.6 * d, DOWN - 1)) for d in (15, 12, 10))
     },
     **{f"approach and part, {d}": list(meet(d, 20.0, 47.0)) for d in (12, 9, 6)},
     **{f"pinch, pull up, {d}": list(meet(d, 14.0, UP)) for d in (20, 16, 12)},
