@@ -50,9 +50,13 @@ def list_rows(filters: int) -> OwnRows:
     return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
 
 
-#: While the force is within this share of the set point, and the fingertip no faster than this, m/s, it is
-#: fitted and the top solved for in one of so many periods; in the others the top goes along with it.
-NEAR, SLOW, EVERY = 0.02, 20e-3, 2
+#: Noise beyond which a finger is taken to accelerate the less, the noisier its forces are, N: else the filter
+#: follows the noise of 10 mN to velocities of 40 mm/s.
+STEADY = 5e-4
+#: While the force is within this share of the set point, less with noise, and the fingertip no faster than
+#: this, m/s, it is fitted and the top solved for in one of so many periods; in the others the top goes along
+#: with it. So a force that a few stiff pins carry does not swing from period to period, as it does at 2 %.
+NEAR, SLOW, EVERY = 0.15, 20e-3, 2
 #: How far a touched cell may be from the predicted fingertip, in semi-axes: beyond is a new touch.
 JUMP = 1.5
 #: Underside where none is predicted, m.
@@ -144,8 +148,8 @@ class FingerObserver:
     def holds(self, memory: Follower, force: float) -> bool:
         """Tell whether a fingertip is slow, and a total force, N, near the set point: then less is solved."""
         _, _, _, vx, vy, vz, *_ = memory.estimate.mean.tolist()
-        error = abs(force - self.asked)
-        return error <= NEAR * self.asked and math.hypot(vx, vy, vz) <= SLOW
+        near = NEAR * min(STEADY / self.noise, 1.0) * self.asked
+        return abs(force - self.asked) <= near and math.hypot(vx, vy, vz) <= SLOW
 
     def _has_jumped(self, guess: Estimate, x: Sequence[float], y: Sequence[float]) -> bool:
         """Tell whether cells are touched, at x, y, m, but none where the fingertip can be."""

@@ -28,7 +28,7 @@ from ..model.touch import Touch
 from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Aim, FingerFilter, Spread
-from .finger_observer import AWAY, EVERY, OWN_ROWS, FingerObserver, OwnRows, list_rows
+from .finger_observer import AWAY, EVERY, OWN_ROWS, STEADY, FingerObserver, OwnRows, list_rows
 from .finger_sections import SHARED, WHOLE, Whole
 from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
@@ -402,9 +402,6 @@ class HybridControl:
 BESIDE = 3e-3
 #: Standard deviation of the forces of sensors without noise that the filter counts on, N.
 QUIET = 2e-4
-#: Noise beyond which a finger is taken to accelerate the less, the noisier its forces are, N: else the filter
-#: follows the noise of 10 mN to velocities of 40 mm/s.
-STEADY = 5e-4
 
 
 def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
