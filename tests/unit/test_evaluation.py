@@ -303,6 +303,8 @@ def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(words, tables
     assert left(here / "far/points") == left(here / "own/points") != []
 
 
+# Dask may drop a coroutine of its own that waited for a task's result.
+@pytest.mark.filterwarnings("ignore:.*Future._result:pytest.PytestUnraisableExceptionWarning")
 def test_after_a_stop_no_task_is_left_in_the_cluster(address):
     with Client(address, set_as_default=False) as client:
 
