@@ -29,14 +29,17 @@ PLACES = [(x, y) for y in (-18.0, 18.0) for x in (0.0, 15.0, -15.0, 30.0, -30.0)
 METHODS = ("", "virtual_master", "cell_states", "hybrid")
 #: Speed of all drags and rises, mm/s; height of a lifted, a sunk and a pressing fingertip, mm.
 DRAG, RISE, UP, DOWN, PRESSED = 10.0, 6.0, 48.0, 34.0, 38.5
-#: Beginning of the way of a fingertip that lands at 0, 0: time, x, y, z, s and mm.
-LANDING = (0.0, 0, 0, 43.0), (0.5, 0, 0, PRESSED), (1.2, 0, 0, PRESSED)
 #: All cases are turned and shifted, rad and m: along the rows of pins symmetry would hide faults.
 TURN, SHIFT = 0.3, (0.7e-3, -0.4e-3)
 #: From when on the force is judged, s: then all fingertips have touched down.
 JUDGED = 1.0
 
 Way = list[tuple[float, float, float, float]]
+
+
+def land(x: float, y: float) -> Way:
+    """Return the beginning of a way (time, x, y, z), s and mm: press, and stay until 1.2 s."""
+    return [(0.0, x, y, 43.0), (0.5, x, y, PRESSED), (1.2, x, y, PRESSED)]
 
 
 def press_and_drag(
@@ -46,14 +49,13 @@ def press_and_drag(
     there = 1.2 + abs(height - PRESSED) / RISE
     start = max(there, 1.2 + (UP - PRESSED) / RISE) + wait
     end = start + float(np.hypot(to_x - x, to_y - y)) / DRAG
-    first = [(0.0, x, y, 43.0), (0.5, x, y, PRESSED), (1.2, x, y, PRESSED), (there, x, y, height)]
-    return [*first, (start, x, y, height), (end, to_x, to_y, height)]
+    return [*land(x, y), (there, x, y, height), (start, x, y, height), (end, to_x, to_y, height)]
 
 
 def meet(apart: float, far: float, lifted: float) -> Iterator[Way]:
     """Give the ways of two fingertips that come within `apart`, mm, lifted to a height before or after."""
     for side in (-1.0, 1.0):
-        way = [(0.0, side * far, 0.0, 43.0), (0.5, side * far, 0.0, PRESSED), (1.2, side * far, 0.0, PRESSED)]
+        way = land(side * far, 0.0)
         height = lifted if far > 15.0 else PRESSED
         gone, near = 1.2 + (height - PRESSED) / RISE, side * apart / 2
         there = gone + (far - apart / 2) / DRAG
@@ -76,8 +78,8 @@ CASES: dict[str, list[Way]] = {
     },
     **{
         f"sinks beside a drag, {d}": [
-            [*LANDING, (1.9, 0, 5, PRESSED - 1), (5.0, 0, 5, PRESSED - 1)],
-            [*((t, -5, 18, z) for t, _, _, z in (*LANDING, (1.9, 0, 0, PRESSED))), (3.4, *at), (5.0, *at)],
+            [*land(0, 0), (1.9, 0, 5, PRESSED - 1), (5.0, 0, 5, PRESSED - 1)],
+            [*land(-5, 18), (1.9, -5, 18, PRESSED), (3.4, *at), (5.0, *at)],
         ]
         for d, at in ((d, (-0.8 * d, 5 + 0.6 * d, DOWN - 1)) for d in (15, 12, 10))
     },

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from digiclay.core.scene.assembly import assemble
 
-from benchmarks.several_fingers import LANDING, TURN, feel, make_scene, measure_near, trace
+from benchmarks.several_fingers import PRESSED, TURN, feel, land, make_scene, measure_near, trace
 
 
 @pytest.mark.parametrize(
@@ -46,9 +46,7 @@ def test_no_finger_is_stolen_by_another_one_that_comes_near(
 def test_on_a_bed_of_a_few_pins_a_force_comes_to_rest_after_a_tremor(turn: float) -> None:
     made = make_scene("hybrid", 1, 20)
     system = assemble(replace(made, layout=replace(made.layout, pitch=6e-3)))
-    path = trace(
-        [[(time, 0.4, 0.7, z) for time, _, _, z in (*LANDING, (4.0, *LANDING[-1][1:]))]], system.period, turn
-    )
+    path = trace([[*land(0.4, 0.7), (4.0, 0.4, 0.7, PRESSED)]], system.period, turn)
     path[400:403, 0, 2] += 0.2e-3  # for 15 ms
     force = feel(system, path).force[500:600, 0]
     # A hundredth of the set point; it swung by 30 to 39 mN, from period to period.

@@ -53,6 +53,13 @@ def list_rows(filters: int) -> OwnRows:
 #: Noise beyond which a finger is taken to accelerate the less, the noisier its forces are, N: else the filter
 #: follows the noise of 10 mN to velocities of 40 mm/s.
 STEADY = 5e-4
+
+
+def measure_trust(noise: float) -> float:
+    """Return the share to which forces with a noise, N, are followed."""
+    return min(STEADY / noise, 1.0)
+
+
 #: While the force is within this share of the set point, less with noise, and the fingertip no faster than
 #: this, m/s, it is fitted and the top solved for in one of so many periods; in the others the top goes along
 #: with it. So a force that a few stiff pins carry does not swing from period to period, as it does at 2 %.
@@ -83,6 +90,11 @@ class FingerObserver:
     def farthest(self) -> float:
         """Distance from the predicted place beyond which a touch is a new one, m."""
         return JUMP * max(self.finger.fingertip.length, self.finger.fingertip.width)
+
+    @cached_property
+    def near(self) -> float:
+        """Distance from the set point within which a force is near it, N."""
+        return NEAR * measure_trust(self.noise) * self.asked
 
     def observe(self, memories: list[Follower], touched: Measurement, sections: Whole) -> list[Follower]:
         """Observe the pulp of the cells the fingertips may touch, and follow or find them."""
@@ -148,8 +160,7 @@ class FingerObserver:
     def holds(self, memory: Follower, force: float) -> bool:
         """Tell whether a fingertip is slow, and a total force, N, near the set point: then less is solved."""
         _, _, _, vx, vy, vz, *_ = memory.estimate.mean.tolist()
-        near = NEAR * min(STEADY / self.noise, 1.0) * self.asked
-        return abs(force - self.asked) <= near and math.hypot(vx, vy, vz) <= SLOW
+        return abs(force - self.asked) <= self.near and math.hypot(vx, vy, vz) <= SLOW
 
     def _has_jumped(self, guess: Estimate, x: Sequence[float], y: Sequence[float]) -> bool:
         """Tell whether cells are touched, at x, y, m, but none where the fingertip can be."""

@@ -117,11 +117,10 @@ class HandControl:
             basis, force = touched.quadratic_basis[:, pressed], touched.force[pressed]
             who = touched.pressing[:, pressed].argmax(axis=0)
             under = self._predict_under(memory, basis)
-            height = touched.height[pressed]
             if self._predicts:
-                under[under > height + REACHED] = np.inf
+                under[under > touched.height[pressed] + REACHED] = np.inf
             owner[pressed] = self._find_new(basis, force, find_lowest(under), who)
-            shares, known = self._share(under, owner[pressed], height, touched.own[:, pressed])
+            shares, known = self._share(under, owner[pressed], touched, pressed)
             if self._predicts:
                 # What a finger that is not found yet presses would draw the estimates of the others to it.
                 shares[:, owner[pressed] == NOBODY] = 0.0
@@ -170,10 +169,10 @@ class HandControl:
         a blister raised it to its top, is that fingertip's. Where one blister would press it into another's
         fingertip, and not the other way round, it is the other's alone: it cannot be high for the one.
         """
-        basis, height = seen.quadratic_basis[:, double], seen.height[double]
+        basis = seen.quadratic_basis[:, double]
         under = self._predict_under(memory, basis)
         owner = find_lowest(under)
-        shares, _ = self._share(under, owner, height, seen.own[:, double])
+        shares, _ = self._share(under, owner, seen, double)
         # Only undersides that are predicted tell where a blister would press a pin.
         if not self._predicts:
             return owner, shares
@@ -187,18 +186,19 @@ class HandControl:
         claimed = (seen.force[double] != 0.0) | (tops > low).any(axis=0)
         return np.where(claimed, find_lowest(np.where(harms, np.inf, under)), NOBODY), shares
 
-    def _share(self, under: Floats, owner: Cells, height: Floats, own: Floats) -> tuple[Floats, Flags]:
-        """Return the shares of fingers in the forces of pins, (f, q), and of which pins they are known.
+    def _share(self, under: Floats, owner: Cells, measured: Measurement, pins: Cells) -> tuple[Floats, Flags]:
+        """Return the shares of fingers in the forces of pins (q,), (f, q), and of which pins they are known.
 
-        By the undersides over them, m, and the rows of the controllers (r, q): of a pin that two may press
-        each has its share in the forces predicted; where none is predicted, nobody knows who presses it.
+        By the undersides over them, m: of a pin that two may press each has its share in the forces
+        predicted; where none is predicted, nobody knows who presses it.
         """
         shares = np.where((owner == np.arange(len(self.runs))[:, None]) | (owner == NOBODY), 1.0, 0.0)
-        known = np.ones(height.size, np.bool_)
+        known = np.ones(pins.size, np.bool_)
         if self._predicts:
+            height = measured.height[pins]
             (both,) = (np.count_nonzero(under < height + UNCLEAR, axis=0) > 1).nonzero()
             forces = np.maximum(height[both] - under[:, both], 0.0)
-            rows = own[:, both].reshape(len(self.runs), int(self.runs[0].rows), both.size)
+            rows = measured.own[:, pins[both]].reshape(len(self.runs), int(self.runs[0].rows), both.size)
             for run, alike in self._alike:
                 forces[alike] = run.predict_force(forces[alike], rows[alike])
             total = forces.sum(axis=0)

@@ -28,7 +28,7 @@ from ..model.touch import Touch
 from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Aim, FingerFilter, Spread
-from .finger_observer import AWAY, EVERY, OWN_ROWS, STEADY, FingerObserver, OwnRows, list_rows
+from .finger_observer import AWAY, EVERY, OWN_ROWS, FingerObserver, OwnRows, list_rows, measure_trust
 from .finger_sections import SHARED, WHOLE, Whole
 from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
@@ -414,7 +414,7 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
     servo = make_flow_servo(device.cell, device.period, device.dead_time, parameters.dead_band)
     noise = max(device.force_floor / 5.0, QUIET)
     spread = Spread(
-        parameters.acceleration * min(STEADY / noise, 1.0),
+        parameters.acceleration * measure_trust(noise),
         parameters.turn,
         parameters.size_drift,
         parameters.underside_error,
