@@ -106,27 +106,31 @@ def place_fingertips(bed: Any, poses: Floats, fingers: Sequence[Fingertip]) -> N
 def move_fingertips(bed: Any, poses: Floats, fingers: Sequence[Fingertip]) -> None:
     """Put fingertips of a bed to poses (f, 7); a palm whose fingertips keep their places goes along."""
     hands: dict[Any, list[tuple[Any, Floats]]] = {}
-    for tip, at, finger in zip(fingertips_of(bed).values(), poses, fingers, strict=False):
+    every, whole = fingertips_of(bed).values(), np.array(bed.matrix_world)
+    for tip, at, finger in zip(every, poses, fingers, strict=False):
         if tip.parent == bed:
             move_fingertip(tip, at, finger)
         else:
-            hands.setdefault(tip.parent, []).append((tip, _place(at, finger)))
-    whole = np.array(bed.matrix_world)
+            hands.setdefault(tip.parent, []).append((tip, whole @ _place(at, finger)))
     for palm, tips in hands.items():
+        if palm.get(ROLE) != PALM:
+            for tip, place in tips:
+                tip.matrix_world = _to_matrix(tip, place)
+            continue
         stood = np.array(palm.matrix_world)
-        if palm.get(ROLE) == PALM:
-            ways = [whole @ place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
-            stood = ways[0] @ stood if np.ptp(ways, axis=0).max() < STRAY else stood
-            above = palm.parent.matrix_world @ palm.matrix_parent_inverse
-            _set_basis(palm, np.linalg.pinv(above) @ stood)
+        if len(tips) == sum(tip.parent == palm for tip in every):
+            ways = [place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
+            if np.ptp(ways, axis=0).max() < STRAY:
+                stood = ways[0] @ stood
+                palm.matrix_world = _to_matrix(palm, stood)
         for tip, place in tips:
             tip.matrix_parent_inverse.identity()
-            _set_basis(tip, np.linalg.pinv(stood) @ whole @ place)
+            tip.matrix_basis = _to_matrix(tip, np.linalg.pinv(stood) @ place)
 
 
-def _set_basis(thing: Any, matrix: Floats) -> None:
-    """Set location, rotation and scale of an object by a matrix (4, 4)."""
-    thing.matrix_basis = type(thing.matrix_basis)(matrix.tolist())
+def _to_matrix(thing: Any, matrix: Floats) -> Any:
+    """Return a matrix (4, 4) as Blender's."""
+    return type(thing.matrix_basis)(matrix.tolist())
 
 
 def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:

@@ -31,8 +31,13 @@ def bed_of(context: Any) -> Any:
     """Return the bed the active object is or belongs to, be it fingertip, housing or a part; None without."""
     thing = getattr(context, "object", None)
     while thing is not None and not is_bed(thing):
-        thing = thing.parent
+        thing = find_whole(thing)
     return thing
+
+
+def find_whole(part: Any) -> Any | None:
+    """Return what an object is a part of: its parent, or the bed of a fingertip or palm."""
+    return owner_of(part) if part.get(ROLE) in (FINGERTIP, PALM) else part.parent
 
 
 def is_edited(context: Any) -> bool:
@@ -63,11 +68,22 @@ def ellipsoid(tip: Any) -> Any | None:
 
 
 def owner_of(part: Any, role: str = BED) -> Any | None:
-    """Return the nearest object of a role above one; None without, or if a palm between is deleted."""
+    """Return the nearest object of a role above one; None without, or if a palm between is deleted.
+
+    A fingertip or palm that hangs on something else is still the bed's that holds it, or its fingertips.
+    """
     above = part.parent
     while above is not None and above.get(ROLE) != role:
-        above = None if above.get(ROLE) == PALM and not is_linked(above) else above.parent
-    return above
+        if above.get(ROLE) == PALM and not is_linked(above):
+            return None
+        above = above.parent
+    if above is not None or role != BED or part.parent is None:
+        return above
+    own = {part, *(part.get(name) for name in FINGERS)} - {None}
+    beds = (thing for scene in part.users_scene for thing in scene.objects if is_bed(thing))
+    held = [bed for bed in beds if own & {bed.get(name) for name in FINGERS}]
+    # A copy of the bed holds it as well, until it gets one of its own.
+    return min(held, key=lambda bed: bed.session_uid, default=None)
 
 
 def _part(owner: Any, name: str, role: str) -> Any | None:

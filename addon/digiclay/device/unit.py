@@ -49,7 +49,7 @@ class Faults(NamedTuple):
     #: Beds, and palms, that have come without fingertips of their own: copies, and beds of older files. And
     #: fingertips that were copied without their ellipsoid, which cannot be selected.
     bare: list[Any]
-    #: Fingertips that were copied on their bed: further ones.
+    #: Fingertips that were copied on their bed, or have come from another one: further ones.
     loose: list[Any]
     #: Fingertips, palms, ellipsoids and housings whose bed or fingertip is gone.
     left: list[Any]
@@ -81,9 +81,10 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     tips = _standing(FINGERTIP)
     bare += [tip for tip in tips if _lacks_part(tip, BALL, known, mended)]
     beds = _standing(BED)
-    held = {bed.get(name) for bed in beds for name in FINGERS}.union(tip for _, _, tip in _tips())
-    new = [tip for tip in tips if tip not in held and tip.session_uid not in known - mended]
-    loose = [tip for tip in new if owner_of(tip) in beds]
+    held, own = {bed.get(name) for bed in beds for name in FINGERS}, {tip for _, _, tip in _tips()}
+    # Held, but by another bed: it was given to this one.
+    come = [tip for tip in tips if (tip in held) == (tip.session_uid in known - mended)]
+    loose = [tip for tip in come if tip not in own and owner_of(tip) in beds]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
     # Deleted along with its bed a fingertip may stand nowhere, and have no user any more.
     left = [thing for thing in mine if not thing.users or (is_linked(thing) and _is_orphan(thing))]
@@ -191,7 +192,7 @@ def _lacks_part(owner: Any, name: str, known: frozenset[int], mended: frozenset[
     holder = _holder(part, owner)
     if holder == owner:  # it stands nowhere: of a bed that was linked and made local, or deleted
         return name != BALL and new
-    return new or holder is not None or owner.session_uid in mended
+    return new or owner.session_uid in mended
 
 
 def _is_orphan(part: Any) -> bool:
@@ -262,7 +263,7 @@ def _stand(bed: Any, tip: Any) -> None:
 
 
 def _adopt(tip: Any) -> None:
-    """Make a fingertip that was copied on its bed a further one; as many as a bed can have."""
+    """Make a fingertip that has come to a bed a further one; as many as a bed can have."""
     bed = owner_of(tip)
     try:
         number = parts.find_free_number(bed)

@@ -21,6 +21,7 @@ from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
 from ..device.instant import find_ellipsoids
 from ..device.node_tree import TOP_FORCE
+from ..roles import bed_of
 from ..sessions import running
 from .picture import BLACK, WHITE, Dot, Look, Picture, Words, choose_colors, contrast
 from .sections import COMPACT, FULL, Readings, Room, find_room, lay_out
@@ -128,10 +129,8 @@ def _is_wanted(bed: Any) -> bool:
 def _choose_bed(context: Any) -> Any | None:
     """Return the bed of a view's overlay: the active one, or the first one in the view's scene."""
     beds = [bed for bed in _beds() if _is_wanted(bed) and bed.name in context.scene.objects]
-    active = context.object
-    while active is not None and active not in beds:
-        active = active.parent
-    return active or (beds[0] if beds else None)
+    active = bed_of(context)
+    return active if active in beds else beds[0] if beds else None
 
 
 def find_free_room(area: Any, region: Any, closed: Mapping[str, float] = MappingProxyType({})) -> Room:

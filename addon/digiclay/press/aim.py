@@ -15,7 +15,7 @@ from ..core.base.errors import DigiclayError
 from ..core.model.layout import Grid, make_grid
 from ..core.surface.pointing import find_ray, intersect_surface
 from ..device import view
-from ..roles import ROLE, is_bed
+from ..roles import ROLE, find_whole, is_bed
 from ..sessions import running
 from ..settings import properties
 from ..ui_text import localize
@@ -194,7 +194,7 @@ def _hides(thing: Any) -> bool:
 def _belongs(thing: Any, bed: Any) -> bool:
     """Return whether an object is a bed or a part of it; what a user has parented to it is none."""
     while thing is not None and thing != bed:
-        thing = thing.parent if ROLE in thing else None
+        thing = find_whole(thing) if ROLE in thing else None
     return thing is not None
 
 

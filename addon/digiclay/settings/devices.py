@@ -198,7 +198,7 @@ def find_settings(context: Any) -> tuple[int, Any]:
     bed: Any = bed_of(context)
     thing: Any = context.object
     tips = {tip: number for number, tip in fingertips_of(bed).items()}
-    while thing not in tips and thing != bed:
+    while thing not in tips and thing not in (bed, None):
         thing = thing.parent
     number = tips.get(thing, 1)
     return number, bed.digiclay if number == 1 else thing.digiclay

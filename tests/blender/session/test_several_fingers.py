@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge
+from digiclay import bridge, roles
 from digiclay.core.base.modes import COLORS
 from digiclay.core.scene.scene_source import load
 from digiclay.device import unit
@@ -156,6 +156,69 @@ def test_the_session_goes_on_with_the_fingertips_that_are_left(
     assert tuple(fingertips_of(bed)) == (1, 2)
     assert running.find(bed).numbers == (1, 2)
     assert press(bed, clock, 1, 2) == []
+
+
+def hang(part: Any, where: Any, bone: str = "") -> None:
+    """Parent an object to another one, or to a bone of it; it stays where it is."""
+    place = part.matrix_world.copy()
+    part.parent, part.parent_type, part.parent_bone = where, "BONE" if bone else "OBJECT", bone
+    looked()
+    part.matrix_world = place
+    bpy.ops.ed.undo_push(message="Parent")
+    looked()
+
+
+HUNG = ["a fingertip on an empty", "a fingertip on a bone", "a thumb on an empty", "a palm on an empty"]
+
+
+@pytest.mark.parametrize("what", HUNG)
+def test_what_is_parented_to_something_else_follows_that_and_is_still_the_bed_s(
+    pair: Any, clock: Clock, what: str
+) -> None:
+    bpy.ops.digiclay.add_hand()
+    palm, own = bpy.context.object, fingertips_of(pair)
+    (bpy.ops.object.armature_add if "bone" in what else bpy.ops.object.empty_add)(location=(0.1, 0.2, 0.3))
+    where = bpy.context.object
+    where.rotation_euler, where.scale = (0.3, -0.2, 1.0), (1.5, 1.5, 1.5)
+    looked()
+    started(pair)
+    part = palm if "palm" in what else own[3 if "thumb" in what else 2]
+    hang(part, where, "Bone" if "bone" in what else "")
+    select(part)
+    assert (clock.tick(2), roles.bed_of(bpy.context)) == ([], pair)
+    assert (running.find(pair).numbers, fingertips_of(pair)) == (tuple(range(1, 8)), own)
+    before = bridge.poses(pair)
+    where.location.z += 0.1
+    clock.tick()
+    moved = bridge.poses(pair)[:, 2] - before[:, 2]
+    follows = [part in (tip, tip.parent) for tip in own.values()]
+    np.testing.assert_allclose(moved, np.where(follows, 0.01, 0.0), rtol=0, atol=1e-6)  # Blender's 32 bits
+    wanted = before + [0.01, -0.02, 0.003, 0.0, 0.0, 0.0, 0.0]
+    bridge.move_fingertips(pair, wanted, [bridge.finger_of(tip) for tip in own.values()])
+    looked()
+    np.testing.assert_allclose(bridge.poses(pair)[:, :3], wanted[:, :3], rtol=0, atol=2e-6)
+
+
+def test_a_fingertip_that_is_parented_to_another_bed_is_that_bed_s(pair: Any, clock: Clock) -> None:
+    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    other = bpy.context.object
+    started(pair)
+    hang(fingertips_of(pair)[2], other)
+    assert clock.tick(2) == []
+    assert (tuple(fingertips_of(pair)), tuple(fingertips_of(other))) == ((1,), (1, 2))
+
+
+def test_a_stroke_of_a_thumb_leaves_its_hand_where_it_is(pair: Any, clock: Clock) -> None:
+    bpy.ops.digiclay.add_hand()
+    for number in (1, 2):
+        bpy.data.objects.remove(fingertips_of(pair)[number])
+    looked()
+    started(pair)
+    before = bridge.poses(pair)
+    running.put(sculpting.queue_stroke(running.find(pair), 10e-3, 10e-3, 4e-3)[0])
+    clock.tick(10)
+    moved = np.abs(bridge.poses(pair) - before).max(axis=1)
+    assert (moved[0] > 1e-3, moved[1:].max() < 1e-6) == (True, True)
 
 
 def test_the_size_and_the_pulp_of_one_fingertip_change_in_mid_session(pair: Any, clock: Clock) -> None:
