@@ -96,21 +96,31 @@ def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
     return cells
 
 
-def place_fingertips(bed: Any, poses: Floats, fingers: Sequence[Fingertip]) -> None:
-    """Put the fingertips of a bed to poses (f, 7), in order, and give their ellipsoids their sizes."""
-    for tip, finger in zip(fingertips_of(bed).values(), fingers, strict=False):
-        resize_fingertip(tip, finger)
-    move_fingertips(bed, poses, fingers)
+def place_fingertips(
+    bed: Any, poses: Floats, fingers: Sequence[Fingertip], numbers: Sequence[int] = ()
+) -> None:
+    """Put fingertips of a bed to poses (f, 7), and give their ellipsoids their sizes: `move_fingertips`."""
+    tips = fingertips_of(bed)
+    for number, finger in zip(numbers or tips, fingers, strict=False):
+        if number in tips:
+            resize_fingertip(tips[number], finger)
+    move_fingertips(bed, poses, fingers, numbers)
 
 
-def move_fingertips(bed: Any, poses: Floats, fingers: Sequence[Fingertip]) -> None:
-    """Put fingertips of a bed to poses (f, 7); a palm whose fingertips keep their places goes along."""
+def move_fingertips(
+    bed: Any, poses: Floats, fingers: Sequence[Fingertip], numbers: Sequence[int] = ()
+) -> None:
+    """Put fingertips of a bed to poses (f, 7); a palm whose fingertips keep their places goes along.
+
+    `numbers`: of the fingertips, of which the bed may have lost some; by default its first ones.
+    """
     hands: dict[Any, list[tuple[Any, Floats]]] = {}
-    every, whole = fingertips_of(bed).values(), np.array(bed.matrix_world)
-    for tip, at, finger in zip(every, poses, fingers, strict=False):
-        if tip.parent == bed:
+    every, whole = fingertips_of(bed), np.array(bed.matrix_world)
+    for number, at, finger in zip(numbers or every, poses, fingers, strict=False):
+        tip = every.get(number)
+        if tip is not None and tip.parent == bed:
             move_fingertip(tip, at, finger)
-        else:
+        elif tip is not None:
             hands.setdefault(tip.parent, []).append((tip, whole @ _place(at, finger)))
     for palm, tips in hands.items():
         if palm.get(ROLE) != PALM:
@@ -118,7 +128,7 @@ def move_fingertips(bed: Any, poses: Floats, fingers: Sequence[Fingertip]) -> No
                 tip.matrix_world = _to_matrix(tip, place)
             continue
         stood = np.array(palm.matrix_world)
-        if len(tips) == sum(tip.parent == palm for tip in every):
+        if len(tips) == sum(tip.parent == palm for tip in every.values()):
             ways = [place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
             if np.ptp(ways, axis=0).max() < STRAY:
                 stood = ways[0] @ stood
@@ -158,6 +168,14 @@ def resize_fingertip(tip: Any, finger: Fingertip) -> None:
     for ball in tip.children:
         if ball.get(ROLE) == ELLIPSOID:  # other things may hang on the fingertip, and keep their size
             ball.scale = axes * SCALE
+
+
+def keep_sizes(bed: Any) -> None:
+    """Take back what the scale of a palm, or other parent, adds to the size of fingertips."""
+    for tip in fingertips_of(bed).values():
+        scale = np.linalg.norm(np.array(tip.matrix_world)[:3, :3], axis=0) / uniform(bed)
+        if np.abs(scale - 1.0).max() > UNEVEN:
+            tip.scale = np.array(tip.scale) / scale
 
 
 def finger_of(tip: Any) -> Fingertip:

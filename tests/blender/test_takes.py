@@ -214,7 +214,7 @@ def shown(bed: Any, frame: float) -> Floats:
 def baked(bed: Any, take: Take, first: int = 1) -> bake.BakedFrames:
     *_, moments = bake.simulate_frames(take, 40.0)
     assert isinstance(moments, bake.BakedFrames)
-    bake.apply(bed, moments, first, [Fingertip()], keyframe_fingers=True)
+    bake.apply(bed, moments, first, [Fingertip()], [1])
     return moments
 
 

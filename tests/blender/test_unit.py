@@ -53,7 +53,7 @@ def reset_to_empty() -> None:
 def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_path, how):
     bed = added()
     if how == "append baked":
-        bake.apply(bed, still(bed), 1, [Fingertip()], keyframe_fingers=False)
+        bake.apply(bed, still(bed), 1, [Fingertip()], [])
     at, name = bridge.pose(fingertip_of(bed)), bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     reset_to_empty()

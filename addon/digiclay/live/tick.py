@@ -197,6 +197,7 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
     reason, words = blocking_reason(context, bed, session.system.grid.count), ""
     if reason:
         return reason, session, words
+    bridge.keep_sizes(bed)
     try:
         settings = properties.read_stored_settings(bed)
         changed = settings != session.settings or properties.find_layout_mismatch(bed, session.scene.layout)

@@ -59,7 +59,7 @@ def keep_take(operator: Any, context: Any) -> set[str] | None:
     if take is None:
         operator.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
         return {"CANCELLED"}
-    entry = takes.add(bed, take, operator.name)
+    entry = takes.add(bed, take, operator.name, session.numbers)
     operator.report({"INFO"}, localize("{}: {:.1f} s kept", entry.name, entry.seconds))
     return None
 
@@ -194,6 +194,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         # The poses of the fingertips now: they may have been moved since the last session.
         self._stood = bridge.poses(bed)
         self._take: Take = takes.read(bed, self.take)
+        self._numbers = takes.list_fingers(bed, self.take, len(self._take.scene.fingers))
         self._states = play_take(self._take, refine(self._take.scene, self.parts))
         self._system, self._state = next(self._states)
         if self._system.grid.count != len(bed.data.vertices):
@@ -203,7 +204,8 @@ class ReplayTake(TimedAction, bpy.types.Operator):
 
     def _place(self, bed: Any) -> None:
         """Put the fingertips to where the take has them; one that is animated follows its animation."""
-        bridge.place_fingertips(bed, self._take.poses[self._at], find_ellipsoids(self._take.scene))
+        fingers = find_ellipsoids(self._take.scene)
+        bridge.place_fingertips(bed, self._take.poses[self._at], fingers, self._numbers)
 
     def _finish(self, context: Any) -> set[str]:
         """Leave the bed in the final state of the take, and report the comparison."""
@@ -211,11 +213,9 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         state = snapshot.dump(system, self._state)
         self._place(bed)
         # The session that would go on from here.
-        own, tick_count = len(self._take.scene.fingers), beds.read_tick(bed)
-        numbers = tuple(fingertips_of(bed))
-        numbers = numbers if len(numbers) == own else tuple(range(1, own + 1))
+        numbers, tick_count = self._numbers, beds.read_tick(bed)
         begun = sculpting.begin_session(
-            bed.session_uid, bed.name, self._take.scene, self._take.poses[-1, :own], state, tick_count,
+            bed.session_uid, bed.name, self._take.scene, self._take.poses[-1, : len(numbers)], state, tick_count,
             numbers, running.name_fingers(numbers, system.fingers),
         )  # fmt: skip
         beds.write(bed, begun[0])
@@ -338,7 +338,9 @@ class Bake(TimedAction, bpy.types.Operator):
                 yield 0.3 + 0.7 * part
             else:
                 moments = part
-        bake.apply(bed, moments, self.first, find_ellipsoids(take.scene), keyframe_fingers=recorded)
+        fingers = find_ellipsoids(take.scene)
+        numbers = takes.list_fingers(bed, self.take, len(fingers)) if recorded else ()
+        bake.apply(bed, moments, self.first, fingers, numbers)
         count = len(moments.height)
         last = self.first + count - 1
         self.report({"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, last))

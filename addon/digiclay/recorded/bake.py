@@ -103,9 +103,9 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
 
 
 def apply(
-    bed: Any, moments: BakedFrames, first: int, fingers: Sequence[Fingertip], *, keyframe_fingers: bool
+    bed: Any, moments: BakedFrames, first: int, fingers: Sequence[Fingertip], numbers: Sequence[int]
 ) -> None:
-    """Give a bed a bake from a frame on, in place of an older one, and the fingertips keyframes if asked."""
+    """Give a bed a bake from a frame on, in place of an older one, and fingertips of some numbers keyframes."""
     free(bed)
     count = len(moments.height)
     modifier = bed.modifiers.new(MODIFIER, "NODES")
@@ -123,13 +123,13 @@ def apply(
     for _, curve in _curves(bed):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
-    tips = list(fingertips_of(bed).values()) if keyframe_fingers else []
+    tips = [tip for number, tip in fingertips_of(bed).items() if number in numbers]
     moving = [*dict.fromkeys(filter(None, (owner_of(tip, PALM) for tip in tips))), *tips]
     for thing in moving:
         thing.animation_data_clear()
         thing.rotation_mode = "QUATERNION"
     for row, poses in enumerate(moments.pose if tips else ()):
-        bridge.place_fingertips(bed, poses, fingers)
+        bridge.place_fingertips(bed, poses, fingers, numbers)
         for thing in moving:
             thing.keyframe_insert("location", frame=first + row)
             thing.keyframe_insert("rotation_quaternion", frame=first + row)

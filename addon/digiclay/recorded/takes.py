@@ -15,11 +15,14 @@ from ..core.scene.schema import Scene
 from ..core.session import snapshot
 from ..core.session.live_session import simulate_path
 from ..core.session.take import Take, from_bytes, make_take, to_bytes
+from ..roles import fingertips_of
 from ..sessions.running import Running
 from ..ui_text import localize
 
 #: The bed's property that holds them, by number.
 PROPERTY = "digiclay_takes"
+#: Numbers of the fingertips of a take, in its order; older ones have none.
+FINGERS = "fingers"
 #: Most cells times control periods that are simulated while somebody waits: some seconds' worth.
 MOST = 8_000_000
 #: When a path begins, s.
@@ -61,13 +64,15 @@ def read_recording(session: Running) -> Take | None:
     return None if recording is None else make_take(session.scene, recording, session.snapshot)
 
 
-def add(bed: Any, take: Take, name: str = "") -> Entry:
-    """Add a take to a bed; without a name it gets its number. `bed` bpy.types.Object."""
+def add(bed: Any, take: Take, name: str = "", fingers: tuple[int, ...] = ()) -> Entry:
+    """Add a take to a bed, with the numbers of its fingertips; without a name it gets its number."""
     if PROPERTY not in bed:
         bed[PROPERTY] = {}
     takes = bed[PROPERTY]
     number = str(max(map(int, takes.keys()), default=0) + 1)
     takes[number] = {"name": name or f"Take {number}", "seconds": take.duration, "data": to_bytes(take)}
+    if fingers:
+        takes[number][FINGERS] = bytes(fingers)
     return Entry(number, takes[number]["name"], take.duration)
 
 
@@ -76,7 +81,7 @@ def keep_recording(bed: Any, session: Running) -> str:
     take = read_recording(session)
     if take is None:
         return ""
-    entry = add(bed, take)
+    entry = add(bed, take, fingers=session.numbers)
     return localize("The recording ended and was kept as {} ({:.1f} s)", entry.name, entry.seconds)
 
 
@@ -84,6 +89,15 @@ def read(bed: Any, number: str = "") -> Take:
     """Return a take of a bed, by default the last; raise DigiclayError if it is missing or damaged."""
     number = find(bed, number).number  # first: a bed without takes has no such property
     return from_bytes(bytes(bed[PROPERTY][number]["data"]))
+
+
+def list_fingers(bed: Any, number: str, count: int) -> tuple[int, ...]:
+    """Return the numbers of so many fingertips of a take; where it has none, those of the bed, if as many."""
+    kept = bed[PROPERTY][find(bed, number).number].get(FINGERS)
+    if isinstance(kept, bytes) and len(kept) == count:
+        return tuple(kept)
+    here = tuple(fingertips_of(bed))
+    return here if len(here) == count else tuple(range(1, count + 1))
 
 
 def remove(bed: Any, number: str) -> None:

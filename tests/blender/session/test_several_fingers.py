@@ -208,6 +208,52 @@ def test_a_fingertip_that_is_parented_to_another_bed_is_that_bed_s(pair: Any, cl
     assert (tuple(fingertips_of(pair)), tuple(fingertips_of(other))) == ((1,), (1, 2))
 
 
+@pytest.mark.parametrize("scale", [(1.5, 1.5, 1.5), (-1.0, 1.0, 1.0), (0.8, -0.8, 0.8)])
+def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_their_sizes(
+    pair: Any, clock: Clock, scale: tuple[float, float, float]
+) -> None:
+    bpy.ops.digiclay.add_hand()
+    palm, before = bpy.context.object, bridge.poses(pair)[2:, :2]
+    started(pair)
+    palm.scale = scale
+    assert clock.tick(2) == []
+    looked()
+    middle = np.array(palm.location)[:2] / bridge.SCALE
+    placed = bridge.poses(pair)[2:, :2] - middle
+    np.testing.assert_allclose(placed, (before - middle) * scale[:2], rtol=0, atol=1e-6)  # Blender's 32 bits
+    for tip in fingertips_of(pair).values():
+        size = np.abs(tip[roles.BALL].matrix_world.to_scale()) / bridge.SCALE
+        np.testing.assert_allclose(size, tip[bridge.AXES], rtol=1e-5)
+    poses = running.find(pair).poses
+    tick.place_fingers(bpy.context, pair, running.find(pair))
+    looked()
+    np.testing.assert_allclose(bridge.poses(pair)[:, :3], poses[:, :3], rtol=0, atol=2e-6)
+
+
+def test_a_take_moves_the_fingertips_it_is_of_though_another_one_has_come_between(
+    pair: Any, clock: Clock
+) -> None:
+    select(pair)
+    bpy.ops.digiclay.add_fingertip()
+    bpy.data.objects.remove(fingertips_of(pair)[2])
+    looked()
+    started(pair)
+    running.put(sculpting.set_recording(running.find(pair), True))
+    press(pair, clock, 3)
+    tick.stop(pair.session_uid)
+    select(pair)
+    bpy.ops.digiclay.add_fingertip()
+    looked()
+    before = bridge.poses(pair)
+    bpy.ops.digiclay.take_replay()
+    bpy.ops.digiclay.bake(source="TAKE")
+    looked()
+    np.testing.assert_allclose(bridge.poses(pair)[1], before[1], rtol=0, atol=1e-6)
+    assert beds.read_numbers(pair) == (1, 3)
+    keyed = [number for number, tip in fingertips_of(pair).items() if tip.animation_data]
+    assert (tuple(fingertips_of(pair)), keyed) == ((1, 2, 3), [1, 3])
+
+
 def test_a_stroke_of_a_thumb_leaves_its_hand_where_it_is(pair: Any, clock: Clock) -> None:
     bpy.ops.digiclay.add_hand()
     for number in (1, 2):
