@@ -215,8 +215,8 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         # The session that would go on from here.
         numbers, tick_count = self._numbers, beds.read_tick(bed)
         begun = sculpting.begin_session(
-            bed.session_uid, bed.name, self._take.scene, self._take.poses[-1, : len(numbers)], state, tick_count,
-            numbers, running.name_fingers(numbers, system.fingers),
+            bed.session_uid, bed.name, self._take.scene, self._take.poses[-1, : len(numbers)], state,
+            tick_count, numbers, running.name_fingers(numbers, system.fingers),
         )  # fmt: skip
         beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)

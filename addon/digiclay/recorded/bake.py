@@ -105,7 +105,7 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
 def apply(
     bed: Any, moments: BakedFrames, first: int, fingers: Sequence[Fingertip], numbers: Sequence[int]
 ) -> None:
-    """Give a bed a bake from a frame on, in place of an older one, and fingertips of some numbers keyframes."""
+    """Give a bed a bake from a frame on, in place of an older one, and some fingertips keyframes."""
     free(bed)
     count = len(moments.height)
     modifier = bed.modifiers.new(MODIFIER, "NODES")

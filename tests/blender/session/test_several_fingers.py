@@ -193,7 +193,7 @@ def test_what_is_parented_to_something_else_follows_that_and_is_still_the_bed_s(
     moved = bridge.poses(pair)[:, 2] - before[:, 2]
     follows = [part in (tip, tip.parent) for tip in own.values()]
     np.testing.assert_allclose(moved, np.where(follows, 0.01, 0.0), rtol=0, atol=1e-6)  # Blender's 32 bits
-    wanted = before + [0.01, -0.02, 0.003, 0.0, 0.0, 0.0, 0.0]
+    wanted = before + np.array([0.01, -0.02, 0.003, 0.0, 0.0, 0.0, 0.0])
     bridge.move_fingertips(pair, wanted, [bridge.finger_of(tip) for tip in own.values()])
     looked()
     np.testing.assert_allclose(bridge.poses(pair)[:, :3], wanted[:, :3], rtol=0, atol=2e-6)
