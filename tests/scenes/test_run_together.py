@@ -100,10 +100,10 @@ CHANGES = {
     "cylinder": "actuator.bore=1.8e-3|2e-3 actuator.rest_height=39.8e-3|40e-3",
     "the load makes the flow turbulent": "actuator.bore=0.2e-3|0.3e-3",
     "valve and fluid": "supply.high=0.4e5|0.6e5 valve.stroke=25e-6|40e-6 valve_lag.time_constant=1e-3|3e-3"
-    " delay.dead_time=1e-3|2e-3 fluid.viscosity=1e-6|3e-6",
+    " delay.dead_time=1e-3|1.2e-3 fluid.viscosity=1e-6|3e-6",
     "the flow is turbulent": "fluid.viscosity=1.6e-9|2e-9",
     "sensors": "sensors.height_step=5e-6|20e-6 sensors.force_step=5e-6|20e-6",
-    "period": "simulation.control_period=4e-3|5e-3",
+    "period": "simulation.control_period=4.4e-3|4.8e-3",
 }
 
 

@@ -15,7 +15,6 @@ groove with ragged flanks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ import numpy as np
 from ..base.arrays import Flags, Floats, Modes, any_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
+from ..model.interfaces import Alike
 from .blister import Blister, BlisterCells, BlisterRule
 from .servo import sum_weighted
 
@@ -34,8 +34,7 @@ SPREAD = 1.0
 UNEVEN = 0.1
 
 
-@dataclass(frozen=True)
-class EdgeGround:
+class EdgeGround(Alike):
     """One height for all cells, that of the edge (the paper's)."""
 
     #: State rows a cell needs.
@@ -60,8 +59,7 @@ class EdgeGround:
         return kept
 
 
-@dataclass(frozen=True)
-class OwnGround:
+class OwnGround(Alike):
     """Height of each cell when the blister came over it, in a row of the controller's; see `EdgeGround`."""
 
     rows = 1

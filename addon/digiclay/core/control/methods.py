@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..base.errors import ParameterError
@@ -50,7 +50,7 @@ class ControlParameters(Parameters):
         return Pace()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Method:
     """Module of a control method, and its requirements."""
 
@@ -58,7 +58,7 @@ class Method:
     """Within the core; holds a function ``build(parameters, device)``."""
     parameters: str
     """Class of its parameters there."""
-    blister: Mapping[str, float] | None = field(default=None)
+    blister: Mapping[str, float] | None = None
     """Its defaults for the blister where they differ; None: it forms no blister."""
     recovers: bool = False
     """Whether its cells go back to the height they had at rest."""

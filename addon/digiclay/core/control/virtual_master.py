@@ -68,7 +68,7 @@ def bound(value: float, least: float, most: float) -> float:
     return least if value < least else most if value > most else value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LossRule:
     """Rule by which a fingertip that is not felt for a time, s, of control periods, s, is given up."""
 
@@ -115,7 +115,7 @@ class Master(NamedTuple):
         return None if self.phase is IDLE else (self.x, self.y)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MasterCell:
     """One unloaded cell in plain numbers: exact valve opening, averaged flow."""
 

@@ -12,7 +12,7 @@ class Delay(Parameters):
     dead_time: float = quantity(1e-3, "dead time", unit="s", symbol="t_d", at_least=0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Queue:
     """Queued commands, and the instant of the next one within a period.
 

@@ -1,7 +1,6 @@
 """Null parts, which replace omitted parts: no state, no computation."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,11 +8,10 @@ import numpy as np
 from ..base.arrays import Floats
 from .control_interface import Commands, Measurement
 from .delay import Queue
-from .interfaces import Sensors
+from .interfaces import Alike, Sensors
 
 
-@dataclass(frozen=True)
-class InstantValve:
+class InstantValve(Alike):
     """No valve lag: the opening is the command."""
 
     rows = 0
@@ -36,8 +34,7 @@ class InstantValve:
         """Nothing to settle."""
 
 
-@dataclass(frozen=True)
-class Unrelaxed:
+class Unrelaxed(Alike):
     """No relaxation: the pulp is elastic."""
 
     rows = 0
@@ -64,8 +61,7 @@ class Unrelaxed:
         """Nothing to age. `own` (0, n); `time` (n,), s."""
 
 
-@dataclass(frozen=True)
-class PerfectSensors(Sensors):
+class PerfectSensors(Alike, Sensors):
     """No sensor model: measured forces and heights are the true ones."""
 
     rows = 0

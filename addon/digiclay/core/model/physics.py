@@ -17,7 +17,7 @@ from .touch import Touch, compute_force, relax_force
 GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cell:
     """Parts of every cell.
 

@@ -25,7 +25,7 @@ from .interfaces import Pulp
 AHEAD, MOST = 32, 200_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Touch:
     """Fingertip, contact law and relaxation of the pulp."""
 

@@ -193,7 +193,7 @@ def make_batch(systems: Sequence[System]) -> Batch:
     return Batch(
         grid=first.grid,
         cell=cell,
-        sensors=merge_parts([system.sensors for system in systems]),
+        sensors=_one([system.sensors for system in systems]),
         controller=join_controllers([system.controller for system in systems], by_set=first.by_set),
         stepper=first.stepper,
         plan=merge_parts([system.plan for system in systems]),

@@ -1,9 +1,8 @@
 """Error estimate of a session: second, finer integration under the same commands.
 
-The commands are those the session gave, so what differs is the integration alone. Richardson's
-form is more accurate than the other methods and cannot blow up: a method that did does not
-judge itself. A whole run is evaluated from its history; a live session has an `ErrorMonitor`,
-which follows it for a short stretch now and then.
+The commands are those the session gave, so what differs is the integration alone. The closed form cannot blow
+up: a method that did does not judge itself, and what is more accurate does. A whole run is evaluated from its
+history; a live session has an `ErrorMonitor`, which follows it for a short stretch now and then.
 """
 
 from __future__ import annotations
@@ -26,17 +25,19 @@ from ..model.control_interface import Commands, Measurement
 from ..model.layout import Disc, Grid
 from ..model.trajectory import Path, interpolate_poses, sample_poses
 from ..scene.assembly import assemble
-from ..scene.schema import Scene, Simulation
+from ..scene.schema import MOST_STEPS, Scene, Simulation
 
 #: Control periods of a session: the state after each, and the fingertip at both ends of it, (2, f, 7).
 Noted = tuple[tuple[State, Floats], ...]
 
-#: The reference's own error is taken to be a quarter of that of the run: halving the step leaves so much of
-#: an error of second order, which is what remains of a higher one across a kink. What comes out is an
-#: estimate, no bound, and is printed as "about".
+#: The reference's own error is taken to be a quarter of that of the run: a quarter of the step leaves so much
+#: of an error of first order, as across a kink, and less of a smooth one. What comes out is an estimate, no
+#: bound, and is printed as "about".
 SHARE = 4.0 / 3.0
+#: Longest physics step of a reference, s: with longer ones the shortest time constants are not resolved.
+LONGEST = 1.25e-3
 #: Control periods of a live session's stretch, and from the end of one to the start of the next. A period of
-#: the reference takes three times one of the session: one is done in so many, so that no tick is slow.
+#: the reference takes twice one of the session: one is done in so many, so that no tick is slow.
 STRETCH, PAUSE, SPREAD = 20, 180, 4
 #: How far the fingertip may leave the straight way within a step before the error estimate is in doubt, m.
 BENT = 0.1e-3
@@ -113,9 +114,12 @@ def has_every_command(scene: Scene) -> bool:
 
 
 def reference_settings(simulation: Simulation) -> Simulation:
-    """Return how a reference is integrated: half the physics step, by Richardson's form or to a tolerance."""
-    finer = simulation.refined(2)
-    return finer if finer.stepper == "adaptive" else replace(finer, stepper="richardson")
+    """Return how a reference is integrated: in closed form, in at least 4 parts of a step; else in halves."""
+    if simulation.stepper in ("richardson", "adaptive"):
+        return simulation.refined(2)
+    parts = max(4, math.ceil(simulation.control_period / simulation.steps / LONGEST * (1.0 - 1e-9)))
+    parts = max(2, min(parts, MOST_STEPS // simulation.steps))
+    return replace(simulation.refined(parts), stepper="bernoulli")
 
 
 def make_reference(scene: Scene) -> Scene:

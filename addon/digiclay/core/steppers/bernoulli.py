@@ -21,7 +21,7 @@ from ..base.arrays import Constants, Flags, Floats, any_true, apply_map, per_row
 from ..model.actuator import Supply
 from ..model.contact import LARGEST_EXPONENT, Contact
 from ..model.delay import Queue
-from ..model.interfaces import Pulp, Segment
+from ..model.interfaces import Alike, Pulp, Segment
 from ..model.null_parts import Unrelaxed
 from ..model.physics import Cell
 from .closed_form import LARGE, TINY, StepStart, find_loaded_path, solve_crossing, solve_pressed
@@ -170,8 +170,7 @@ def _propagator(pulp: Pulp, step: float, unit: float, share: float) -> Floats:
     return np.insert(both, [-3, -3], 0.0, axis=1)
 
 
-@dataclass(frozen=True)
-class BernoulliExponential:
+class BernoulliExponential(Alike):
     """Second order, stable at any step and stiffness, without iteration."""
 
     name = "bernoulli"

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..model.delay import Queue
-from ..model.interfaces import Movement, Segment
+from ..model.interfaces import Alike, Movement, Segment
 from ..model.physics import Cell, Speeds, compute_rates, find_contact_force, find_speeds
 
 #: Rates of a block of cells, from its rows and from the number of the stepper's node.
@@ -31,8 +31,7 @@ class ExplicitPlan:
     speeds: Speeds
 
 
-@dataclass(frozen=True)
-class Explicit:
+class Explicit(Alike):
     """Base of the explicit steppers, which march through the segments of a period.
 
     A method that has left its region of stability throws pins from stop to stop, and the stops
@@ -80,7 +79,6 @@ class Explicit:
         return find_contact_force(cell, y, under[-1])
 
 
-@dataclass(frozen=True)
 class Euler(Explicit):
     """Explicit, order 1."""
 
@@ -93,7 +91,6 @@ class Euler(Explicit):
         return step * rates(y, 0)
 
 
-@dataclass(frozen=True)
 class Heun(Explicit):
     """Explicit, order 2."""
 
@@ -107,7 +104,6 @@ class Heun(Explicit):
         return (0.5 * step) * (first + rates(y + step * first, 1))
 
 
-@dataclass(frozen=True)
 class RungeKutta4(Explicit):
     """Explicit, order 4 where the right-hand side is smooth, 2 across a contact or a reversed valve."""
 

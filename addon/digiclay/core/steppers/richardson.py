@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..model.delay import Queue
-from ..model.interfaces import Movement, Segment
+from ..model.interfaces import Alike, Movement, Segment
 from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
@@ -30,8 +30,7 @@ class RichardsonPlan:
     """s."""
 
 
-@dataclass(frozen=True)
-class Richardson:
+class Richardson(Alike):
     """Order 3 for smooth problems, stability of the closed-form step."""
 
     name = "richardson"
