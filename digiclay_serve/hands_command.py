@@ -85,7 +85,7 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
     packets = read_packets(arguments.play) if arguments.play else None
     came, told = asyncio.Event(), -math.inf
     async with AsyncExitStack() as stack:
-        file = stack.enter_context(arguments.record.open("x", encoding="utf-8")) if arguments.record else None
+        file: Any = None
 
         def tell(line: object) -> None:
             nonlocal told
@@ -105,8 +105,11 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
             came.set()
 
         send = await stack.enter_async_context(_connect(arguments.to, token, tell))
-        if packets is None:
-            await _listen(stack, arguments.host, arguments.port or PORTS[arguments.source], take)
+        ways = await _listen(stack, arguments, take) if packets is None else ""
+        if arguments.record:  # nothing is left behind by what is refused before
+            file = stack.enter_context(arguments.record.open("x", encoding="utf-8"))
+        if ways:
+            print(f"listening at {ways}", flush=True)
         late = time.monotonic() - packets[0][0] if packets else 0.0
         while not stop() and packets != []:
             with suppress(TimeoutError):
@@ -117,8 +120,9 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
             await send(source.fingers(time.monotonic()))
 
 
-async def _listen(stack: AsyncExitStack, host: str, port: int, take: Callable[[bytes], None]) -> None:
-    """Listen at a port by UDP and, to lines, by TCP."""
+async def _listen(stack: AsyncExitStack, arguments: argparse.Namespace, take: Callable[[bytes], None]) -> str:
+    """Listen at a port by UDP and, to lines, by TCP; return it in words."""
+    host, port = arguments.host, arguments.port or PORTS[arguments.source]
 
     class Datagrams(asyncio.DatagramProtocol):
         def datagram_received(self, data: bytes, address: Any) -> None:
@@ -127,13 +131,15 @@ async def _listen(stack: AsyncExitStack, host: str, port: int, take: Callable[[b
     async def take_lines(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with suppress(ValueError, OSError):  # a line without end; a connection that was reset
             async for line in reader:
-                take(line)
+                if line.endswith(b"\n"):  # else the connection ended within it
+                    take(line)
         writer.close()
 
     transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Datagrams, (host, port))
     stack.callback(transport.close)
-    stack.callback((await asyncio.start_server(take_lines, host, port)).close)
-    print(f"listening at {host}:{port}, by UDP and TCP", flush=True)
+    if arguments.source == "hts":
+        stack.callback((await asyncio.start_server(take_lines, host, port)).close)
+    return f"{host}:{port}, by UDP{' and TCP' * (arguments.source == 'hts')}"
 
 
 def read_packets(path: Path) -> list[tuple[float, bytes]]:
@@ -180,8 +186,10 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
             values = [value for one, place in fingers.items() for value in (one, *place.tolist())]
             transport.sendto(format_osc("poses", "si" + "hddd" * len(fingers), token, 0, *values))
 
-        yield send_datagram
-        transport.close()
+        try:
+            yield send_datagram
+        finally:
+            transport.close()
         return
 
     async def send(fingers: Mapping[int, Floats]) -> None:
@@ -193,9 +201,9 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
             if (answer := json.loads(message))["type"] == "error":
                 tell(f"server: {answer['message']}")
 
-    header = {"Authorization": f"Bearer {token}"}
+    header, door = {"Authorization": f"Bearer {token}"}, f"ws://{parts.netloc}/?rate=0"
     try:
-        async with connect(f"{address}/?rate=0", additional_headers=header, compression=None) as server:
+        async with connect(door, additional_headers=header, compression=None) as server:
             answers = asyncio.ensure_future(take_answers())
             yield send
             answers.cancel()

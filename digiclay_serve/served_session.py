@@ -19,6 +19,7 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
 from digiclay.core.model.contact import Contact
+from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -107,7 +108,8 @@ def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, fl
     """
     targets, clear = session.poses.copy(), math.inf
     if order.named:
-        tracks, felt, time = session.tracks, feel(session), count * session.system.period
+        tracks, time = session.tracks, count * session.system.period
+        felt = feel(session, time)
         if order.named != session.named:
             tracks = name_fingers(tracks, order.fingers)
         tracks, targets = advance(tracks, session.tracking, felt, time)
@@ -120,18 +122,29 @@ def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, fl
     return session, targets, clear
 
 
-def feel(session: Session) -> Felt:
-    """Return what the fingertips feel, by the laws of the first."""
+def feel(session: Session, time: float) -> Felt:
+    """Return what the fingertips feel, by the laws of the first, before a time, s."""
     state, system, poses = session.state, session.system, session.poses
     heights, pressed = state.row(0), state.row(system.rows.force) > 0.0
     x, y = system.grid.positions.T
     near = (x - poses[:, :1]) ** 2 + (y - poses[:, 1:2]) ** 2 < AROUND**2
-    force, law = state.finger_forces(), session.scene.fingers[0].contact or Contact()
+    first = session.scene.fingers[0]
+    force, law, tip = state.finger_forces(), first.contact or Contact(), first.fingertip or Fingertip()
     # What grows is the tension: the force and what has relaxed of it meanwhile. Twice that never swings.
     tension = force + session.relaxed @ _read_pulp(session.scene)[0]
     stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * (near & pressed).sum(1))
-    top = np.where(near, heights, 0.0).max(1)
-    return Felt(poses, force, tension, stiffness, top, 1.0 / law.exponent, float(heights.max()))
+    peak = float(heights.max())
+    top = np.where(near.any(1), np.where(near, heights, 0.0).max(1), peak)
+    basis = system.grid.compute_basis(np.arange(heights.size))
+
+    def meet(there: Floats) -> Floats:
+        under = compute_underside(*compute_forms(tip.outline(there)), basis)
+        meets: Floats = there[:, 2] + (heights - under).max(1)
+        return meets
+
+    return Felt(
+        poses, force, tension, stiffness, top, 1.0 / law.exponent, peak, meet, session.limits.speed * time
+    )
 
 
 def _read_pulp(scene: Scene) -> tuple[Floats, Floats]:

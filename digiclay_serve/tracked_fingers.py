@@ -7,7 +7,7 @@ a row a finger. No clock, no bed: `served_session` has both.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 PARKED = 1.0
 #: Height over the highest pin from which on a fingertip goes anywhere without touching, m.
 CLEAR = 5e-3
-#: A hand is no farther from where it was a message ago, m: what is has another identity's name, or is new.
-JUMP = 25e-3
+#: A finger is no farther aside from where it was named last, m, and m per s since, and no finger is nearer to
+#: another, m: what is farther has another one's name, or is none. Nothing tracked is farther from the bed, m.
+JUMP, PACE, APART, FAR = 6e-3, 0.25, 15e-3, 1e3
 #: Of the 1-euro filter: cutoff of the speed, Hz, and what a speed adds to the cutoff, Hz per m/s.
 SPEED_CUTOFF, HASTE = 1.0, 20.0
 
@@ -51,12 +52,16 @@ class Felt(NamedTuple):
     force: Floats
     tension: Floats
     stiffness: Floats
-    #: (f,): highest pin around each, m.
+    #: (f,): highest pin around each, m; of the bed, where there is none.
     top: Floats
     #: Depth in which the force of a pin grows e times, m.
     growth: float
     #: Highest pin of the bed, m.
     peak: float
+    #: Heights (f,), m, at which fingertips at poses (f, 7) touch a pin first.
+    meet: Callable[[Floats], Floats]
+    #: Way that a fingertip can go, m.
+    way: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,17 +95,24 @@ def begin_tracks(poses: Floats) -> Tracks:
 def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -> Tracks:
     """Return the tracks after a message: identities, none twice, and their poses (7,).
 
-    A known identity keeps its fingertip, a new one gets the first that is free; without any it waits.
+    A known identity keeps its fingertip, a new one gets the first that is free; without any it waits. What is
+    elsewhere all at once counts as not named.
     """
-    poses, ids = dict(named), tracks.identities.copy()
+    given = np.array([pose for _, pose in named]).reshape(-1, 7)
+    given[:, :3] = given[:, :3].clip(-FAR, FAR)
+    poses, ids = {one: given[row] for row, (one, _) in enumerate(named)}, tracks.identities.copy()
     unnamed, tracked, fresh = tracks.unnamed.copy(), tracks.tracked.copy(), np.zeros(len(ids), bool)
     _put_back_exchanged(ids, tracked, poses)
     known = {identity: slot for slot, identity in enumerate(ids.tolist())}
     free = iter(np.flatnonzero(ids < 0).tolist())
     taken = {one: known[one] if one in known else next(free, None) for one in poses}
-    found = {one: slot for one, slot in taken.items() if slot is not None}
+    most = np.minimum(JUMP + PACE * unnamed, APART)
+    found = {
+        one: slot for one, slot in taken.items() if slot is not None
+        and (ids[slot] < 0 or math.dist(poses[one][:2], tracked[slot, :2]) <= most[slot])
+    }  # fmt: skip
     slots, now = [*found.values()], np.array([poses[one] for one in found]).reshape(-1, 7)
-    fresh[slots] = (ids[slots] < 0) | (np.linalg.norm(tracked[slots, :3] - now[:, :3], axis=1) > JUMP)
+    fresh[slots] = ids[slots] < 0
     ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, now
     was = fresh[:, None]
     return replace(
@@ -110,17 +122,22 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     )  # fmt: skip
 
 
-def _put_back_exchanged(ids: NDArray[np.int64], tracked: Floats, poses: dict[int, Sequence[float]]) -> None:
+def _put_back_exchanged(ids: NDArray[np.int64], tracked: Floats, poses: Mapping[int, Floats]) -> None:
     """Put back identities (f,) that have changed places in a message."""
     known = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in poses], np.intp)
     now = np.array([poses[identity][:3] for identity in ids[known].tolist()]).reshape(-1, 3)
     own = np.linalg.norm(now - tracked[known, :3], axis=1)
-    if own.max(initial=0.0) <= 0.2 * JUMP:
+    if own.max(initial=0.0) <= JUMP:
         return
-    way, stay = np.linalg.norm(now[:, None] - tracked[known, :3], axis=2), own[:, None] + own
-    # Fingers go on where they were: what is far nearer to the other's place has its name.
-    for i, j in np.argwhere(np.triu(2.0 * (way + way.T) < stay, 1) & (stay > 0.4 * JUMP)).tolist():
-        ids[known[[i, j]]] = ids[known[[j, i]]]
+    way = np.linalg.norm(now[:, None] - tracked[known, :3], axis=2)
+    # Fingers go on where they were: what is far nearer to another's place has its name. Those that go around
+    # in a ring of such places have exchanged theirs.
+    place = np.where((2.0 * way.min(1) < own) & (own > JUMP), way.argmin(1), np.arange(known.size))
+    ring = place
+    for _ in place:
+        ring = place[ring]
+    ring = np.unique(ring)
+    ids[known[place[ring]]] = ids[known[ring]]
 
 
 def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tuple[Tracks, Floats]:
@@ -134,10 +151,13 @@ def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tupl
     goal = filtered.copy()
     slip = np.zeros(len(ids))
     if tracking.clutch:
-        slip = np.minimum(tracks.slip, felt.top + tracking.clutch - goal[:, 2])
+        # What is not there yet feels other pins than it will.
+        most = np.where(tracks.there, felt.top + tracking.clutch - goal[:, 2], math.inf)
+        slip = np.minimum(tracks.slip, most)
         goal[:, 2] += slip
+    goal[~tracks.there, 2] = PARKED
     if tracking.coupling:
-        goal[:, 2] = give_way(goal[:, 2], felt, tracking.coupling)
+        goal = give_way(goal, felt, tracking.coupling)
     there = held & (tracks.there | (felt.poses[:, 2] >= felt.peak + CLEAR))
     away = felt.poses.copy()
     away[:, 2] = PARKED
@@ -166,13 +186,20 @@ def _share(cutoff: float | Floats, time: float) -> float | Floats:
     return 1.0 / (1.0 + 1.0 / (2.0 * math.pi * time * cutoff))
 
 
-def give_way(height: Floats, felt: Felt, coupling: float) -> Floats:
-    """Return the heights (f,), m, of fingertips on springs, N/m, from tracked ones at `height`.
+def give_way(goal: Floats, felt: Felt, coupling: float) -> Floats:
+    """Return the poses (f, 7) of fingertips on springs, N/m, from tracked ones.
 
     In balance with the force at the new height, which its stiffness foretells: no step is too long, and no
-    force too large. Below the pins around it a fingertip descends by `growth` at most.
+    force too large. No pin comes in by more than `growth`: a fingertip goes over what stands in its way.
     """
-    here = felt.poses[:, 2]
+    here, height = felt.poses[:, 2], goal[:, 2]
+    meets = felt.meet(goal)
+    deep = np.maximum(felt.meet(felt.poses) - here, 0.0)
     balanced = (coupling * height + felt.force + felt.stiffness * here) / (coupling + felt.stiffness)
+    lowest = meets - deep - felt.growth
     # The spring never pulls: clay does not stick to a fingertip.
-    return np.maximum(np.maximum(balanced, height), np.minimum(here, felt.top) - felt.growth)
+    after = goal.copy()
+    after[:, 2] = np.maximum(np.maximum(balanced, height), lowest)
+    up = (lowest > here) & (np.linalg.norm(after[:, :3] - felt.poses[:, :3], axis=1) > felt.way)
+    after[up, :2] = felt.poses[up, :2]
+    return after

@@ -10,7 +10,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from pythonosc.osc_packet import OscPacket
 
-#: Time after which a pad is gone, s: one that is touched repeats itself each second. Pressure where it has
+#: Time after which a pad is gone, s: one that is touched repeats itself each second. Pressure of one that has
 #: none. Most contacts between two lists of those alive.
 GONE, USUAL, MOST = 1.2, 0.5, 256
 
@@ -25,8 +25,8 @@ class Pad:
     depth: float
     #: Position from the upper left corner and pressure, 0 to 1, of those alive; None before the first.
     contacts: dict[int, list[float] | None] = field(default_factory=dict)
-    #: s.
-    heard: float = 0.0
+    heard: float = 0.0  # s
+    senses: bool = False  # pressure
 
     def take(self, data: bytes, now: float) -> Pad:
         """Take a datagram at a time, s. Raises ParameterError for one that is none."""
@@ -36,14 +36,14 @@ class Pad:
                 contacts = _take_message(contacts, each.message.address, each.message.params)
         except Exception:  # python-osc raises errors of many kinds over bytes that are no OSC
             raise ParameterError("datagram", "", "must be TUIO 1.1 or 2.0", repr(data[:40])) from None
-        return replace(self, contacts=contacts, heard=now)
+        senses = self.senses or any(touch and touch[2] for touch in contacts.values())
+        return replace(self, contacts=contacts, heard=now, senses=bool(senses))
 
     def fingers(self, now: float) -> dict[int, Floats]:
         """Return the lowest points (3,), m, of the fingers that are there at a time, s, by identity."""
-        scale = np.array([self.size, -self.size, -self.depth])
-        corner = np.array([-0.5 * self.size, 0.5 * self.size, self.height])
-        there = self.contacts.items() if now - self.heard <= GONE else ()
-        return {one: corner + scale * touch for one, touch in there if touch}
+        corner, scale = (-0.5 * self.size, 0.5 * self.size, self.height), (self.size, -self.size, -self.depth)
+        there, usual = self.contacts.items() if now - self.heard <= GONE else (), not self.senses and USUAL
+        return {one: corner + np.add(touch, (0.0, 0.0, usual)) * scale for one, touch in there if touch}
 
 
 def _take_message(contacts: dict[int, Any], address: str, values: list[Any]) -> dict[int, Any]:
@@ -53,7 +53,7 @@ def _take_message(contacts: dict[int, Any], address: str, values: list[Any]) -> 
         return {int(one) % 2**32: contacts.get(int(one) % 2**32) for one in values if one != "alive"}
     if kind not in ("set", "/tuio2/ptr"):
         return contacts
-    one, *touch = [*values[1:4], USUAL] if kind == "set" else [*values[:1], *values[3:5], values[8] or USUAL]
+    one, *touch = [*values[1:4], 0.0] if kind == "set" else [*values[:1], *values[3:5], values[8]]
     x, y, pressure = np.clip(touch, 0.0, 1.0).tolist()
     if len(contacts) > MOST or not np.isfinite(touch).all():
         raise ValueError

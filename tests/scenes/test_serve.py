@@ -26,6 +26,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
+from digiclay_serve.hands_command import read_packets
 from digiclay_serve.protocol import Flag, Frame, Pose, pack_pose, unpack_frame
 from tests.other_process import PACKAGES
 from tests.served import TOKEN, Server, frame_message, load_example, serve
@@ -293,10 +294,13 @@ def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path: Path) 
                 for _ in range(20):
                     quest.sendall(lines)
                     time.sleep(0.01)
+                quest.sendall(lines[:-2])  # the connection ends within a number
             fingers_after(client, 0, 1, 2, 3, 4)
             hands.send_signal(signal.SIGINT)
             assert hands.wait(TIMEOUT) == 0
         fingers_after(client)
+        packets = read_packets(tmp_path / "hands.txt")
+        assert {data for _, data in packets} == set(lines.splitlines(keepends=True))
         one_second = time.monotonic() + 2.5  # the lease of the first
         while time.monotonic() < one_second:
             client.recv(TIMEOUT)

@@ -45,6 +45,9 @@ class Stream:
     silent: tuple[float, float] = (0.0, 0.0)
     #: Fingers besides, which are none.
     hostile: bool = False
+    #: They come from beside the bed, as low as over it; each half second one is 20 mm aside.
+    beside: bool = False
+    astray: bool = False
 
     def messages(self) -> Iterator[tuple[float, list[tuple[object, Sequence[object]]]]]:
         """Yield the messages with their times, s: identities and places."""
@@ -56,6 +59,9 @@ class Stream:
                 for side, off in zip((-1.0, 1.0), bias, strict=True)
             ]
             names = (2, 1) if self.exchanged[0] <= time < self.exchanged[1] else (1, 2)
+            for hand, side in enumerate((-1.0, 1.0)):
+                places[hand][0] += side * self.beside * np.interp(time, [0.3, 0.6], [40e-3, 0.0])
+                places[hand][1] += self.astray * (round(time * self.rate) % 30 == 7 * hand) * 20e-3
             named: list[tuple[object, Sequence[object]]] = [
                 (name, place.tolist()) for name, place in zip(names, places, strict=True)
             ]
@@ -111,6 +117,8 @@ STREAMS = {
     "two hands at 30 Hz": Stream(30.0),
     "two hands at 90 Hz": Stream(90.0),
     "dropouts of 60 ms, exchanged identities, hostile fingers": Stream(60.0, **WORSE),
+    "hands that come from beside the bed": Stream(60.0, beside=True),
+    "places that are none": Stream(60.0, astray=True),
 }
 
 
