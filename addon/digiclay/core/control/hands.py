@@ -47,6 +47,8 @@ class Hands(NamedTuple):
 
     fingers: tuple[Any, ...]
     discs: tuple[Disc, ...]
+    pressed: tuple[Cells, Cells] | None = None
+    """From locating to commanding: the pressed pins, (m,), ascending, and the fingers they belong to."""
 
     @property
     def losses(self) -> int:
@@ -100,6 +102,12 @@ class HandControl:
         """How far from each finger a pressed pin may be its own, (f,), m."""
         return CAPTURE * np.array(self.sizes)
 
+    @cached_property
+    def _sizes(self) -> tuple[Cells, Floats, Floats]:
+        """The fingers, their sizes, m, and squares of `capture`, m², (f, 1) each."""
+        numbers = np.arange(len(self.runs))
+        return numbers[:, None], np.array(self.sizes)[:, None], self.capture[:, None] ** 2
+
     @property
     def rows(self) -> int:
         """State rows a cell needs: those of each controller, one after the other."""
@@ -113,6 +121,7 @@ class HandControl:
         """Divide the pressed pins among the fingers, and let each controller take in its own."""
         (pressed,) = touched.force.nonzero()
         owner, shares = np.full(touched.force.size, NOBODY), np.zeros((len(self.runs), 0))
+        divided = None
         if pressed.size:
             basis, force = touched.quadratic_basis[:, pressed], touched.force[pressed]
             who = touched.pressing[:, pressed].argmax(axis=0)
@@ -125,21 +134,28 @@ class HandControl:
                 # What a finger that is not found yet presses would draw the estimates of the others to it.
                 shares[:, owner[pressed] == NOBODY] = 0.0
                 shares[:, ~known] = HIDDEN
+            divided = touched.cells[pressed], owner[pressed]
         located = self.locate_each(memory.fingers, touched, owner, pressed, shares)
         discs = [disc for _, disc in located]
-        return Hands(tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs)), discs
+        return Hands(
+            tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs), divided
+        ), discs
 
     def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
         """Let each controller command the pins around its finger; of two for one pin obey one."""
         columns = self.arrange("all", seen)
         double, shares = columns.double, np.ones((len(self.runs), seen.force.size))
-        owner = np.full(double.size, NOBODY)
         # What stands in one column alone is no other finger's; nor is what is free, if no underside is known.
-        told = np.flatnonzero(self._predicts | (seen.force[double] != 0.0))
-        if told.size:
-            owner[told], shares[:, double[told]] = self._claim(memory, seen, double[told])
+        owner = np.full(double.size, NOBODY)
+        if self._predicts and double.size:
+            owner, shares[:, double] = self._claim(memory, seen, double)
+        elif memory.pressed:
+            pins, of = memory.pressed
+            at = np.minimum(pins.searchsorted(seen.cells[double]), pins.size - 1)
+            owner = np.where(pins[at] == seen.cells[double], of[at], NOBODY)
+            shares[:, double] = self._hide(owner)
         fingers, given = self.command_each(memory.fingers, seen, shares, columns)
-        memory = memory._replace(fingers=tuple(fingers))
+        memory = memory._replace(fingers=tuple(fingers), pressed=None)
         chosen = np.empty(seen.target.size, np.intp)
         chosen[columns.flat] = np.arange(columns.flat.size)
         if double.size:
@@ -173,9 +189,6 @@ class HandControl:
         under = self._predict_under(memory, basis)
         owner = find_lowest(under)
         shares, _ = self._share(under, owner, seen, double)
-        # Only undersides that are predicted tell where a blister would press a pin.
-        if not self._predicts:
-            return owner, shares
         x, y, radius, ground, top = self._find_blisters(memory)[..., None]
         inside = np.hypot(basis[1] - x, basis[2] - y) <= radius
         tops = np.where(inside, np.maximum(top, ground), -np.inf)
@@ -192,7 +205,7 @@ class HandControl:
         By the undersides over them, m: of a pin that two may press each has its share in the forces
         predicted; where none is predicted, nobody knows who presses it.
         """
-        shares = np.where((owner == np.arange(len(self.runs))[:, None]) | (owner == NOBODY), 1.0, 0.0)
+        shares = self._hide(owner)
         known = np.ones(pins.size, np.bool_)
         if self._predicts:
             height = measured.height[pins]
@@ -205,6 +218,11 @@ class HandControl:
             known[both] = total > 0.0
             shares[:, both] = np.where(known[both], forces / np.maximum(total, TINY), shares[:, both])
         return shares, known
+
+    def _hide(self, owner: Cells) -> Floats:
+        """Return the shares of fingers in the forces of pins (q,), (f, q): none in what is another's."""
+        shares: Floats = ((owner == self._sizes[0]) | (owner == NOBODY)).astype(np.float64)
+        return shares
 
     @cached_property
     def _alike(self) -> list[tuple[Any, list[int]]]:
@@ -223,27 +241,28 @@ class HandControl:
 
     def _predict_under(self, memory: Hands, basis: Floats) -> Floats:
         """Return the undersides of fingers over pins, (f, q), m; infinite where one is not near."""
-        places = np.array([own.place or (np.inf, np.inf) for own in memory.fingers])[:, :, None]
-        with np.errstate(invalid="ignore"):
-            apart = (basis[1] - places[:, 0]) ** 2 + (basis[2] - places[:, 1]) ** 2
-        far = ~(apart <= self.capture[:, None] ** 2)
-        rank = self._estimate_under(memory, apart)
-        if self._predicts:
-            for run, alike in self._alike:
-                own = [i for i in alike if memory.fingers[i].place]
-                if own:
-                    rank[own] = run.predict_under([memory.fingers[i] for i in own], basis)
-        np.putmask(rank, far, np.inf)
-        return rank
-
-    def _estimate_under(self, memory: Hands, square: Floats) -> Floats:
-        """Return undersides of fingers at squared distances, (f, q), m², from the tops of blisters, m."""
-        tops = np.array([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
-        size = self.capture[:, None] / CAPTURE
-        reduced = square / (size * size)
-        under = STEEP * np.maximum(reduced - JOIN, 0.0) - np.sqrt(np.maximum(1.0 - reduced, 1.0 - JOIN))
-        heights: Floats = tops + size * (1.0 + under)
-        return heights
+        places = np.array([own.place or (BEYOND, BEYOND) for own in memory.fingers])[:, :, None]
+        square, other = basis[1:3, None] - places.transpose(1, 0, 2)
+        square *= square
+        other *= other
+        square += other
+        _, size, reach = self._sizes
+        far: Flags = square > reach
+        if not self._predicts:
+            tops = np.array([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
+            square /= size * size
+            heights: Floats = continue_ellipsoid(square)
+            heights *= size
+            heights += tops + size
+            heights[far] = np.inf
+            return heights
+        under = np.full(square.shape, np.inf)
+        for run, alike in self._alike:
+            own = [i for i in alike if memory.fingers[i].place]
+            if own:
+                under[own] = run.predict_under([memory.fingers[i] for i in own], basis)
+        under[far] = np.inf
+        return under
 
     def _find_new(self, basis: Floats, force: Floats, owner: Cells, who: Cells) -> Cells:
         """Return the owners of pressed pins, those of new fingers among them: about the strongest forces.
@@ -273,19 +292,21 @@ class HandControl:
     ) -> Cells:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
         copies, fingers, (x, y) = columns.copies, columns.named, columns.places
-        at_x, at_y, radius, ground, _ = self._find_blisters(memory).take(fingers, axis=1)
+        at_x, at_y, radius, ground, _ = self._find_blisters(memory)
+        limits = radius * np.abs(radius), UNDER**2 * self._sizes[2][:, 0]
+        at_x, at_y, ground, edge, under = np.array((at_x, at_y, ground, *limits)).take(fingers, axis=1)
         square = (x - at_x) ** 2
         square += (y - at_y) ** 2
-        inside = square <= radius * np.abs(radius)
+        inside = square <= edge
         # Outside of all blisters pins are led, or left as they are; of two the nearer one is obeyed.
         asked = target.take(copies)
         aside = np.where(asked == seen.target.take(columns.double), -1.0, -0.5)
         off = np.where(inside, np.abs(asked - ground), aside - square)
         # Under a fingertip its own blister is obeyed, and where it presses before all.
-        inside &= square <= (UNDER * self.capture).take(fingers) ** 2
+        inside &= square <= under
         off = np.where(inside, 1.0 - square, off)
         off[owner == fingers] = 2.0
-        chosen: Cells = np.take_along_axis(copies, off.argmax(axis=0)[None], 0)[0]
+        chosen: Cells = copies[off.argmax(axis=0), np.arange(owner.size)]
         return chosen
 
     def arrange(self, part: str, seen: Measurement) -> Columns:
@@ -314,12 +335,10 @@ class HandTogether(HandControl):
         self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells, shares: Floats
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see the pressed cells, without the forces on those of the others."""
-        count = len(self.runs)
-        own = owner[pressed, None] == np.arange(count)
-        basis, height = touched.quadratic_basis[:, pressed], touched.height[pressed, None]
+        own = owner[pressed, None] == self._sizes[0].T
         columns = touched._replace(
-            quadratic_basis=np.broadcast_to(basis[..., None], (6, pressed.size, count)),
-            height=np.broadcast_to(height, own.shape),
+            quadratic_basis=touched.quadratic_basis[:, pressed, None],
+            height=touched.height[pressed, None],
             force=np.where(own, touched.force[pressed, None], 0.0),
         )
         return list(zip(*self.together.locate(list(memory), columns), strict=True))
@@ -434,9 +453,18 @@ class HandInGroups(HandControl):
                 rows_of[i][:, columns[i]] = own
 
 
+def continue_ellipsoid(reduced: Floats) -> Floats:
+    """Return the underside of a ball of radius 1 at squared distances of its axis; see `model.fingertip`."""
+    low = np.sqrt(np.maximum(1.0 - reduced, 1.0 - JOIN))
+    under: Floats = STEEP * np.maximum(reduced - JOIN, 0.0) - low
+    return under
+
+
 def find_lowest(under: Floats) -> Cells:
     """Return the finger with the lowest of undersides (f, q), (q,); `NOBODY`: all are infinite."""
-    return np.where(np.isinf(under).all(axis=0), NOBODY, under.argmin(axis=0))
+    lowest: Cells = under.argmin(axis=0)
+    lowest[np.minimum.reduce(under) == np.inf] = NOBODY
+    return lowest
 
 
 def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float, float]:

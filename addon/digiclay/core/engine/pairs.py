@@ -34,7 +34,7 @@ class HandSelection(Selection):
     def update(self, state: State, finger: Any, control: Any) -> State:
         """Return a state whose active cells are all that can change in a period; see `Selection`."""
         active, periods = state.active, state.active.known
-        if finger is None or control is not None or active.reach is None or state.period >= active.until:
+        if finger is None or active.reach is None or state.period >= active.until:
             return super().update(state, finger, control)
         # How far along its path the set serves is worked out once.
         path, last = periods.get("path", (None, 0))
@@ -42,12 +42,15 @@ class HandSelection(Selection):
             windows = finger.path.windows[finger.number : finger.number + KEPT]
             last = finger.number + count_inside(active, windows)
             periods["path"] = finger.path, last
-        return state if finger.number < last else super().update(state, finger, control)
+        serves = finger.number < last and self.serves(active, state.period, None, self.join(control))
+        return state if serves else super().update(state, finger, control)
 
     def serves(self, active: ActiveSet, period: int, window: Any, control: Discs | None) -> bool:
         """Return whether a set has all cells that can change; orders may ask for a disc more."""
+        if control is None:
+            return super().serves(active, period, window, control)
         kept = active.control
-        same = kept is not None and control is not None and len(kept[0]) == len(control[0])
+        same = kept is not None and len(kept[0]) == len(control[0])
         return same and super().serves(active, period, window, control)
 
     def join(self, control: Any) -> Discs | None:
