@@ -11,7 +11,7 @@ from .compat import bpy
 from .core.base.arrays import Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import LEVEL, Fingertip, make_matrices
-from .roles import ELLIPSOID, PALM, ROLE, fingertips_of, owner_of
+from .roles import BED, ELLIPSOID, PALM, ROLE, fingertips_of, owner_of
 from .ui_text import localize
 
 #: Blender units per meter of the device: a millimeter is drawn as a hundredth of a unit,
@@ -114,42 +114,29 @@ def move_fingertips(
 
     `numbers`: of the fingertips, of which the bed may have lost some; by default its first ones.
     """
-    hands: dict[Any, list[tuple[Any, Floats]]] = {}
+    parts: dict[Any, list[tuple[Any, Floats]]] = {}
     every, whole = fingertips_of(bed), np.array(bed.matrix_world)
     for number, at, finger in zip(numbers or every, poses, fingers, strict=False):
-        tip = every.get(number)
-        if tip is not None and tip.parent == bed:
-            move_fingertip(tip, at, finger)
-        elif tip is not None:
-            hands.setdefault(tip.parent, []).append((tip, whole @ _place(at, finger)))
-    for palm, tips in hands.items():
-        if palm.get(ROLE) != PALM:
-            for tip, place in tips:
-                tip.matrix_world = _to_matrix(tip, place)
-            continue
-        stood = np.array(palm.matrix_world)
-        if len(tips) == sum(tip.parent == palm for tip in every.values()):
-            ways = [place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
+        if number in every:
+            parts.setdefault(every[number].parent, []).append((every[number], _place(at, finger)))
+    for above, tips in parts.items():
+        stood = np.array(above.matrix_world)
+        if above.get(ROLE) == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
+            ways = [whole @ place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
             if np.ptp(ways, axis=0).max() < STRAY:
                 stood = ways[0] @ stood
-                palm.matrix_world = _to_matrix(palm, stood)
+                above.matrix_world = _to_matrix(above, stood)
         for tip, place in tips:
-            tip.matrix_parent_inverse.identity()
-            tip.matrix_basis = _to_matrix(tip, np.linalg.pinv(stood) @ place)
+            if above.get(ROLE) in (BED, PALM):
+                tip.matrix_parent_inverse.identity()
+                tip.matrix_basis = _to_matrix(tip, np.linalg.pinv(stood) @ whole @ place)
+            else:
+                tip.matrix_world = _to_matrix(tip, whole @ place)
 
 
 def _to_matrix(thing: Any, matrix: Floats) -> Any:
     """Return a matrix (4, 4) as Blender's."""
     return type(thing.matrix_basis)(matrix.tolist())
-
-
-def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
-    """Put a fingertip that hangs on its bed to a pose (7,), lowest point, m, and quaternion."""
-    tip.matrix_parent_inverse.identity()
-    tip.rotation_mode = "QUATERNION"
-    tip.rotation_quaternion = at[3:]
-    tip.location = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
-    tip.scale = (1.0, 1.0, 1.0)
 
 
 def _place(at: Floats, finger: Fingertip) -> Floats:
