@@ -9,8 +9,7 @@ from .. import preferences
 from ..compat import bpy
 from ..core.base.arrays import Floats
 from ..device import detail, view
-from ..overlay.sections import find_compact_box
-from ..overlay.views import find_free_room
+from ..overlay.views import find_covered, find_free_room
 from ..roles import BALL, fingertips_of
 
 #: Width of a sidebar that is yet to be opened, at a UI scale of 1, pixels.
@@ -68,7 +67,7 @@ def frame(context: Any, bed: Any) -> None:
     )
     if parallel:
         lens = lens * looking.view_distance
-    free, taken = 2.0 * _find_room(context, area, region, SIDEBAR) / size - 1.0
+    free, taken = 2.0 * _find_room(context, bed, area, region, SIDEBAR) / size - 1.0
     middle, back = corners.mean(axis=0), axes[:, 2]
     half = np.abs(corners - middle)[:, :2].max(axis=0)
     for farther in FARTHER:
@@ -93,7 +92,7 @@ def reveal(context: Any, bed: Any, tips: Iterable[Any]) -> None:
     if shown is None or not shown[1].data or shown[1].data.view_perspective == "CAMERA":
         return
     context.view_layer.update()
-    (free, taken), region = _find_room(context, *shown), shown[1]
+    (free, taken), region = _find_room(context, bed, *shown), shown[1]
     corners = _list_corners(_list_balls(tips))
     clip = np.column_stack([corners, np.ones(len(corners))]) @ np.array(region.data.perspective_matrix).T
     places = 0.5 * (clip[:, :2] / clip[:, 3:] + 1.0) * [region.width, region.height]
@@ -102,11 +101,10 @@ def reveal(context: Any, bed: Any, tips: Iterable[Any]) -> None:
         frame(context, bed)
 
 
-def _find_room(context: Any, area: Any, region: Any, sidebar: float = 0.0) -> Floats:
+def _find_room(context: Any, bed: Any, area: Any, region: Any, sidebar: float = 0.0) -> Floats:
     """Return the free part of a view and the overlay's box in it, (2, 2, 2), pixels, beside a `sidebar`."""
-    scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
-    room = find_free_room(area, region, {"UI": sidebar * scale})
-    return np.reshape([room, find_compact_box(room, scale, corner)], (2, 2, 2))
+    room = find_free_room(area, region, {"UI": sidebar * context.preferences.system.ui_scale})
+    return np.reshape([room, find_covered(context, bed, room)], (2, 2, 2))
 
 
 def find_eye(

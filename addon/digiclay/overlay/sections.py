@@ -309,11 +309,27 @@ def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> 
     return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
 
 
-def find_compact_box(room: Room, scale: float, corner: str) -> Room:
-    """Return left, bottom, right and top of what a compact overlay takes of a corner of a room, pixels."""
+def choose_sections(
+    readings: Readings, room: Room, scale: float, content: Content, corner: str
+) -> list[Section]:
+    """Return the sections that fit into a room."""
+    space, chosen = SHARE * (room[3] - TAKEN.get(corner, 0.0) * scale - room[1]) - 2 * PADDING * scale, []
+    for section in content.sections:
+        height = section.height(readings) * scale
+        if 0.0 < height <= space:
+            chosen.append(section)
+            space -= height
+    return chosen
+
+
+def find_box(room: Room, scale: float, corner: str, width: float = BRIEF, height: float = 2 * ROW) -> Room:
+    """Return left, bottom, right and top of what an overlay takes of a corner of a room, pixels.
+
+    `width`, `height`: of its sections at a UI scale of 1, pixels; by default of a compact one.
+    """
     left, bottom, right, top = room
-    wide = (COMPACT.width + 2 * MARGIN) * scale
-    tall = (2 * (ROW + PADDING + MARGIN) + TAKEN.get(corner, 0.0)) * scale
+    wide = (width + 2 * MARGIN) * scale
+    tall = (height + 2 * (PADDING + MARGIN) + TAKEN.get(corner, 0.0)) * scale
     at_top, at_left = corner.startswith("top"), corner.endswith("left")
     x, y = (left, left + wide) if at_left else (right - wide, right), (top - tall, top)
     y = y if at_top else (bottom, bottom + tall)
@@ -325,26 +341,18 @@ def lay_out(
     corner: str = "bottom_right",
 ) -> Picture:  # fmt: skip
     """Lay the overlay out in a corner of a room; sections that do not fit are left out."""
-    left, bottom, right, top = room
-    at_top, at_left = corner.startswith("top"), corner.endswith("left")
-    top -= TAKEN.get(corner, 0.0) * scale
-    width, margin, padding = content.width * scale, MARGIN * scale, PADDING * scale
-    space, sections = SHARE * (top - bottom) - 2 * padding, []
-    for section in content.sections:
-        height = section.height(readings) * scale
-        if 0.0 < height <= space:
-            sections.append((height, section.draw))
-            space -= height
+    margin, padding = MARGIN * scale, PADDING * scale
+    sections = choose_sections(readings, room, scale, content, corner)
+    heights = [section.height(readings) for section in sections]
+    x, y, end, _ = find_box(room, scale, corner, content.width, sum(heights))
     picture = Picture()
-    if not sections or right - left < width + 2 * margin:
+    if not sections or room[2] - room[0] < end - x:
         return picture
-    tall = sum(height for height, _ in sections) + 2 * padding
-    x = left + margin if at_left else right - margin - width
-    y = top - margin - tall if at_top else bottom + margin
-    picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
+    x, y, width, tall = x + margin, y + margin, content.width * scale, sum(heights) * scale
+    picture.boxes.append(Box(x, y, width, tall + 2 * padding, look.back, BACK_ALPHA))
     pen = Pen(picture, look, x + padding, width - 2 * padding, scale)
-    y += tall - padding
-    for height, draw in sections:
-        draw(readings, pen, y)
-        y -= height
+    y += tall + padding
+    for height, section in zip(heights, sections, strict=True):
+        section.draw(readings, pen, y)
+        y -= height * scale
     return picture

@@ -6,7 +6,7 @@ nothing. `follow` is called after each start and end of a session.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -15,16 +15,16 @@ import numpy as np
 from .. import preferences
 from ..bridge import project
 from ..compat import bpy
-from ..core.base.modes import Mode
+from ..core.base.modes import COLORS, Mode
 from ..core.model.control_interface import find_set_point
 from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
 from ..device.instant import find_ellipsoids
 from ..device.node_tree import TOP_FORCE
-from ..roles import bed_of
+from ..roles import bed_of, fingertips_of
 from ..sessions import running
 from .picture import BLACK, WHITE, Dot, Look, Picture, Words, choose_colors, contrast
-from .sections import COMPACT, FULL, Readings, Room, find_room, lay_out
+from .sections import COMPACT, FULL, Readings, Room, choose_sections, find_box, find_room, lay_out
 
 #: How often the views are redrawn while nothing moves in them, s: the curves continue.
 QUIET = 0.25
@@ -149,6 +149,19 @@ def find_free_room(area: Any, region: Any, closed: Mapping[str, float] = Mapping
             shut = min(other.width, other.height) <= 1
             covered.append((side, closed.get(other.type, 0.0) if shut else depth))
     return find_room(region.width, region.height, covered)
+
+
+def find_covered(context: Any, bed: Any, room: Room) -> Room:
+    """Return what the overlay of a bed takes of a room, pixels, as soon as it tells all fingertips."""
+    scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
+    session, numbers = running.find(bed), tuple(fingertips_of(bed))
+    if session is None:
+        return find_box(room, scale, corner)
+    told = read_session(bed, session, COLORS)
+    told = replace(told, fingers=tuple((number, BLACK) for number in numbers if len(numbers) > 1))
+    content = FULL if bed.digiclay_display.overlay_full else COMPACT
+    sections = choose_sections(told, room, scale, content, corner)
+    return find_box(room, scale, corner, content.width, sum(section.height(told) for section in sections))
 
 
 def _draw() -> None:
