@@ -19,8 +19,8 @@ from .picture import Box, Color, Dot, Line, Look, Picture, Words, round_axis, sc
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
 #: Space below a section.
 GAP = 6.0
-#: Width of the number and force of a fingertip.
-FINGER = 85.0
+#: Width of the number and force of a fingertip, and of the numbers of an axis.
+FINGER, LABEL = 85.0, 40.0
 #: Set points that the axis of the force shows at most: a hard knock is drawn up to its end, and no further.
 MOST = 5.0
 #: Shortest axes, N and mm: a quiet force is not drawn as a wild one.
@@ -104,8 +104,9 @@ class Pen:
         return box
 
     def level(self, box: Box, y: float, color: Color, width: float, *, dashed: bool = False) -> None:
-        """Draw a level line across the box of a plot."""
-        line = np.array([[box.x, y], [box.x + box.width, y]])
+        """Draw a level line across the box of a plot; one that is dashed leaves the axis legible."""
+        start = box.x + (LABEL * self.scale if dashed else 0.0)
+        line = np.array([[start, y], [box.x + box.width, y]])
         self.picture.lines.append(Line(line, color, width * self.scale, dashed))
 
     def curve(
@@ -273,17 +274,22 @@ def _measure_heights(readings: Readings) -> float:
     return ROW * (2 + math.ceil(len(readings.pins) / 3)) + PLOT + GAP if readings.pins else ROW + GAP
 
 
-def _measure_fingers(readings: Readings, width: float) -> float:
-    return ROW * math.ceil(len(readings.fingers) / _count_columns(width - 2.0 * PADDING))
+def _measure_fingers(count: int, width: float) -> float:
+    return ROW * math.ceil(count / _count_columns(width - 2.0 * PADDING))
+
+
+def measure_brief(count: int) -> float:
+    """Return the height of a compact overlay that tells the forces of so many fingertips, pixels."""
+    return 2 * ROW + _measure_fingers(count, BRIEF)
 
 
 #: Widths of the overlay at a UI scale of 1, in short and in full, and the space about it and in it, pixels.
 BRIEF, WIDE, MARGIN, PADDING = 190.0, 290.0, 12.0, 10.0
-COMPACT = Content((Section(lambda told: 2 * ROW + _measure_fingers(told, BRIEF), _draw_brief),), BRIEF)
+COMPACT = Content((Section(lambda told: measure_brief(len(told.fingers)), _draw_brief),), BRIEF)
 FULL = Content(
     (
         Section(lambda readings: 3 * ROW + GAP, _draw_head),
-        Section(lambda told: 2 * ROW + PLOT + GAP + _measure_fingers(told, WIDE), _draw_force),
+        Section(lambda told: 2 * ROW + PLOT + GAP + _measure_fingers(len(told.fingers), WIDE), _draw_force),
         Section(lambda readings: 0.0 if readings.top is None else 2.6 * ROW, _draw_scale),
         Section(_measure_heights, _draw_heights),
         Section(lambda readings: ROW * (1 + math.ceil(np.count_nonzero(readings.modes) / 2)), _draw_modes),
@@ -322,10 +328,10 @@ def choose_sections(
     return chosen
 
 
-def find_box(room: Room, scale: float, corner: str, width: float = BRIEF, height: float = 2 * ROW) -> Room:
+def find_box(room: Room, scale: float, corner: str, width: float, height: float) -> Room:
     """Return left, bottom, right and top of what an overlay takes of a corner of a room, pixels.
 
-    `width`, `height`: of its sections at a UI scale of 1, pixels; by default of a compact one.
+    `width`, `height`: of its sections at a UI scale of 1, pixels.
     """
     left, bottom, right, top = room
     wide = (width + 2 * MARGIN) * scale

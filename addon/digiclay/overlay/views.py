@@ -24,7 +24,18 @@ from ..device.node_tree import TOP_FORCE
 from ..roles import bed_of, fingertips_of
 from ..sessions import running
 from .picture import BLACK, WHITE, Dot, Look, Picture, Words, choose_colors, contrast
-from .sections import COMPACT, FULL, Readings, Room, choose_sections, find_box, find_room, lay_out
+from .sections import (
+    BRIEF,
+    COMPACT,
+    FULL,
+    Readings,
+    Room,
+    choose_sections,
+    find_box,
+    find_room,
+    lay_out,
+    measure_brief,
+)
 
 #: How often the views are redrawn while nothing moves in them, s: the curves continue.
 QUIET = 0.25
@@ -155,10 +166,10 @@ def find_covered(context: Any, bed: Any, room: Room) -> Room:
     """Return what the overlay of a bed takes of a room, pixels, as soon as it tells all fingertips."""
     scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
     session, numbers = running.find(bed), tuple(fingertips_of(bed))
+    numbers = numbers if len(numbers) > 1 else ()
     if session is None:
-        return find_box(room, scale, corner)
-    told = read_session(bed, session, COLORS)
-    told = replace(told, fingers=tuple((number, BLACK) for number in numbers if len(numbers) > 1))
+        return find_box(room, scale, corner, BRIEF, measure_brief(len(numbers)))
+    told = replace(read_session(bed, session, COLORS), fingers=tuple((number, BLACK) for number in numbers))
     content = FULL if bed.digiclay_display.overlay_full else COMPACT
     sections = choose_sections(told, room, scale, content, corner)
     return find_box(room, scale, corner, content.width, sum(section.height(told) for section in sections))
