@@ -120,14 +120,14 @@ def move_fingertips(
         if number in every:
             parts.setdefault(every[number].parent, []).append((every[number], _place(at, finger)))
     for above, tips in parts.items():
-        stood = np.array(above.matrix_world)
-        if above.get(ROLE) == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
+        role, stood = above and above.get(ROLE), np.array(above.matrix_world if above else np.eye(4))
+        if role == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
             ways = [whole @ place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
             if np.ptp(ways, axis=0).max() < STRAY:
                 stood = ways[0] @ stood
                 above.matrix_world = _to_matrix(above, stood)
         for tip, place in tips:
-            if above.get(ROLE) in (BED, PALM):
+            if role in (BED, PALM):
                 tip.matrix_parent_inverse.identity()
                 tip.matrix_basis = _to_matrix(tip, np.linalg.pinv(stood) @ whole @ place)
             else:

@@ -70,16 +70,18 @@ def ellipsoid(tip: Any) -> Any | None:
 def owner_of(part: Any, role: str = BED) -> Any | None:
     """Return the nearest object of a role above one; None without, or if a palm between is deleted.
 
-    A fingertip or palm that hangs on something else is still the bed's that holds it, or its fingertips.
+    A fingertip or palm that hangs on something else, or nothing, is still the bed's that holds it.
     """
     above = part.parent
     while above is not None and above.get(ROLE) != role:
         if above.get(ROLE) == PALM and not is_linked(above):
             return None
         above = above.parent
-    if above is not None or role != BED or part.parent is None:
+    if above is not None or role != BED:
         return above
-    own = {part, *(part.get(name) for name in FINGERS)} - {None}
+    # A palm is held by its fingertips, and a copy of a fingertip by the one that has its ellipsoid.
+    ball = part.get(BALL)
+    own = {part, ball and ball.parent, *(part.get(name) for name in FINGERS)} - {None}
     beds = (thing for scene in part.users_scene for thing in scene.objects if is_bed(thing))
     held = [bed for bed in beds if own & {bed.get(name) for name in FINGERS}]
     # A copy of the bed holds it as well, until it gets one of its own.

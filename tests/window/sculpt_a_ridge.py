@@ -137,6 +137,21 @@ def note(blender: Any, name: str) -> None:
     }  # fmt: skip
 
 
+def list_hidden(blender: Any) -> list[int]:
+    """Take a picture; return which fingertips the overlay in it covers."""
+    module, (_, region), boxes = blender.part("overlay.draw"), blender.view(), []
+    draw = module.draw
+    module.draw = lambda picture, *size: (boxes.extend(picture.boxes[:1]), draw(picture, *size))[1]
+    blender.shot("hand above")
+    module.draw, (box, *_) = draw, boxes
+    tips = blender.part("roles").fingertips_of(blender.beds()[0])
+    places = {number: blender.pixel(tip.matrix_world.translation) for number, tip in tips.items()}
+    return [
+        number for number, (x, y) in places.items()
+        if 0.0 < x - region.x - box.x < box.width and 0.0 < y - region.y - box.y < box.height
+    ]  # fmt: skip
+
+
 def several_fingers(blender: Any) -> Iterator[float | None]:
     """Press two fingertips, then a hand by its palm; delete it, undo that, copy a fingertip."""
     yield from blender.scene_with_bed(bed="paper")
@@ -154,14 +169,13 @@ def several_fingers(blender: Any) -> Iterator[float | None]:
     note(blender, "two pressed")
     blender.shot("two")
     blender.select(blender.beds()[0])
+    blender.beds()[0].digiclay_display.overlay_full = True
     blender.call(bpy.ops.digiclay.add_hand)
     yield from blender.settle()
     note(blender, "hand")
-    blender.shot("hand above")
+    blender.SEEN["hand"]["hidden"] = list_hidden(blender)
     yield from blender.grab((0.0, 0.0, -9.0), "Z", periods=4)
     note(blender, "hand pressed")
-    blender.beds()[0].digiclay_display.overlay_full = True
-    yield from blender.rounds(10)
     blender.shot("hand")
     yield from blender.grab((0.0, 0.0, 12.0), "Z", periods=4)
     blender.key("DEL", blender.middle())

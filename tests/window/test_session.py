@@ -180,12 +180,13 @@ def test_fingertips_come_and_go_while_the_session_goes_on(seen: Seen) -> None:
     }  # fmt: skip
     assert [seen[name]["tips"] == seen[name]["numbers"] for name in found] == [True] * 5
     assert [seen[name]["waits"] for name in found] == [""] * 5
+    assert seen["hand"]["hidden"] == []
 
 
 def test_two_fingertips_press_each_with_its_force_and_a_hand_as_one(seen: Seen) -> None:
     assert min(seen["two pressed"]["forces"]) > 0.01
     moved = np.array(seen["hand pressed"]["poses"]) - seen["hand"]["poses"]
-    # The mouse moves by pixels.
-    np.testing.assert_allclose(moved[2:], [[0.0, 0.0, -9.0]] * 5, rtol=0, atol=0.3)
+    # The mouse moves by pixels, of 0.7 mm in a view that has the bed beside the open overlay.
+    np.testing.assert_allclose(moved[2:], [[0.0, 0.0, -9.0]] * 5, rtol=0, atol=0.7)
     np.testing.assert_allclose(moved[:2], 0.0, rtol=0, atol=1e-3)
     assert min(seen["hand pressed"]["forces"]) > 0.01

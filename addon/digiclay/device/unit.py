@@ -49,8 +49,8 @@ class Faults(NamedTuple):
     #: Beds, and palms, that have come without fingertips of their own: copies, and beds of older files. And
     #: fingertips that were copied without their ellipsoid, which cannot be selected.
     bare: list[Any]
-    #: Fingertips that were copied on their bed, or have come from another one: further ones.
-    loose: list[Any]
+    #: Fingertips that were copied on their bed, or have come from another one, and that bed: further ones.
+    loose: list[tuple[Any, Any]]
     #: Fingertips, palms, ellipsoids and housings whose bed or fingertip is gone.
     left: list[Any]
     #: What beds are drawn with, come into a scene with an older bed that was appended.
@@ -84,7 +84,7 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     held, own = {bed.get(name) for bed in beds for name in FINGERS}, {tip for _, _, tip in _tips()}
     # Held, but by another bed: it was given to this one.
     come = [tip for tip in tips if (tip in held) == (tip.session_uid in known - mended)]
-    loose = [tip for tip in come if tip not in own and owner_of(tip) in beds]
+    loose = [(tip, bed) for tip in come if tip not in own and (bed := owner_of(tip)) in beds]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
     # Deleted along with its bed a fingertip may stand nowhere, and have no user any more.
     left = [thing for thing in mine if not thing.users or (is_linked(thing) and _is_orphan(thing))]
@@ -102,8 +102,8 @@ def repair(found: Faults) -> None:
             _copy(owner, BALL)
         else:
             _complete(owner)
-    for tip in found.loose:
-        _adopt(tip)
+    for tip, bed in found.loose:
+        _adopt(tip, bed)
     _remove(found.left)
 
 
@@ -229,7 +229,7 @@ def _complete(owner: Any) -> None:
             if owner == bed:
                 parts.hold_fingertip(bed, number, owner[name])
             else:
-                _adopt(owner.pop(name))
+                _adopt(owner.pop(name), bed)
     if owner != bed or bed is None:
         return
     try:
@@ -262,9 +262,8 @@ def _stand(bed: Any, tip: Any) -> None:
             bed.users_collection[0].objects.link(part)
 
 
-def _adopt(tip: Any) -> None:
+def _adopt(tip: Any, bed: Any) -> None:
     """Make a fingertip that has come to a bed a further one; as many as a bed can have."""
-    bed = owner_of(tip)
     try:
         number = parts.find_free_number(bed)
     except DigiclayError:  # it stays as it is, and touches nothing
@@ -285,6 +284,9 @@ def _duplicate(thing: Any, parent: Any, owner: Any) -> Any:
     made = thing.copy()
     own_curves(made)
     made.parent = parent
+    if thing.parent is None or ROLE not in thing.parent:  # it stands on its bed as the other one on its own
+        made.matrix_parent_inverse.identity()
+        made.matrix_basis = owner_of(thing).matrix_world.inverted() @ thing.matrix_world
     for collection in owner.users_collection:
         collection.objects.link(made)
     return made
