@@ -125,18 +125,13 @@ def move_fingertips(
             ways = [whole @ place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
             if np.ptp(ways, axis=0).max() < STRAY:
                 stood = ways[0] @ stood
-                above.matrix_world = _to_matrix(above, stood)
+                above.matrix_world = stood.T.tolist()
         for tip, place in tips:
             if role in (BED, PALM):
                 tip.matrix_parent_inverse.identity()
-                tip.matrix_basis = _to_matrix(tip, np.linalg.pinv(stood) @ whole @ place)
+                tip.matrix_basis = (np.linalg.pinv(stood) @ whole @ place).T.tolist()
             else:
-                tip.matrix_world = _to_matrix(tip, whole @ place)
-
-
-def _to_matrix(thing: Any, matrix: Floats) -> Any:
-    """Return a matrix (4, 4) as Blender's."""
-    return type(thing.matrix_basis)(matrix.tolist())
+                tip.matrix_world = (whole @ place).T.tolist()
 
 
 def _place(at: Floats, finger: Fingertip) -> Floats:

@@ -21,7 +21,7 @@ from digiclay.operators.pin_view import pick_pins
 from digiclay.operators.ready_view import FACTORY, RELIEF, SPACE, find_eye, place_eye
 from digiclay.overlay import views
 from digiclay.overlay.picture import choose_colors
-from digiclay.overlay.sections import find_box, lay_out
+from digiclay.overlay.sections import find_covered, lay_out
 from digiclay.panels import display
 from digiclay.panels.session import error_line
 from digiclay.preferences import CORNERS
@@ -364,7 +364,7 @@ def test_the_nearest_eye_sees_all_points_in_the_room_and_they_touch_two_sides(pa
 @pytest.mark.parametrize("corner", CORNERS)
 def test_nothing_of_a_bed_is_seen_behind_the_overlay(corner, parallel):
     size, room = np.array([1050.0, 700.0]), (50.0, 0.0, 780.0, 650.0)
-    box = find_box(room, 2.0, corner, 190.0, 34.0)
+    box = find_covered(room, 2.0, corner)
     assert (box[0] == 50.0, box[2] == 780.0) == (corner.endswith("left"), corner.endswith("right"))
     assert (box[1] == 0.0, box[3] == 650.0) == (corner.startswith("bottom"), corner.startswith("top"))
     free, taken = (2.0 * np.reshape(part, (2, 2)) / size - 1.0 for part in (room, box))
@@ -375,7 +375,7 @@ def test_nothing_of_a_bed_is_seen_behind_the_overlay(corner, parallel):
     assert ((free[0] < seen) & (seen < free[1])).all()
     assert not ((taken[0] < seen) & (seen < taken[1])).all(axis=1).any()
     # As near as without an overlay where it leaves room enough.
-    small = find_box(room, 0.3, corner, 190.0, 34.0)
+    small = find_covered(room, 0.3, corner)
     near = find_eye(corners, LENS, free, 2.0 * np.reshape(small, (2, 2)) / size - 1.0, parallel)
     assert near[2] < eye[2]
     # A view without room is left as it is.

@@ -286,7 +286,8 @@ def _duplicate(thing: Any, parent: Any, owner: Any) -> Any:
     made.parent = parent
     if thing.parent is None or ROLE not in thing.parent:  # it stands on its bed as the other one on its own
         made.matrix_parent_inverse.identity()
-        made.matrix_basis = owner_of(thing).matrix_world.inverted() @ thing.matrix_world
+        home: Any = owner_of(thing)
+        made.matrix_basis = home.matrix_world.inverted() @ thing.matrix_world
     for collection in owner.users_collection:
         collection.objects.link(made)
     return made

@@ -67,7 +67,8 @@ def _find_place(bed: Any, places: Floats) -> Floats:
     tips = fingertips_of(bed).values()
     taken = bridge.poses(bed)[:, :2] if tips else np.empty((0, 2))
     palms = {palm for tip in tips if (palm := owner_of(tip, PALM)) is not None}
-    middles = np.array([palm.location[:2] for palm in palms]).reshape(-1, 2) / bridge.SCALE
+    centers = [(bed.matrix_world.inverted() @ palm.matrix_world).translation[:2] for palm in palms]
+    middles = np.array(centers).reshape(-1, 2) / bridge.SCALE
     reach = np.abs(bridge.read_cells(bed.data)["position"]).max(axis=0) + BESIDE
     axes = (np.arange(-int(most / STEP), int(most / STEP) + 1) * STEP for most in reach)
     moves = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)

@@ -9,7 +9,7 @@ from .. import preferences
 from ..compat import bpy
 from ..core.base.arrays import Floats
 from ..device import detail, view
-from ..overlay.views import find_covered, find_free_room
+from ..overlay.views import find_free_room, find_taken
 from ..roles import BALL, fingertips_of
 
 #: Width of a sidebar that is yet to be opened, at a UI scale of 1, pixels.
@@ -104,7 +104,7 @@ def reveal(context: Any, bed: Any, tips: Iterable[Any]) -> None:
 def _find_room(context: Any, bed: Any, area: Any, region: Any, sidebar: float = 0.0) -> Floats:
     """Return the free part of a view and the overlay's box in it, (2, 2, 2), pixels, beside a `sidebar`."""
     room = find_free_room(area, region, {"UI": sidebar * context.preferences.system.ui_scale})
-    return np.reshape([room, find_covered(context, bed, room)], (2, 2, 2))
+    return np.reshape([room, find_taken(context, bed, room)], (2, 2, 2))
 
 
 def find_eye(

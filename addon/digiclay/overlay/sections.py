@@ -274,22 +274,17 @@ def _measure_heights(readings: Readings) -> float:
     return ROW * (2 + math.ceil(len(readings.pins) / 3)) + PLOT + GAP if readings.pins else ROW + GAP
 
 
-def _measure_fingers(count: int, width: float) -> float:
-    return ROW * math.ceil(count / _count_columns(width - 2.0 * PADDING))
-
-
-def measure_brief(count: int) -> float:
-    """Return the height of a compact overlay that tells the forces of so many fingertips, pixels."""
-    return 2 * ROW + _measure_fingers(count, BRIEF)
+def _measure_fingers(readings: Readings, width: float) -> float:
+    return ROW * math.ceil(len(readings.fingers) / _count_columns(width - 2.0 * PADDING))
 
 
 #: Widths of the overlay at a UI scale of 1, in short and in full, and the space about it and in it, pixels.
 BRIEF, WIDE, MARGIN, PADDING = 190.0, 290.0, 12.0, 10.0
-COMPACT = Content((Section(lambda told: measure_brief(len(told.fingers)), _draw_brief),), BRIEF)
+COMPACT = Content((Section(lambda told: 2 * ROW + _measure_fingers(told, BRIEF), _draw_brief),), BRIEF)
 FULL = Content(
     (
         Section(lambda readings: 3 * ROW + GAP, _draw_head),
-        Section(lambda told: 2 * ROW + PLOT + GAP + _measure_fingers(len(told.fingers), WIDE), _draw_force),
+        Section(lambda told: 2 * ROW + PLOT + GAP + _measure_fingers(told, WIDE), _draw_force),
         Section(lambda readings: 0.0 if readings.top is None else 2.6 * ROW, _draw_scale),
         Section(_measure_heights, _draw_heights),
         Section(lambda readings: ROW * (1 + math.ceil(np.count_nonzero(readings.modes) / 2)), _draw_modes),
@@ -315,27 +310,15 @@ def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> 
     return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
 
 
-def choose_sections(
-    readings: Readings, room: Room, scale: float, content: Content, corner: str
-) -> list[Section]:
-    """Return the sections that fit into a room."""
-    space, chosen = SHARE * (room[3] - TAKEN.get(corner, 0.0) * scale - room[1]) - 2 * PADDING * scale, []
-    for section in content.sections:
-        height = section.height(readings) * scale
-        if 0.0 < height <= space:
-            chosen.append(section)
-            space -= height
-    return chosen
+def find_covered(room: Room, scale: float, corner: str, box: Box | None = None, fingers: int = 0) -> Room:
+    """Return left, bottom, right and top of what the overlay takes of a corner of a room, pixels.
 
-
-def find_box(room: Room, scale: float, corner: str, width: float, height: float) -> Room:
-    """Return left, bottom, right and top of what an overlay takes of a corner of a room, pixels.
-
-    `width`, `height`: of its sections at a UI scale of 1, pixels.
+    `box`: that of the overlay; None: of a compact one that tells the forces of so many fingers, two in a row.
     """
     left, bottom, right, top = room
-    wide = (width + 2 * MARGIN) * scale
-    tall = (height + 2 * (PADDING + MARGIN) + TAKEN.get(corner, 0.0)) * scale
+    wide, tall = COMPACT.width * scale, (2 * PADDING + ROW * (2 + math.ceil(fingers / 2))) * scale
+    wide, tall = (box.width, box.height) if box else (wide, tall)
+    wide, tall = wide + 2 * MARGIN * scale, tall + (2 * MARGIN + TAKEN.get(corner, 0.0)) * scale
     at_top, at_left = corner.startswith("top"), corner.endswith("left")
     x, y = (left, left + wide) if at_left else (right - wide, right), (top - tall, top)
     y = y if at_top else (bottom, bottom + tall)
@@ -347,18 +330,26 @@ def lay_out(
     corner: str = "bottom_right",
 ) -> Picture:  # fmt: skip
     """Lay the overlay out in a corner of a room; sections that do not fit are left out."""
-    margin, padding = MARGIN * scale, PADDING * scale
-    sections = choose_sections(readings, room, scale, content, corner)
-    heights = [section.height(readings) for section in sections]
-    x, y, end, _ = find_box(room, scale, corner, content.width, sum(heights))
+    left, bottom, right, top = room
+    at_top, at_left = corner.startswith("top"), corner.endswith("left")
+    top -= TAKEN.get(corner, 0.0) * scale
+    width, margin, padding = content.width * scale, MARGIN * scale, PADDING * scale
+    space, sections = SHARE * (top - bottom) - 2 * padding, []
+    for section in content.sections:
+        height = section.height(readings) * scale
+        if 0.0 < height <= space:
+            sections.append((height, section.draw))
+            space -= height
     picture = Picture()
-    if not sections or room[2] - room[0] < end - x:
+    if not sections or right - left < width + 2 * margin:
         return picture
-    x, y, width, tall = x + margin, y + margin, content.width * scale, sum(heights) * scale
-    picture.boxes.append(Box(x, y, width, tall + 2 * padding, look.back, BACK_ALPHA))
+    tall = sum(height for height, _ in sections) + 2 * padding
+    x = left + margin if at_left else right - margin - width
+    y = top - margin - tall if at_top else bottom + margin
+    picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
     pen = Pen(picture, look, x + padding, width - 2 * padding, scale)
-    y += tall + padding
-    for height, section in zip(heights, sections, strict=True):
-        section.draw(readings, pen, y)
-        y -= height * scale
+    y += tall - padding
+    for height, draw in sections:
+        draw(readings, pen, y)
+        y -= height
     return picture

@@ -24,18 +24,7 @@ from ..device.node_tree import TOP_FORCE
 from ..roles import bed_of, fingertips_of
 from ..sessions import running
 from .picture import BLACK, WHITE, Dot, Look, Picture, Words, choose_colors, contrast
-from .sections import (
-    BRIEF,
-    COMPACT,
-    FULL,
-    Readings,
-    Room,
-    choose_sections,
-    find_box,
-    find_room,
-    lay_out,
-    measure_brief,
-)
+from .sections import COMPACT, FULL, Readings, Room, find_covered, find_room, lay_out
 
 #: How often the views are redrawn while nothing moves in them, s: the curves continue.
 QUIET = 0.25
@@ -162,17 +151,19 @@ def find_free_room(area: Any, region: Any, closed: Mapping[str, float] = Mapping
     return find_room(region.width, region.height, covered)
 
 
-def find_covered(context: Any, bed: Any, room: Room) -> Room:
+def find_taken(context: Any, bed: Any, room: Room) -> Room:
     """Return what the overlay of a bed takes of a room, pixels, as soon as it tells all fingertips."""
     scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
     session, numbers = running.find(bed), tuple(fingertips_of(bed))
-    numbers = numbers if len(numbers) > 1 else ()
-    if session is None:
-        return find_box(room, scale, corner, BRIEF, measure_brief(len(numbers)))
-    told = replace(read_session(bed, session, COLORS), fingers=tuple((number, BLACK) for number in numbers))
-    content = FULL if bed.digiclay_display.overlay_full else COMPACT
-    sections = choose_sections(told, room, scale, content, corner)
-    return find_box(room, scale, corner, content.width, sum(section.height(told) for section in sections))
+    numbers, boxes = numbers if len(numbers) > 1 else (), []
+    if session is not None:
+        told = replace(
+            read_session(bed, session, COLORS), fingers=tuple((number, BLACK) for number in numbers),
+            finger_force=np.zeros((len(session.trace.time), len(numbers))),
+        )  # fmt: skip
+        content = FULL if bed.digiclay_display.overlay_full else COMPACT
+        boxes = lay_out(told, choose_colors(BLACK, WHITE), room, scale, content, corner).boxes
+    return find_covered(room, scale, corner, boxes[0] if boxes else None, len(numbers))
 
 
 def _draw() -> None:

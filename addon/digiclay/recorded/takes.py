@@ -21,8 +21,6 @@ from ..ui_text import localize
 
 #: The bed's property that holds them, by number.
 PROPERTY = "digiclay_takes"
-#: Numbers of the fingertips of a take, in its order; older ones have none.
-FINGERS = "fingers"
 #: Most cells times control periods that are simulated while somebody waits: some seconds' worth.
 MOST = 8_000_000
 #: When a path begins, s.
@@ -72,7 +70,7 @@ def add(bed: Any, take: Take, name: str = "", fingers: tuple[int, ...] = ()) -> 
     number = str(max(map(int, takes.keys()), default=0) + 1)
     takes[number] = {"name": name or f"Take {number}", "seconds": take.duration, "data": to_bytes(take)}
     if fingers:
-        takes[number][FINGERS] = bytes(fingers)
+        takes[number]["fingers"] = bytes(fingers)
     return Entry(number, takes[number]["name"], take.duration)
 
 
@@ -93,7 +91,7 @@ def read(bed: Any, number: str = "") -> Take:
 
 def list_fingers(bed: Any, number: str, count: int) -> tuple[int, ...]:
     """Return the numbers of so many fingertips of a take; where it has none, those of the bed, if as many."""
-    kept = bed[PROPERTY][find(bed, number).number].get(FINGERS)
+    kept = bed[PROPERTY][find(bed, number).number].get("fingers")
     if isinstance(kept, bytes) and len(kept) == count:
         return tuple(kept)
     here = tuple(fingertips_of(bed))
