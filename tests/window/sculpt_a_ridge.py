@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import bpy
+import numpy as np
 
 
 def script(blender: Any) -> Iterator[float | None]:
@@ -139,17 +140,16 @@ def note(blender: Any, name: str) -> None:
 
 def list_hidden(blender: Any) -> list[int]:
     """Take a picture; return which fingertips the overlay in it covers."""
-    module, (_, region), boxes = blender.part("overlay.draw"), blender.view(), []
+    module, (_, region), pictures = blender.part("overlay.draw"), blender.view(), []
     draw = module.draw
-    module.draw = lambda picture, *size: (boxes.extend(picture.boxes[:1]), draw(picture, *size))[1]
+    module.draw = lambda picture, *size: (pictures.append(picture), draw(picture, *size))
     blender.shot("hand above")
-    module.draw, (box, *_) = draw, boxes
-    tips = blender.part("roles").fingertips_of(blender.beds()[0])
-    places = {number: blender.pixel(tip.matrix_world.translation) for number, tip in tips.items()}
-    return [
-        number for number, (x, y) in places.items()
-        if 0.0 < x - region.x - box.x < box.width and 0.0 < y - region.y - box.y < box.height
-    ]  # fmt: skip
+    module.draw, box = draw, pictures[0].boxes[0]
+    tips = blender.part("roles").fingertips_of(blender.beds()[0]).items()
+    places = np.array([blender.pixel(tip.matrix_world.translation) for _, tip in tips])
+    aside = places - [region.x + box.x, region.y + box.y]
+    inside = ((aside > 0.0) & (aside < [box.width, box.height])).all(axis=1)
+    return [number for (number, _), covered in zip(tips, inside, strict=True) if covered]
 
 
 def several_fingers(blender: Any) -> Iterator[float | None]:
