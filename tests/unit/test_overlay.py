@@ -67,7 +67,7 @@ WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
     "several fingertips": (
         {"fingers": ((1, DARK), (4, LIGHT)), "hardest": 1.9, "finger_force": np.full((1001, 2), [1.9, 0.25]),
          "force": np.full(1001, 2.15)},
-        ("Total force  2.15 N | set point 0.40 N each", "1: 1.90 N | 4: 0.25 N"), ("N: beyond",),
+        ("Total force  2.15 N | set point 0.40 N each | 0 N | 2 N", "1: 1.90 N | 4: 0.25 N"), ("N: beyond",),
     ),
     "the fingertips of a stroke's images, which are not numbered": (
         {"hardest": 0.4, "force": np.full(1001, 1.6)}, ("Total force  1.60 N | set point 0.40 N each",), ()

@@ -13,7 +13,7 @@ from ..core.base.modes import Mode
 from ..core.model.touch import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
 from ..ui_text import localize
-from .picture import Box, Color, Dot, Line, Look, Picture, Words, round_axis, scale_curve
+from .picture import LINES, Box, Color, Dot, Line, Look, Picture, Words, make_legible, round_axis, scale_curve
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
@@ -160,25 +160,26 @@ def _draw_head(readings: Readings, pen: Pen, top: float) -> None:
 
 
 def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
-    """Draw the total force over the last seconds, its set point dashed."""
+    """Draw the force over the last seconds, of several fingertips each one's, its set point dashed."""
     now = _tell_force(readings) if readings.force.size else ""
     words = "set point {:.2f} N each" if readings.hardest is not None else "set point {:.2f} N"
     asked = "" if readings.set_point is None else localize(words, readings.set_point)
     top = pen.row(top, localize("Total force  {}", now), asked)
-    recent = readings.force[readings.time >= readings.window[0]]
-    asked_for = readings.set_point or 0.0
-    largest = float(recent.max(initial=0.0))
+    # A sum would flatten the force of each.
+    curves = list(zip(readings.finger_force.T, (color for _, color in readings.fingers), strict=False))
+    curves = curves or [(readings.force, pen.look.force)]
+    recent, asked_for = readings.time >= readings.window[0], readings.set_point or 0.0
+    largest = max(float(curve[recent].max(initial=0.0)) for curve, _ in curves)
     if asked_for:
-        largest = min(max(largest, 1.2 * asked_for), MOST * asked_for * max(1, len(readings.fingers)))
+        largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
     largest = max(largest, LEAST_FORCE)
     ends = (0.0, round_axis(0.0, largest)[1])
     box = pen.plot(readings, top, ends, "N")
     if readings.set_point is not None:
         y = box.y + readings.set_point / ends[1] * box.height
         pen.level(box, y, pen.look.set_point, 1.5, dashed=True)
-    pen.curve(readings, readings.force, ends, box, pen.look.force)
-    for column, (_, color) in enumerate(readings.fingers):
-        pen.curve(readings, readings.finger_force[:, column], ends, box, color)
+    for curve, color in curves:
+        pen.curve(readings, curve, ends, box, make_legible(color, pen.look.back, LINES))
     _draw_fingers(readings, pen, box.y - ROW * pen.scale)
 
 
