@@ -111,7 +111,9 @@ def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper
     exponent, lift, bow, deepest = np.array(cases).T
     one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
     cell, openings = one_cell().cell, np.ones((1, 4))
-    start = StepStart(cell, openings, weights, exponent, 9.0 * one, bow, lift, relaxed=one, idle=loaded)
+    pressure = cell.supply.pressure(openings)
+    paths = exponent, 9.0 * one, bow, lift
+    start = StepStart(cell, openings, pressure, weights, *paths, relaxed=one, idle=loaded)
     rise, _, _ = find_loaded_path(2000.0, 1e6, 1.0, start)
     np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
 

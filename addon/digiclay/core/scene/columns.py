@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Cells, Flags, Floats
 from ..control.servo import BatchControl
-from ..engine.active_set import OwnSelection, PaddedSelection
+from ..engine.active_set import Selection
 from ..engine.state import ActiveSet, State, make_initial_state
 from ..engine.system import System
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.interfaces import Movement
+from ..model.layout import Discs, join_discs
 from ..model.null_parts import Uncontrolled
+from ..model.touch import FingerPeriod
 
 Part = TypeVar("Part")
 
@@ -102,6 +104,82 @@ def _take_run(seen: Measurement, run: int) -> Measurement:
     rows: Any = seen[:-3]
     basis, *others = (one[..., own, run] for one in rows)
     return Measurement(np.ascontiguousarray(basis), *others)
+
+
+class PaddedSelection(Selection):
+    """Selection of the active cells of many sessions, for all of them anew as soon as one needs it.
+
+    Where fewer are active than in another run, others make up the number. They could as well be
+    left out, so it does no harm that they are not.
+    """
+
+    margin = 0.5
+    larger, smaller = np.maximum, np.minimum
+
+    def join(self, control: Any) -> Discs | None:
+        """Return the controlled discs as arrays."""
+        return join_discs(control)
+
+    def pick(
+        self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
+    ) -> tuple[Cells, int]:
+        """Return the active cells (w, b), near ones first, and the number of near ones; see `Selection`."""
+        wanted = np.zeros((self.grid.count, moving.shape[1]), np.bool_)
+        near = np.broadcast_to(self.grid.covered(reach), wanted.shape)
+        wanted.reshape(-1)[active.flat] = moving
+        wanted |= self.grid.covered(control)
+        rank = 2 - near.astype(np.int8)
+        rank -= near | wanted
+        order = np.argsort(rank.T, axis=1, kind="stable").T
+        count, width = (int(np.count_nonzero(some, axis=0).max()) for some in (near, rank < 2))
+        return np.ascontiguousarray(order[:width]), count
+
+
+@dataclass(frozen=True, eq=False)
+class OwnSelection(Selection):
+    """Selection of the cells that are active in each session alone, for sessions that depend on them.
+
+    Where fewer are active than in another run, others make up the number; of these nothing is measured
+    and nothing is commanded.
+    """
+
+    runs: tuple[Selection, ...]
+    """The sessions' own."""
+
+    def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
+        """Return a state whose active cells are those of each session; see `Selection.update`."""
+        active, period, count = state.active, state.period, len(self.runs)
+        # Before the first period there are no sets; those are as good as outlived.
+        own = list(active.own or [replace(active, cells=np.empty(0, np.intp))] * count)
+        windows = np.broadcast_to(finger.window, (6, count)).T.tolist() if finger else [None] * count
+        discs = control or [None] * count
+        due = [
+            run
+            for run, selection in enumerate(self.runs)
+            if not selection.serves(own[run], period, windows[run], discs[run])
+        ]
+        if period < active.until and not due:
+            return state
+        moving, peak = self.release(state), state.peak.copy()
+        for run in due:
+            size = own[run].cells.size
+            top = float(active.block[0, :size, run].max(initial=peak[run]))
+            peak[run], still = top, moving[:size, run]
+            own[run] = self.runs[run].choose(own[run], period, windows[run], discs[run], still, top)
+        near, until = max(one.near for one in own), min(one.until for one in own)
+        chosen = replace(active, cells=_pad(own, self.grid.count), near=near, until=until, own=tuple(own))
+        return state._replace(peak=peak, active=self.take(state, chosen))
+
+
+def _pad(own: Sequence[ActiveSet], count: int) -> Cells:
+    """Return the cells (w, b) of all sets, with as many others of the `count` behind them as it takes."""
+    width = max(one.cells.size for one in own)
+    others = np.ones((len(own), count), np.bool_)
+    columns = []
+    for one, free in zip(own, others, strict=True):
+        free[one.cells] = False
+        columns.append(np.concatenate([one.cells, np.flatnonzero(free)[: width - one.cells.size]]))
+    return np.stack(columns, axis=-1)
 
 
 #: Cells moved at a time: as many as stay in a core's cache, and few enough for the matrix products to stay

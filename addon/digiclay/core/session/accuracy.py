@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,19 +78,15 @@ class ErrorMonitor(NamedTuple):
     """(2, n): Heights, m, and forces, N, of the session at the end of the stretch."""
 
 
-@dataclass(frozen=True, eq=False)
 class Replay:
     """Replay of recorded valve commands, (t, n), a row a control period; none afterwards."""
 
-    grid: Grid
-    commands: Floats
-
     rows = 0
 
-    @cached_property
-    def disc(self) -> Disc | None:
-        """The disc that holds every cell that is ever commanded: x, y, radius, m."""
-        return self.grid.enclose(np.flatnonzero(self.commands.any(axis=0)))
+    def __init__(self, grid: Grid, commands: Floats) -> None:
+        self.commands = commands
+        # The disc that holds every cell that is ever commanded: x, y, radius, m.
+        self.disc: Disc | None = grid.enclose(np.flatnonzero(commands.any(axis=0)))
 
     def begin(self) -> int:
         """Return the number of periods played."""

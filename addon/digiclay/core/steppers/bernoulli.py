@@ -390,6 +390,7 @@ class StepWorkspace:
         start = StepStart(
             plan.cell,
             openings,
+            plan.cell.supply.pressure(openings),
             weights,
             exponent,
             deviation,

@@ -13,8 +13,7 @@ to push. ``u = exp(-e)`` obeys the linear equation ``du/ds = decay - growth u`` 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,13 +114,13 @@ def replace_zeros(values: Floats) -> Floats:
     return np.where(np.abs(values) < TINY, TINY, values)
 
 
-@dataclass(frozen=True, eq=False)
-class StepStart:
+class StepStart(NamedTuple):
     """Conditions at the start of a step, for k cells, (k,), or for k cells of b runs, (k, b)."""
 
     cell: Cell
     openings: Floats
-    """(g, ..): Of the valves, at the step's Gauss points."""
+    pressure: Floats
+    """(g, ..): Of the valves, at the step's Gauss points, and at their far side, Pa."""
     weights: Floats
     """(g, 1) or (g, 1, b): Of these points, over the piston's area, s/m²."""
     exponent: Floats
@@ -136,11 +135,6 @@ class StepStart:
     """exp(e) at which the pulp begins to push."""
     idle: NDArray[np.bool_]
     """Cells that it does not push at the start."""
-
-    @cached_property
-    def pressure(self) -> Floats:
-        """Pressure at the far side of the valves, Pa."""
-        return self.cell.supply.pressure(self.openings)
 
     def conductance(self, load: Floats) -> Floats:
         """Return the secant conductance under a load, Pa, at each Gauss point."""

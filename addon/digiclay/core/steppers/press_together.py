@@ -114,6 +114,7 @@ class TogetherPlan:
             start = StepStart(
                 cell,
                 openings[nodes],
+                pressure[nodes],
                 plan.weights[nodes, None] / cell.actuator.area,
                 whole[0],
                 free[s] * (m / plan.numbers[0]) - bend,
