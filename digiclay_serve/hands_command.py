@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import logging
 import math
 import os
 import time
@@ -67,9 +68,13 @@ def carry_out(arguments: argparse.Namespace) -> int:
     refuse_without("digiclay hands", "serve", "websockets", "pythonosc")
     from .tuio import Pad
 
+    logging.getLogger().addHandler(logging.NullHandler())  # python-osc prints what hostile senders like
     if arguments.token is None and VARIABLE not in os.environ:
         raise OutputError(f"digiclay hands needs the token of the server: --token, or {VARIABLE}.")
     token, pad = choose_token(arguments.token)[0], (arguments.height, arguments.size, arguments.depth)
+    for name, length in zip(("--height", "--size", "--depth"), pad, strict=True):
+        if not 0.0 < length <= 1.0:
+            raise OutputError(f"{name} must be above 0 and at most 1000 mm (got {1e3 * length:g}).")
     source = Hands(arguments.height) if arguments.source == "hts" else Pad(*pad)
     with Stop() as stop:
         try:
@@ -84,8 +89,8 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
     """Pass what comes on to the server; fingers that rest are named again and again."""
     packets = read_packets(arguments.play) if arguments.play else None
     came, told = asyncio.Event(), -math.inf
+    file: Any = None
     async with AsyncExitStack() as stack:
-        file: Any = None
 
         def tell(line: object) -> None:
             nonlocal told
@@ -94,10 +99,14 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
                 told = time.monotonic()
 
         def take(data: bytes) -> None:
-            nonlocal source
+            nonlocal source, file
             now = time.monotonic()
-            if file:
-                print(json.dumps([round(now, 6), data.decode("latin-1")]), file=file, flush=True)
+            try:
+                if file:
+                    print(json.dumps([round(now, 6), data.decode("latin-1")]), file=file, flush=True)
+            except OSError as error:
+                file = None
+                tell(f"The recording ends here: {error.strerror}.")
             try:
                 source = source.take(data, now)
             except DigiclayError as error:
@@ -145,8 +154,9 @@ async def _listen(stack: AsyncExitStack, arguments: argparse.Namespace, take: Ca
 def read_packets(path: Path) -> list[tuple[float, bytes]]:
     """Return the packets of a recording with their times, s: lines of JSON, a character a byte."""
     try:
-        lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
-        packets = [(float(at), str(text).encode("latin-1")) for at, text in lines]
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        whole = [json.loads(line) for line in lines if line.endswith("\n") or len(lines) == 1]
+        packets = [(float(at), str(text).encode("latin-1")) for at, text in whole]  # the last may be cut
         if not all(math.isfinite(at) for at, _ in packets):
             raise ValueError("a time is not finite")
     except (OSError, ValueError, TypeError) as error:
@@ -170,6 +180,7 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
             raise ValueError
     except ValueError:
         raise OutputError(f"--to must be ws://HOST:PORT or osc://HOST:PORT (got {address!r}).") from None
+    missing = f"No server at {address}: it has ended, or is not started yet."
     if parts.scheme == "osc":
 
         class Answers(asyncio.DatagramProtocol):
@@ -177,7 +188,7 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
                 tell(f"server: {OscMessage(data).params[0]}")
 
             def error_received(self, exc: Exception) -> None:
-                tell(f"No server at {address}: it has ended, or is not started yet.")
+                tell(missing)
 
         where = parts.hostname, parts.port
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Answers, remote_addr=where)
@@ -210,5 +221,7 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
     except InvalidStatus as error:
         reason = (error.response.body or b"").decode().strip()
         raise OutputError(f"The server at {address} refuses: {reason}") from None
+    except ConnectionRefusedError:
+        raise OutputError(missing) from None
     except WebSocketException as error:
         raise OutputError(f"The server at {address} has ended: {error}.") from None

@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -137,10 +138,9 @@ def feel(session: Session, time: float) -> Felt:
     top = np.where(near.any(1), np.where(near, heights, 0.0).max(1), peak)
     basis = system.grid.compute_basis(np.arange(heights.size))
 
-    def meet(there: Floats) -> Floats:
+    def meet(there: Floats) -> Any:
         under = compute_underside(*compute_forms(tip.outline(there)), basis)
-        meets: Floats = there[:, 2] + (heights - under).max(1)
-        return meets
+        return there[:, 2] + (heights - under).max(1)
 
     return Felt(
         poses, force, tension, stiffness, top, 1.0 / law.exponent, peak, meet, session.limits.speed * time

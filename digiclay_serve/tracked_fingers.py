@@ -58,7 +58,7 @@ class Felt(NamedTuple):
     growth: float
     #: Highest pin of the bed, m.
     peak: float
-    #: Heights (f,), m, at which fingertips at poses (f, 7) touch a pin first.
+    #: Heights (k,), m, at which fingertips at poses (k, 7) touch a pin first.
     meet: Callable[[Floats], Floats]
     #: Way that a fingertip can go, m.
     way: float
@@ -193,8 +193,8 @@ def give_way(goal: Floats, felt: Felt, coupling: float) -> Floats:
     force too large. No pin comes in by more than `growth`: a fingertip goes over what stands in its way.
     """
     here, height = felt.poses[:, 2], goal[:, 2]
-    meets = felt.meet(goal)
-    deep = np.maximum(felt.meet(felt.poses) - here, 0.0)
+    meets, now = felt.meet(np.concatenate([goal, felt.poses])).reshape(2, -1)
+    deep = np.maximum(now - here, 0.0)
     balanced = (coupling * height + felt.force + felt.stiffness * here) / (coupling + felt.stiffness)
     lowest = meets - deep - felt.growth
     # The spring never pulls: clay does not stick to a fingertip.

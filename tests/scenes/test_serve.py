@@ -301,6 +301,8 @@ def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path: Path) 
         fingers_after(client)
         packets = read_packets(tmp_path / "hands.txt")
         assert {data for _, data in packets} == set(lines.splitlines(keepends=True))
+        with (tmp_path / "hands.txt").open("a") as file:
+            file.write('[1.0, "Left wr')  # the disk was full
         one_second = time.monotonic() + 2.5  # the lease of the first
         while time.monotonic() < one_second:
             client.recv(TIMEOUT)

@@ -140,7 +140,15 @@ def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.
     """Return what fingertips feel, all the same."""
     each = np.ones(len(poses))
     forces = force * each, force * each, stiffness * each
-    return Felt(np.array(poses, float), *forces, top * each, 5e-4, top, lambda there: top * each, 1.25e-3)
+    return Felt(
+        np.array(poses, float),
+        *forces,
+        top * each,
+        5e-4,
+        top,
+        lambda there: np.full(len(there), top),
+        1.25e-3,
+    )
 
 
 def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]]]:
@@ -464,7 +472,9 @@ def test_a_pad_beyond_its_corners_stays_on_the_bed() -> None:
         ("--from quest --token=a-token-of-tests", "invalid choice"),
         ("--to http://x:1 --token=a-token-of-tests --play empty", "--to must be ws://HOST:PORT"),
         ("--to ws://x:1:2 --token=a-token-of-tests --play empty", "--to must be ws://HOST:PORT"),
-        ("--to ws://127.0.0.1:1 --token=a-token-of-tests --play empty", "has ended"),
+        ("--to ws://127.0.0.1:1 --token=a-token-of-tests --play empty", "No server at ws://127.0.0.1:1"),
+        ("--size 0 --token=a-token-of-tests", "--size must be above 0 and at most 1000 mm (got 0)"),
+        ("--depth=-3 --token=a-token-of-tests", "--depth must be above 0"),
         ("--play missing --token=a-token-of-tests", "must be a recording"),
         ("--play bad --token=a-token-of-tests", "must be a recording"),
         ("--play nan --token=a-token-of-tests", "must be a recording"),
