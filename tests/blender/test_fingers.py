@@ -288,6 +288,17 @@ def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by
     np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)
 
 
+def test_a_stretched_bed_gets_no_fingertip_and_no_part_of_a_hand() -> None:
+    bed = added()
+    bed.scale = (1.0, 2.0, 1.0)
+    looked()
+    objects = len(bpy.data.objects)
+    for add in (bpy.ops.digiclay.add_fingertip, bpy.ops.digiclay.add_hand):
+        with pytest.raises(RuntimeError, match="must be the same along x, y and z"):
+            add()
+    assert len(bpy.data.objects) == objects
+
+
 def test_a_bed_has_at_most_32_fingertips() -> None:
     bed = added()
     for _ in range(6):

@@ -52,8 +52,8 @@ def add_hand(operator: Any, context: Any) -> None:
     mirror = np.array([-1.0 if operator.side == "LEFT" else 1.0, 1.0])
     places = np.array(HAND) * mirror
     away = places - np.array(WRIST) * mirror
-    palm = parts.make_palm(bed.users_collection[0], bed)
     x, y = _find_place(bed, places)
+    palm = parts.make_palm(bed.users_collection[0], bed)
     palm.location = np.array([x, y, _find_top(bed)]) * bridge.SCALE
     palm.location.z += 2.0 * devices.read_finger(bed.digiclay).height * bridge.SCALE
     context.view_layer.update()
