@@ -24,12 +24,12 @@ def read_shot(name: str, blender: Any) -> np.ndarray:
     return pixels[region.y : region.y + region.height, region.x : region.x + region.width, :3]
 
 
-def add_by_hand(blender: Any, name: str) -> None:
+def add_by_hand(blender: Any, name: str, add: Any = bpy.ops.mesh.digital_clay_add, **chosen: str) -> None:
     """Add a bed as its menu entry does, beside or on what the factory file has; note how it is seen."""
     area, region = blender.view()
     for thing in [blender.beds()[0], blender.fingertip()] if blender.beds() else []:
         bpy.data.objects.remove(thing)
-    blender.call(bpy.ops.mesh.digital_clay_add, "INVOKE_DEFAULT")
+    blender.call(add, "INVOKE_DEFAULT", **chosen)
     room = blender.part("overlay.views").find_free_room(area, region)
     blender.SEEN[name] = {"bed": rectangle_of_the_bed(blender), "room": room}
 
@@ -40,6 +40,7 @@ def see_at_once(blender: Any) -> Iterator[float | None]:
     looking = area.spaces.active.region_3d
     before = {name: getattr(looking, name) for name in ("view_perspective", "view_distance")}
     turned = looking.view_rotation.copy()
+    add_by_hand(blender, "a sample", bpy.ops.digiclay.add_sample, sample="session:two_hands_bowl")
     for side in ("USER", "TOP"):
         if side == "TOP":
             blender.call(bpy.ops.view3d.view_axis, type=side)

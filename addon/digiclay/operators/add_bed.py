@@ -67,6 +67,7 @@ class Placed:
 
     report: Any
     properties: Any
+    execute: Any
 
     location: bpy.props.FloatVectorProperty(
         name="Location",
@@ -75,6 +76,14 @@ class Placed:
         subtype="TRANSLATION",
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Add the bed, and show all of it."""
+        done: set[str] = self.execute(context)
+        if done == {"FINISHED"}:
+            frame(context, bed_of(context))
+            light(context)
+        return done
 
     def place(self, context: Any, bed: Any) -> None:
         """Put the bed there, active; in a window it is not selected, since each pin would have an outline."""
@@ -124,18 +133,14 @@ class AddBed(Placed, Action, bpy.types.Operator):
     )  # fmt: skip
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Add the bed to design on unless another is chosen, and show all of it."""
+        """Add the bed to design on unless another is chosen."""
         if not self.properties.is_property_set("bed"):
             own = self.properties.is_property_set
             given = {name: getattr(self, name) for name in plan(FIRST) if own(name)}
             self.bed = FIRST
             for name, value in given.items():
                 setattr(self, name, value)
-        done = self.execute(context)
-        if done == {"FINISHED"}:
-            frame(context, bed_of(context))
-            light(context)
-        return done
+        return super().invoke(context, event)
 
     def perform(self, context: Any) -> None:
         for name, value in plan(self.bed).items():
@@ -231,7 +236,7 @@ def entry(menu: Any, context: Any) -> None:
 
 
 @action(
-    "import_scene.digital_clay_run", "Import Digital Clay Run", bases=(Placed, FileAction),
+    "import_scene.digital_clay_run", "Import Digital Clay Run", bases=(FileAction, Placed),
     options=("REGISTER", "UNDO", "PRESET"), **file_of("*.npz", "SKIP_PRESET"),
     row=integer("Row", "Recorded row to show: 0 is the first, -1 the last", default=-1),
 )  # fmt: skip
@@ -282,7 +287,7 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser, unless a file was dropped."""
-        return self.execute(context) if self.filepath else super().invoke(context, event)
+        return (Placed if self.filepath else FileAction).invoke(self, context, event)
 
     def perform(self, context: Any) -> None:
         self.add_scene(context, load(Path(bpy.path.abspath(self.filepath))))

@@ -29,7 +29,10 @@ LIT = "digiclay_lit"
 
 
 def find_view(context: Any) -> tuple[Any, Any] | None:
-    """Return area and region of the 3D view in use: the context's, or the first of its window."""
+    """Return area and region of the 3D view in use, the context's or the first of its window.
+
+    In background mode the region has no data.
+    """
     window = None if bpy.app.background else context.window
     areas = [context.area, *(window.screen.areas if window is not None else ())]
     area = next((area for area in areas if area is not None and area.type == "VIEW_3D"), None)
@@ -52,7 +55,7 @@ def light(context: Any) -> None:
 def frame(context: Any, bed: Any) -> None:
     """Move the 3D view in use so that it shows a bed and its fingertip whole, beside sidebar and overlay."""
     shown = find_view(context)
-    if shown is None:
+    if shown is None or not shown[1].data:
         return
     area, region = shown
     looking, size = region.data, np.array([region.width, region.height])
@@ -88,7 +91,6 @@ def frame(context: Any, bed: Any) -> None:
 def reveal(context: Any, bed: Any, tips: Iterable[Any]) -> None:
     """Show a bed whole, as `frame` does, if some of its fingertips would be out of the view in use."""
     shown = find_view(context)
-    # In background mode a view has no data.
     if shown is None or not shown[1].data or shown[1].data.view_perspective == "CAMERA":
         return
     context.view_layer.update()
