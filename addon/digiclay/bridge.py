@@ -110,10 +110,7 @@ def place_fingertips(
 def move_fingertips(
     bed: Any, poses: Floats, fingers: Sequence[Fingertip], numbers: Sequence[int] = ()
 ) -> None:
-    """Put fingertips of a bed to poses (f, 7); a palm whose fingertips keep their places goes along.
-
-    `numbers`: of the fingertips, of which the bed may have lost some; by default its first ones.
-    """
+    """Put the first fingertips, or those of some numbers, to poses (f, 7); a palm goes along if all do."""
     parts: dict[Any, list[tuple[Any, Floats]]] = {}
     every, whole = fingertips_of(bed), np.array(bed.matrix_world)
     for number, at, finger in zip(numbers or every, poses, fingers, strict=False):

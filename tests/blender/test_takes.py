@@ -9,7 +9,6 @@ import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.engine.simulation import begin
-from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
@@ -158,7 +157,7 @@ def test_a_changed_parameter_ends_the_recording_and_keeps_it_as_a_take_of_the_fo
     (note,) = tick.tick(bpy.context, 101.0)
     assert "The recording ended and was kept as Take 1" in note.message
     (entry,) = takes.list_takes(clay)
-    assert takes.read(clay, entry.number).scene.set_point == SetPoint(0.4)
+    assert takes.read(clay, entry.number).scene.set_point.force == 0.4
     assert running.find(clay).recording is None
     tick.stop(clay.session_uid)
     assert bpy.ops.digiclay.take_replay() == {"FINISHED"}

@@ -29,10 +29,7 @@ LIT = "digiclay_lit"
 
 
 def find_view(context: Any) -> tuple[Any, Any] | None:
-    """Return area and region of the 3D view in use, the context's or the first of its window.
-
-    In background mode the region has no data.
-    """
+    """Return area and region of the 3D view in use: the context's, or the first of its window."""
     window = None if bpy.app.background else context.window
     areas = [context.area, *(window.screen.areas if window is not None else ())]
     area = next((area for area in areas if area is not None and area.type == "VIEW_3D"), None)
@@ -55,7 +52,7 @@ def light(context: Any) -> None:
 def frame(context: Any, bed: Any) -> None:
     """Move the 3D view in use so that it shows a bed and its fingertip whole, beside sidebar and overlay."""
     shown = find_view(context)
-    if shown is None or not shown[1].data:
+    if shown is None or not shown[1].data:  # in background mode
         return
     area, region = shown
     looking, size = region.data, np.array([region.width, region.height])

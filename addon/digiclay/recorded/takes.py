@@ -92,10 +92,8 @@ def read(bed: Any, number: str = "") -> Take:
 def list_fingers(bed: Any, number: str, count: int) -> tuple[int, ...]:
     """Return the numbers of so many fingertips of a take; where it has none, those of the bed, if as many."""
     kept = bed[PROPERTY][find(bed, number).number].get("fingers")
-    if isinstance(kept, bytes) and len(kept) == count:
-        return tuple(kept)
-    here = tuple(fingertips_of(bed))
-    return here if len(here) == count else tuple(range(1, count + 1))
+    every = (kept if isinstance(kept, bytes) else b"", tuple(fingertips_of(bed)), range(1, count + 1))
+    return next(tuple(numbers) for numbers in every if len(numbers) == count)
 
 
 def remove(bed: Any, number: str) -> None:

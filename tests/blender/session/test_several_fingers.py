@@ -13,7 +13,7 @@ import pytest
 from digiclay import bridge, roles
 from digiclay.core.base.modes import COLORS
 from digiclay.core.scene.scene_source import load
-from digiclay.device import unit
+from digiclay.device import parts, unit
 from digiclay.live import beds, handlers, tick
 from digiclay.overlay import views
 from digiclay.recorded import takes
@@ -204,12 +204,8 @@ def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(
     assert len(fingertips_of(pair)) == 8
     for bed in (pair, copy):
         np.testing.assert_allclose(bridge.poses(bed)[:7, :3], wanted[:, :3], rtol=0, atol=2e-6)
-
-
-def test_a_fingertip_that_is_parented_to_another_bed_is_that_bed_s(pair: Any, clock: Clock) -> None:
-    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
-    hang(fingertips_of(pair)[2], bpy.context.object)
-    assert (tuple(fingertips_of(pair)), tuple(fingertips_of(bpy.context.object))) == ((1,), (1, 2))
+    hang(own[2], copy)  # from one bed to another
+    assert (len(fingertips_of(pair)), len(fingertips_of(copy))) == (7, 8)
 
 
 @pytest.mark.parametrize("scale", [(1.5, 1.5, 1.5), (-1.0, 1.0, 1.0), (0.8, -0.8, 0.8)])
@@ -250,18 +246,6 @@ def test_a_take_moves_the_fingertips_it_is_of_though_another_one_has_come_betwee
     assert [number for number, tip in fingertips_of(pair).items() if tip.animation_data] == [1, 3]
 
 
-def test_a_stroke_of_a_thumb_leaves_its_hand_where_it_is(pair: Any, clock: Clock) -> None:
-    bpy.ops.digiclay.add_hand()
-    for number in (1, 2):
-        bpy.data.objects.remove(fingertips_of(pair)[number])
-    started(pair)
-    before = bridge.poses(pair)
-    running.put(sculpting.queue_stroke(running.find(pair), 10e-3, 10e-3, 4e-3)[0])
-    clock.tick(10)
-    moved = np.abs(bridge.poses(pair) - before).max(axis=1)
-    assert (moved[0] > 1e-3, moved[1:].max() < 1e-6) == (True, True)
-
-
 def test_the_size_and_the_pulp_of_one_fingertip_change_in_mid_session(pair: Any, clock: Clock) -> None:
     started(pair)
     press(pair, clock, 1, 2)
@@ -283,7 +267,12 @@ def test_a_session_waits_without_any_fingertip(pair: Any, clock: Clock) -> None:
     waits(pair, clock, words="fingertip is deleted")
 
 
-def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock) -> None:
+@pytest.mark.parametrize("palm", [False, True])
+def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock, palm: bool) -> None:
+    hand = parts.make_palm(bpy.context.collection, pair) if palm else pair
+    for tip in fingertips_of(pair).values():
+        tip.parent = hand
+    looked()
     started(pair)
     move(pair, {1: 46.0, 2: 45.0})
     clock.tick(5)
