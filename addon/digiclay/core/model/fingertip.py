@@ -99,11 +99,11 @@ def _outline_still(fingertip: Fingertip, turn: bytes) -> Floats:
 
 def compute_reaches(outline: Floats) -> Floats:
     """Return the end of a `Window` for each outline (..., 10), (..., 3): base, m; tilt; bend, 1/m."""
-    half = outline[..., 8]
-    base = outline[..., 2] - half * (_ROOT + _SLOPE * JOIN)
-    return np.stack(
-        [base, np.hypot(outline[..., 6], outline[..., 7]), 2.0 * _SLOPE * half * outline[..., 9]], -1
-    )
+    half, ends = outline[..., 8], np.empty((*outline.shape[:-1], 3))
+    ends[..., 0] = outline[..., 2] - half * (_ROOT + _SLOPE * JOIN)
+    ends[..., 1] = np.hypot(outline[..., 6], outline[..., 7])
+    ends[..., 2] = 2.0 * _SLOPE * half * outline[..., 9]
+    return ends
 
 
 def compute_reach(window: Window, peak: Any) -> Discs | None:
@@ -129,7 +129,7 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
     Of outlines (..., p, 10): `forms` (..., 2 p, 6), coefficients of 1, x, y, x², x y, y², p rows of R, then p
     rows of the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
     """
-    x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = np.moveaxis(outline, -1, 0)
+    x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = (outline[..., part] for part in range(10))
     count = outline.shape[-2]
     rows = np.zeros((*outline.shape[:-2], 2 * count, 6))
     inward, tangent = rows[..., :count, :], rows[..., count:, :]
@@ -140,11 +140,14 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
     inward[..., 3], inward[..., 4], inward[..., 5] = -xx, -2.0 * xy, -yy
     tangent[..., 0] = z + tilt_x * x + tilt_y * y
     tangent[..., 1], tangent[..., 2] = -tilt_x, -tilt_y
-    slope, join = (_SLOPE * half)[..., None], (0.5 * _ROOT * half)[..., None]
-    tangent -= slope * inward
-    tangent[..., 0] -= join[..., 0]
-    inward *= join / (1.0 - JOIN)
-    return rows, np.stack([join, np.sqrt(join)], -3)
+    join = np.empty((*outline.shape[:-2], 2, count, 1))
+    least = join[..., 0, :, :]
+    np.multiply(0.5 * _ROOT, half[..., None], out=least)
+    np.sqrt(least, out=join[..., 1, :, :])
+    tangent -= (_SLOPE * half)[..., None] * inward
+    tangent[..., 0] -= least[..., 0]
+    inward *= least / (1.0 - JOIN)
+    return rows, join
 
 
 def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:

@@ -146,20 +146,17 @@ def sample_poses(trajectories: Sequence[Trajectory], times: Floats) -> Floats:
 
 def interpolate_poses(path: Floats, parts: Floats) -> Floats:
     """Return poses (t, p, f, 7) at parts (p,) of the lines between rows of a path (t + 1, f, 7)."""
-    count, fingers = len(path) - 1, path.shape[1]
-    start, end = (np.repeat(rows, parts.size, axis=0).reshape(-1, 7) for rows in (path[:-1], path[1:]))
-    part = np.tile(np.repeat(parts, fingers), count)[:, None]
-    poses = np.empty((len(start), 7))
-    poses[:, :3] = start[:, :3] + (end[:, :3] - start[:, :3]) * part
-    poses[:, 3:] = _interpolate_turns(start[:, 3:], end[:, 3:], part)
-    return poses.reshape(count, parts.size, fingers, 7)
+    start, end, part = path[:-1, None], path[1:, None], parts[:, None, None]
+    poses: Floats = start + (end - start) * part
+    poses[..., 3:] = _interpolate_turns(start[..., 3:], end[..., 3:], part)
+    return poses
 
 
 def _interpolate_turns(start: Floats, end: Floats, part: Floats) -> Floats:
-    """Turn unit quaternions (k, 4) along the shortest arc, by the share `part` (k, 1) of the way."""
-    cosine = np.einsum("ij,ij->i", start, end)[:, None]
+    """Turn unit quaternions (.., 4) along the shortest arc, by the share `part` (.., 1) of the way."""
+    cosine = np.einsum("...j,...j->...", start, end)[..., None]
     if (np.abs(cosine) >= 1.0).all():  # as mostly: no turn at all
-        return np.asarray(start / np.linalg.norm(start, axis=1, keepdims=True))
+        return np.asarray(start / np.linalg.norm(start, axis=-1, keepdims=True))
     end = np.where(cosine < 0.0, -end, end)
     angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
     sine = np.sin(angle)
@@ -170,4 +167,4 @@ def _interpolate_turns(start: Floats, end: Floats, part: Floats) -> Floats:
         start,
         (np.sin((1.0 - part) * angle) * start + np.sin(part * angle) * end) / divisor,
     )
-    return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
+    return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))

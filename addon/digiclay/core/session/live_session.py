@@ -123,8 +123,7 @@ def clamp_pose(pose: Floats, stroke: float) -> Floats:
     # Pins bottom out at the floor: below it the force would exceed what floating-point numbers hold.
     far = 1e3 * stroke
     inside = pose.copy()
-    inside[..., :2] = np.clip(pose[..., :2], -far, far)
-    inside[..., 2] = np.clip(pose[..., 2], 0.0, far)
+    np.minimum(np.maximum(pose[..., :3], (-far, -far, 0.0)), far, out=inside[..., :3])
     return inside
 
 
