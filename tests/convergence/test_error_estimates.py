@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.scene_source import SAMPLES
+from digiclay.core.scene.schema import Simulation
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.accuracy import SHARE, Errors, estimate_errors, has_every_command
+from digiclay.core.session.accuracy import (
+    SHARE,
+    Errors,
+    estimate_errors,
+    has_every_command,
+    reference_settings,
+)
 from digiclay.core.session.run_scene import run
 
 from tests.assemble import AWAY, beginning, one_cell, record, scripted
@@ -59,6 +66,25 @@ def test_the_true_error_is_at_most_twice_the_estimate_and_that_no_more_than_twen
         estimate, true = (getattr(errors, kind) for errors in judged(name, stepper, step))
         assert true <= 2.0 * estimate + nothing, kind
         assert estimate <= 20.0 * true + nothing, kind
+
+
+@pytest.mark.parametrize(
+    ("stepper", "period", "step", "by", "finer"),
+    [
+        ("bernoulli", 5e-3, 5e-3, "bernoulli", 1.25e-3),  # a quarter
+        ("heun", 5e-3, 1e-3, "bernoulli", 0.25e-3),  # another method, not judged by itself
+        ("bernoulli", 20e-3, 20e-3, "bernoulli", 1.25e-3),  # short enough for the valve's lag
+        ("bernoulli", 5e-3, 5e-3 / 400, "bernoulli", 5e-3 / 800),  # as many as a period may have
+        ("bernoulli", 10.0, 10.0, "bernoulli", 10e-3),
+        ("richardson", 5e-3, 5e-3, "richardson", 2.5e-3),  # more accurate than the others
+        ("adaptive", 5e-3, 5e-3, "adaptive", 2.5e-3),
+    ],
+)
+def test_a_reference_has_shorter_steps(
+    stepper: str, period: float, step: float, by: str, finer: float
+) -> None:
+    judge = reference_settings(Simulation(control_period=period, physics_step=step, stepper=stepper))
+    assert (judge.stepper, judge.physics_step) == (by, pytest.approx(finer))
 
 
 def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summary_tells_it() -> None:
