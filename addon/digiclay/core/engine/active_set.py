@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,8 +23,9 @@ from ..model.physics import Cell
 from ..model.touch import FingerPeriod
 from .state import ActiveSet, Rows, State
 
-#: Control periods after which the set is made anew, without the cells that have come to rest.
-KEPT = 32
+#: A set is made anew, without the cells at rest by then, after so many control periods, or this time, s,
+#: if that is longer.
+KEPT, LASTS = 32, 0.16
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,12 @@ class Selection:
 
     #: How much farther than it must the set goes, in pitches, so that it serves for some periods.
     margin = 1.0
+
+    @cached_property
+    def kept(self) -> int:
+        """Control periods for which a set is kept."""
+        return max(KEPT, int(LASTS / np.max(self.period)))
+
     #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
     larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
     smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
@@ -76,12 +84,12 @@ class Selection:
         top: Any,
     ) -> ActiveSet:
         """Return the set that follows another one, without its rows; no pin top is higher than `top`, m."""
-        peak = self.smaller(top + KEPT * self.period * self.fastest, self.cell.actuator.stroke)
+        peak = self.smaller(top + self.kept * self.period * self.fastest, self.cell.actuator.stroke)
         margin = self.margin * self.grid.layout.pitch
         reach, control = widen_disc(_reach(window, peak), margin), widen_disc(control, margin)
         cells, near = self.pick(active, moving, reach, control)
         return replace(
-            active, cells=cells, near=near, reach=reach, control=control, peak=peak, until=period + KEPT
+            active, cells=cells, near=near, reach=reach, control=control, peak=peak, until=period + self.kept
         )
 
     def pick(

@@ -18,7 +18,7 @@ from ..model.fingers import HandPeriod, HandTouch
 from ..model.fingertip import compute_reach
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
 from ..model.physics import Cell
-from .active_set import KEPT, Selection
+from .active_set import Selection
 from .state import ActiveSet, State
 from .system import System
 
@@ -39,7 +39,7 @@ class HandSelection(Selection):
         # How far along its path the set serves is worked out once.
         path, last = periods.get("path", (None, 0))
         if path is not finger.path:
-            windows = finger.path.windows[finger.number : finger.number + KEPT]
+            windows = finger.path.windows[finger.number : finger.number + self.kept]
             last = finger.number + count_inside(active, windows)
             periods["path"] = finger.path, last
         serves = finger.number < last and self.serves(active, state.period, None, self.join(control))
@@ -84,7 +84,7 @@ class HandSelection(Selection):
         if near and known and isinstance(touch, HandTouch):
             rows = [own.pulp.rows for own in touch.each]
             apart = ~find_pairs(active)
-            waited = (state.period - (active.until - KEPT)) * self.period
+            waited = (state.period - (active.until - self.kept)) * self.period
             touch.pulp.age(active.block[self.cell.pulp_rows, :near], np.repeat(apart * waited, rows, axis=0))
         return super().release(state)
 
