@@ -65,7 +65,7 @@ class Controller(Protocol):
         """Return memory and orders for the cells of the disc and all that still move."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class SetPoint:
     """Set point of the total force."""
 
