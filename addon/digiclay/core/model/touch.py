@@ -106,12 +106,13 @@ def trace_finger(fingertip: Fingertip, poses: Floats, first: int = 0) -> FingerP
     """Compute the path of a fingertip whose poses at the p instants of t periods are given, (t, p, 7)."""
     count, instants, _ = poses.shape
     outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
-    low, high = outline[:, :, :2].min(axis=1), outline[:, :, :2].max(axis=1)
-    spread = np.hypot(*(0.5 * (high - low)).T)
-    shape = compute_reaches(outline)
-    farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
-    windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
-    return FingerPath(first, *compute_forms(outline), windows)
+    place, shape, windows = outline[:, :, :2], compute_reaches(outline), np.empty((count, 6))
+    low, high = np.minimum.reduce(place, axis=1), np.maximum.reduce(place, axis=1)
+    windows[:, :2] = 0.5 * (low + high)
+    windows[:, 2] = np.hypot(*(0.5 * (high - low)).T)
+    windows[:, 3::2] = np.minimum.reduce(shape[:, :, ::2], axis=1)
+    windows[:, 4] = np.maximum.reduce(shape[:, :, 1], axis=1)
+    return FingerPath(first, *compute_forms(outline), windows.tolist())
 
 
 def join_paths(paths: Sequence[FingerPath]) -> FingerPath:
