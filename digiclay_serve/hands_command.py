@@ -117,8 +117,7 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
         ways = await _listen(stack, arguments, take) if packets is None else ""
         if arguments.record:  # nothing is left behind by what is refused before
             file = stack.enter_context(arguments.record.open("x", encoding="utf-8"))
-        if ways:
-            print(f"listening at {ways}", flush=True)
+        print(f"listening at {ways}" if ways else f"playing {arguments.play}", flush=True)
         late = time.monotonic() - packets[0][0] if packets else 0.0
         while not stop() and packets != []:
             with suppress(TimeoutError):

@@ -136,11 +136,12 @@ def feel(session: Session, time: float) -> Felt:
     stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * (near & pressed).sum(1))
     peak = float(heights.max())
     top = np.where(near.any(1), np.where(near, heights, 0.0).max(1), peak)
-    basis = system.grid.compute_basis(np.arange(heights.size))
+    cells = np.flatnonzero(near.any(0))
+    basis, heights = system.grid.compute_basis(cells), heights[cells]
 
     def meet(there: Floats) -> Any:
         under = compute_underside(*compute_forms(tip.outline(there)), basis)
-        return there[:, 2] + (heights - under).max(1)
+        return there[:, 2] + (heights - under).max(1, initial=-math.inf)
 
     return Felt(
         poses, force, tension, stiffness, top, 1.0 / law.exponent, peak, meet, session.limits.speed * time

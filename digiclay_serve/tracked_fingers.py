@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 #: Height of a fingertip that is not there, m; whatever is as high is simulated at next to no cost.
 PARKED = 1.0
-#: Height over the highest pin from which on a fingertip goes anywhere without touching, m.
-CLEAR = 5e-3
+#: Height over the highest pin from which on a fingertip goes anywhere without touching, m; share of `growth`
+#: by which a pin that is felt comes in further a period.
+CLEAR, CREEP = 5e-3, 0.1
 #: A finger is no farther aside from where it was named last, m, and m per s since, and no finger is nearer to
 #: another, m: what is farther has another one's name, or is none. Nothing tracked is farther from the bed, m.
 JUMP, PACE, APART, FAR = 6e-3, 0.25, 15e-3, 1e3
@@ -136,7 +137,6 @@ def _put_back_exchanged(ids: NDArray[np.int64], tracked: Floats, poses: Mapping[
     ring = place
     for _ in place:
         ring = place[ring]
-    ring = np.unique(ring)
     ids[known[place[ring]]] = ids[known[ring]]
 
 
@@ -190,15 +190,14 @@ def give_way(goal: Floats, felt: Felt, coupling: float) -> Floats:
     """Return the poses (f, 7) of fingertips on springs, N/m, from tracked ones.
 
     In balance with the force at the new height, which its stiffness foretells: no step is too long, and no
-    force too large. No pin comes in by more than `growth`: a fingertip goes over what stands in its way.
+    force too large. A pin comes in by `growth`, then slowly: a fingertip goes over what stands in its way.
     """
-    here, height = felt.poses[:, 2], goal[:, 2]
+    here, height, after = felt.poses[:, 2], goal[:, 2], goal.copy()
     meets, now = felt.meet(np.concatenate([goal, felt.poses])).reshape(2, -1)
     deep = np.maximum(now - here, 0.0)
     balanced = (coupling * height + felt.force + felt.stiffness * here) / (coupling + felt.stiffness)
-    lowest = meets - deep - felt.growth
+    lowest = meets - np.maximum(deep + CREEP * felt.growth, felt.growth)
     # The spring never pulls: clay does not stick to a fingertip.
-    after = goal.copy()
     after[:, 2] = np.maximum(np.maximum(balanced, height), lowest)
     up = (lowest > here) & (np.linalg.norm(after[:, :3] - felt.poses[:, :3], axis=1) > felt.way)
     after[up, :2] = felt.poses[up, :2]
