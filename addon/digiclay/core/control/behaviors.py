@@ -25,7 +25,7 @@ STILL = 0.2
 BORDER = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Elastic(TouchParameters):
     """Spring and damper under every pin."""
 
@@ -54,7 +54,7 @@ class ElasticControl(CellwiseControl):
         return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plastic(TouchParameters):
     """Bingham body under every pin: rigid up to a yield force, viscous above."""
 
@@ -96,7 +96,7 @@ class PlasticControl(CellwiseControl):
         return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Viscous(TouchParameters):
     """Spring and damper in parallel under every pin, and the exchange between neighbors.
 

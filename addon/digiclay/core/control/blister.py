@@ -17,7 +17,7 @@ from ..model.layout import RELATIVE_TOLERANCE
 from .travel import ABEAM, measure_offsets
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Blister(Parameters):
     """Radius and profile of the blister, and the ring around it that gives the edge height."""
 

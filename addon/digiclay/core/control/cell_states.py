@@ -86,7 +86,7 @@ class Patch(NamedTuple):
         return (self.x, self.y) if self.felt else None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class CellStates(Tracking):
     """Gains and thresholds of Method II, all of them per cell."""
 

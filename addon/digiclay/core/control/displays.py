@@ -94,7 +94,7 @@ def read_values(field: str, path: str, grid: Grid, low: float, high: float, unit
     return values.ravel()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ForceDisplay(TouchParameters):
     """Field of forces, and the motion of the cells."""
 
@@ -185,7 +185,7 @@ class Progress(NamedTuple):
     periods: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ShapeDisplay(DriveParameters):
     """Displayed shape and its refresh."""
 

@@ -25,7 +25,7 @@ from .servo import BatchControl, Tracking, declare_again, lock_overloaded, mark_
 OPENINGS = np.linspace(0.0, 1.0, 129)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class DriveParameters(ControlParameters):
     """Parameters of the height control of every behavior."""
 
@@ -35,7 +35,7 @@ class DriveParameters(ControlParameters):
     dead_band: float = declare_again(Tracking, "dead_band")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class TouchParameters(DriveParameters):
     """Parameters of the behaviors that use the force on each cell."""
 

@@ -39,7 +39,7 @@ from .virtual_master import HEAVIEST, IDLE, SHAPING, Master, Phase, VirtualMaste
 from .virtual_master import build as build_master
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Hybrid(ControlParameters):
     """Parameters of Method III."""
 

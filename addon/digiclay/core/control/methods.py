@@ -35,7 +35,7 @@ class Pace(NamedTuple):
     """Time to gain that speed, s: at once, it leaves the pins behind, whose valves have not opened yet."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ControlParameters(Parameters):
     """Base of the parameters of all control methods."""
 

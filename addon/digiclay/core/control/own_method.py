@@ -67,7 +67,7 @@ class Orders(NamedTuple):
     """(rows, m): What is remembered of each cell; by default what was."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class OwnMethod(DriveParameters):
     """Base of the control methods of one's own; a subclass is a frozen dataclass with fields of `quantity`.
 

@@ -36,7 +36,7 @@ class Listening(NamedTuple):
     period: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class PushPull(DriveParameters):
     """Motion of listening pins, and their compliance."""
 

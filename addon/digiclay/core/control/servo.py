@@ -19,7 +19,7 @@ from ..base.quantity import Parameters, quantity
 from .methods import ControlParameters
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tracking(ControlParameters):
     """Common part of the tracking methods: height control of cells, direction of the fingertip."""
 

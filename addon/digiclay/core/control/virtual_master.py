@@ -159,7 +159,7 @@ def make_master_cell(cell: Cell, period: float) -> MasterCell:
     return MasterCell(openings, cell.flow, laminar, up, down, area, stroke, period)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class VirtualMaster(Tracking):
     """Gains and thresholds of Method I."""
 

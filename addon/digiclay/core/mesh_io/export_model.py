@@ -25,7 +25,7 @@ CURVED = 4
 MOST_POINTS = 50_000_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model(Parameters):
     """Selection of bodies of a formed surface."""
 

@@ -11,7 +11,7 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Supply(Parameters):
     """Reservoirs at constant gauge pressure, selected by the sign of the opening."""
 
@@ -39,7 +39,7 @@ class Supply(Parameters):
         return np.where(opening > 0.0, self.high, self.low)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Actuator(Parameters):
     """Single-acting cylinder with the pin as its rod."""
 

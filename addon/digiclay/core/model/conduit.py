@@ -12,7 +12,7 @@ from .interfaces import Flow
 from .valve import Fluid, Orifice
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Conduit(Parameters):
     """Straight round channel."""
 

@@ -45,7 +45,7 @@ class ExponentialLaw:
         return Constants((m, m * self.offset, 0.0, LARGEST_EXPONENT, self.stiffness / m))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contact(ExponentialLaw, Parameters):
     """``T(x) = (b/m) (exp(m (x - x0)) - 1)`` for x > x0, else 0; a cell carries the share f_d of it."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from ..base.quantity import Parameters, quantity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Delay(Parameters):
     """Dead time: a command acts `dead_time` after the controller issued it."""
 

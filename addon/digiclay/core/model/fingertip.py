@@ -42,7 +42,7 @@ def require_one(fingers: Sequence[Item]) -> Item:
     return only
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fingertip(Parameters):
     """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""
 

@@ -15,7 +15,7 @@ from .delay import Queue
 SHUT = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ValveLag(Parameters):
     """``τ_v dK/dt + K = K_com``: exact while the command is held."""
 

@@ -52,7 +52,7 @@ STEPS = {0: (SQUARE, SQUARE), 1: (BACK, FORWARD), -1: (FORWARD, BACK)}
 RELATIVE_TOLERANCE = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Layout(Parameters):
     """Rows and columns of cells, centered on the origin of the bed, in one of the `ARRANGEMENTS`."""
 

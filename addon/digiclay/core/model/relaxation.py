@@ -10,7 +10,7 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Relaxation(Parameters):
     """Reduced relaxation ``G(t) = (c0 + Σ c_i exp(-t/t_i)) / Σ c`` as filters ``dz_i/dt = (T - z_i)/t_i``.
 

@@ -32,7 +32,7 @@ WEYL, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
 AHEAD, MOST = 33, 200_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sensing(Parameters):
     """Parameters of the sensor model; 0 omits an effect."""
 

@@ -20,7 +20,7 @@ SHORTEST = 1e-9
 PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Waypoint(Parameters):
     """Pose of the fingertip at one time."""
 

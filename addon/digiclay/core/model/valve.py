@@ -13,7 +13,7 @@ from ..base.quantity import Parameters, quantity, refuse_overrides
 from .interfaces import Flow
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fluid(Parameters):
     """An incompressible Newtonian fluid; the default is a silicone oil (Syltherm XLT at 20 °C)."""
 
@@ -28,7 +28,7 @@ class Fluid(Parameters):
         return self.density * self.viscosity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Valve(Parameters):
     """Proportional seat valve, after Carretero and Breuer's 10:1 model.
 

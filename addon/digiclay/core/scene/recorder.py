@@ -19,7 +19,7 @@ from ..engine.state import ActiveSet, Rows, State
 CHUNK = 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recorder(Parameters):
     """Recording interval, in control periods."""
 

@@ -89,7 +89,7 @@ def import_parameters(section: str, method: str) -> type[Parameters]:
     return kind
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Simulation(Parameters):
     """Periods, steps and duration of the simulation."""
 

@@ -21,7 +21,7 @@ COLORS = ("mode", "force")
 MOST_FRAMES = 100_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Picture(Parameters):
     """Common settings of stills, turntables and films."""
 
@@ -33,14 +33,14 @@ class Picture(Parameters):
     arrows: bool = quantity(False, "whether arrows show the force on each pin")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Still(Picture):
     """One instant."""
 
     when: str = quantity("last touch", "the instant", choices=("last touch", "end"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Moving(Picture):
     """Common settings of turntables and films."""
 
@@ -54,7 +54,7 @@ class Moving(Picture):
                 raise ParameterError(type(self).__name__, side, rule, str(getattr(self, side)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Turntable(Moving):
     """One rotation of the bed at one instant."""
 
@@ -71,7 +71,7 @@ class Turntable(Moving):
         return np.arange(self.frames) * (2.0 * np.pi / self.frames)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Film(Moving):
     """Session, or a part of it, from its recorded states."""
 

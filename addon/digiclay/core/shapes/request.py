@@ -23,7 +23,7 @@ AUTO = "auto"
 LENGTH: dict[str, Any] = {"unit": "m", "at_least": -100.0, "at_most": 100.0}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shape(Parameters):
     """External shape: source, placement on the bed, refresh."""
 

@@ -20,7 +20,7 @@ from ..session.run_scene import Result, run, select_rows
 REST = 0.3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Criterion(Parameters):
     """Criteria of tracking: no loss, contact in every row, small lag, small RFD."""
 
@@ -55,7 +55,7 @@ class Follows:
         return kept and self.lag < criterion.lag and self.rfd < criterion.deviation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Drag(Parameters):
     """Press, raise or sink a blister, then drag it level and straight along x."""
 
@@ -83,7 +83,7 @@ class Drag(Parameters):
         return _through(points, "linear"), start, end
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Lift(Parameters):
     """Press, then lift straight up, gently at first and at last; its speed is the greatest on the way."""
 

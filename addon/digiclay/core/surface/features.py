@@ -128,7 +128,7 @@ def _line(run: Floats, off: Floats, closed: bool) -> Floats | None:
     return np.asarray(height[i[best]] + slope[best] * (run - at[i[best]]))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Finding(Parameters):
     """Criteria of a feature."""
 
