@@ -102,7 +102,7 @@ OPTIONS: dict[str, Any] = {
     ),
     "--plots": "also plots, session.png and surface.png",
     "--render": "also a picture, pins.png (needs bpy)",
-    "--no-errors": "without error estimates, which take about one and a half times the run's time",
+    "--no-errors": "without error estimates, which take about as long as the run",
     "--quiet": QUIET,
 }  # fmt: skip
 

@@ -18,14 +18,14 @@ from .file_lock import find_host, hold_lock, may_have_made
 #: Bytes of a name in UTF-8; file systems take 255, of which what is unfinished needs some.
 LONGEST = 120
 #: Names that stand for devices in Windows, whatever follows behind a full stop.
-DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|conout\$)", re.IGNORECASE)
+DEVICES = r"(?i)(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|conout\$)"
 
 
 def make_safe_name(text: str) -> str:
     """Return a text as a folder's name: short, of letters, digits and ``. _ + -``, no device of Windows."""
     name = re.sub(r"[^\w.+-]", "_", unicodedata.normalize("NFC", text))
     name = name.lstrip(".-").rstrip(".") or "scene"
-    if DEVICES.fullmatch(name.partition(".")[0]):
+    if re.fullmatch(DEVICES, name.partition(".")[0]):
         name = f"_{name}"
     if len(name.encode(errors="replace")) <= LONGEST:
         return name
@@ -62,7 +62,7 @@ def make_unique_names(texts: Sequence[str]) -> list[str]:
 
 
 #: ``.NAME.PID@HOST.KIND``: what becomes NAME, what NAME was, a film's frames. Older versions name no host.
-UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)")
+UNFINISHED = r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)"
 
 
 def name_unfinished(target: Path, kind: str = "part") -> Path:
@@ -72,7 +72,7 @@ def name_unfinished(target: Path, kind: str = "part") -> Path:
 
 def is_unfinished(path: Path) -> bool:
     """Return whether a name is that of an unfinished file or folder."""
-    return UNFINISHED.fullmatch(path.name) is not None
+    return re.fullmatch(UNFINISHED, path.name) is not None
 
 
 def remove_abandoned(folder: Path, name: str = "") -> None:
@@ -82,7 +82,7 @@ def remove_abandoned(folder: Path, name: str = "") -> None:
     except OSError:
         return
     for path in paths:
-        match = UNFINISHED.fullmatch(path.name)
+        match = re.fullmatch(UNFINISHED, path.name)
         # Nothing here tells whether other machines are still at what they prepare on a shared drive.
         if match is None or (name and match["name"] != name) or match["host"] not in (None, find_host()):
             continue

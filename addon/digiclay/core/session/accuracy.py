@@ -41,6 +41,8 @@ LONGEST = 1.25e-3
 STRETCH, PAUSE, SPREAD = 20, 180, 4
 #: How far the fingertip may leave the straight way within a step before the error estimate is in doubt, m.
 BENT = 0.1e-3
+#: Heights that are compared together: those of some control periods.
+TOGETHER = 20_000
 #: Parts of a physics step in which a path is looked at, and steps looked at together.
 PARTS, BLOCK = 16, 4096
 
@@ -142,10 +144,16 @@ def estimate_errors(
     system = assemble(make_reference(scene))
     system = replace(system, controller=Replay(system.grid, history["command"]))
     done, largest = len(history["time"]) - 1, np.zeros(3)
+    most = max(1, TOGETHER // system.grid.count)
+    seen = np.empty((2, most, system.grid.count))
     for row, state in enumerate(periods(system, scene.trajectories(), begin(system), done), 1):
-        height, force = state.row(0), state.row(system.rows.force)
-        apart = compare(height, force, history["height"][row], history["force"][row])
-        np.maximum(largest, apart, out=largest)
+        last = (row - 1) % most
+        seen[:, last] = state.row(0), state.row(system.rows.force)
+        if last == most - 1 or row == done:
+            rows = slice(row - last, row + 1)
+            own = (history[name][rows].T for name in ("height", "force"))
+            apart = compare(*seen[:, : last + 1].transpose(0, 2, 1), *own)
+            largest = np.maximum(largest, apart.max(axis=1))
         if progress:
             progress(row, done)
         if stopped and stopped():
