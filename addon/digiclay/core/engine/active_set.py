@@ -43,14 +43,14 @@ class Selection:
     #: How much farther than it must the set goes, in pitches, so that it serves for some periods.
     margin = 1.0
 
+    #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
+    larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
+    smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
+
     @cached_property
     def kept(self) -> int:
         """Control periods for which a set is kept."""
         return max(KEPT, int(LASTS / np.max(self.period)))
-
-    #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
-    larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
-    smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
 
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
         """Return a state, in the same arrays, whose active cells are all that can change in a period."""
