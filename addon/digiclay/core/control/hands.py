@@ -150,9 +150,9 @@ class HandControl:
         if self._predicts and double.size:
             owner, shares[:, double] = self._claim(memory, seen, double)
         elif memory.pressed:
-            pins, of = memory.pressed
-            at = np.minimum(pins.searchsorted(seen.cells[double]), pins.size - 1)
-            owner = np.where(pins[at] == seen.cells[double], of[at], NOBODY)
+            (pins, of), cells = memory.pressed, seen.cells[double]
+            at = np.minimum(pins.searchsorted(cells), pins.size - 1)
+            owner = np.where(pins[at] == cells, of[at], NOBODY)
             shares[:, double] = self._hide(owner)
         fingers, given = self.command_each(memory.fingers, seen, shares, columns)
         memory = memory._replace(fingers=tuple(fingers), pressed=None)

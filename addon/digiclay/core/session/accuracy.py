@@ -31,8 +31,8 @@ from ..scene.schema import MOST_STEPS, Scene, Simulation
 Noted = tuple[tuple[State, Floats], ...]
 
 #: The reference's own error is taken to be a quarter of that of the run: a quarter of the step leaves so much
-#: of an error of first order, as across a kink, and less of a smooth one. What comes out is an estimate, no
-#: bound, and is printed as "about".
+#: of an error of first order, as across a kink, and half the step of one of second. What comes out is an
+#: estimate, no bound, and is printed as "about".
 SHARE = 4.0 / 3.0
 #: Longest physics step of a reference, s: with longer ones the shortest time constants are not resolved.
 LONGEST = 1.25e-3
