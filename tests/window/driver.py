@@ -243,10 +243,10 @@ def undo(name: str, redo: bool = False) -> Iterator[float | None]:
     yield from after(name, "Z", ctrl=True, shift=redo)
 
 
-def until(found: Callable[[], bool]) -> Iterator[float | None]:
+def until(found: Callable[[], bool], every: float = 0.25) -> Iterator[float | None]:
     """Wait until something is so, however slow the machine is; what is not so after minutes never will be."""
-    for _ in range(480):
-        yield 0.25
+    for _ in range(int(120.0 / every)):
+        yield every
         if found():
             return
     raise AssertionError("What was waited for did not come")

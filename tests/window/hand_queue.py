@@ -123,13 +123,16 @@ def under_load(blender: Any, name: str, rate: int, load: float) -> Iterator[floa
 
     if load:
         bpy.app.timers.register(burn)
-    process = draw(blender, WAVE)
-    yield from blender.until(lambda: bool(session(blender).strokes))
-    path: list[tuple[float, float]] = []
-    while session(blender).strokes:
-        path = [(sample.x, sample.y) for sample in session(blender).strokes[0].samples]
-        yield 0.02
-    yield from done(blender, process)
+    process, path = draw(blender, WAVE), []
+
+    def formed() -> bool:
+        strokes = session(blender).strokes
+        path[:] = [(sample.x, sample.y) for sample in strokes[0].samples] if strokes else path
+        return bool(path) and not strokes and process.poll() is not None
+
+    # A quick machine forms it in a quarter of a second.
+    yield from blender.until(formed, 0.02)
+    yield from blender.rounds()
     if load:
         bpy.app.timers.unregister(burn)
     yield from blender.settle()
