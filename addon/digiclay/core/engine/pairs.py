@@ -91,7 +91,11 @@ class HandSelection(Selection):
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
         """Take chosen cells out of the bed of a state whose set is released; see `Selection`."""
         taken = super().take(state, chosen)
-        taken.block[self.rows.pressing] = 0.0
+        near = taken.near if taken.reach else 0
+        pressing = taken.block[self.rows.pressing]
+        pressing[:, near:] = 0.0
+        if near:
+            pressing[:, :near] *= find_pairs(taken)
         return taken
 
 
@@ -131,9 +135,13 @@ class HandSystem(System):
 
     def move(self, active: ActiveSet, finger: Any) -> None:
         """Move active cells through a control period under their queued commands, in place."""
+        self.ready(active)(finger)
+
+    def ready(self, active: ActiveSet) -> Any:
+        """Return what moves active cells, made once for a set."""
         if self not in active.known:
             active.known[self] = HandMovement(self, active)
-        active.known[self](finger)
+        return active.known[self]
 
 
 class Pairs:
