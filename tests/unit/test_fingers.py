@@ -71,6 +71,8 @@ def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path):
     file.write_text(BED + ONE, encoding="utf-8")
     (finger,) = load(file, [Setting("fingertip.length", "0.009"), Setting("relaxation", "absent")]).fingers
     assert (finger.fingertip.length, finger.relaxation) == (9e-3, None)
+    with pytest.raises(SceneError, match=r"^--set: finger\.2\.contact must begin with .*has one fingertip"):
+        load(file, [Setting("finger.2.contact", "{}")])
 
 
 @pytest.mark.parametrize(
@@ -80,8 +82,8 @@ def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path):
         ("finger.2.fingertip.length", "0.009", (14e-3, 9e-3)),
         ("finger #1.fingertip.length", "0.009", (9e-3, 10e-3)),  # as describe and messages write it
         ("finger.1.fingertip", "{}", (10e-3, 10e-3)),
-        ("finger.3.fingertip.length", "9 mm", "3 must be a number from 1 to 2 here"),
-        ("finger.fingertip.length", "9 mm", "fingertip must be a number from 1 to 2 here"),
+        ("finger.3.fingertip.length", "9 mm", "finger.3 must be a number from 1 to 2 here"),
+        ("finger.fingertip.length", "9 mm", "finger.fingertip must be a number from 1 to 2 here"),
         ("finger.2.fingertip.lenght", "9 mm", "finger #2.fingertip.lenght must be a known key"),
         ("fingertip.length", "-9 mm", "finger #1.fingertip.length must be above 0 m"),
         ("finger.2.control.force_gain", "3", "finger #2.control must be a known key"),

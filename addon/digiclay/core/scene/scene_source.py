@@ -113,6 +113,9 @@ def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str
     whole = dict(table)
     for key, text, _ in settings:
         keys, value = split_key(key), _read_value(text)
+        if keys[0] == FINGERS and len(keys) > 1 and FINGERS not in whole:
+            rule = f"must begin with {', '.join(FINGER_SECTIONS[:-1])} or {FINGER_SECTIONS[-1]}"
+            raise ParameterError(key, "", f"{rule}: the scene has one fingertip", text)
         fingers = whole.get(FINGERS) if keys[0] in FINGER_SECTIONS else None
         if isinstance(fingers, list) and all(isinstance(finger, dict) for finger in fingers):
             whole[FINGERS] = [_replace(finger, keys, value) for finger in fingers]
@@ -126,18 +129,20 @@ def split_key(key: str) -> list[str]:
     return key.replace(" #", ".").split(".")
 
 
-def _replace(table: Any, keys: Sequence[str], value: Any) -> Any:
-    """Return a table with a value at nested keys; those of a list are numbers from 1 on."""
+def _replace(table: Any, keys: Sequence[str], value: Any, above: str = "") -> Any:
+    """Return a table with a value at nested keys below others; those of a list are numbers from 1 on."""
     if not keys:
         return value
     key, *rest = keys
+    below = f"{above}{key}."
     if isinstance(table, list):
         if not (key.isascii() and key.isdecimal() and 0 < int(key) <= len(table)):
-            raise ParameterError(key, "", f"must be a number from 1 to {len(table)} here", repr(key))
+            rule = f"must be a number from 1 to {len(table)} here"
+            raise ParameterError(below[:-1], "", rule, repr(key))
         place = int(key) - 1
-        return [*table[:place], _replace(table[place], rest, value), *table[place + 1 :]]
+        return [*table[:place], _replace(table[place], rest, value, below), *table[place + 1 :]]
     own = table if isinstance(table, dict) else {}
-    return {**own, key: _replace(own.get(key), rest, value)}
+    return {**own, key: _replace(own.get(key), rest, value, below)}
 
 
 @lru_cache(maxsize=1024)
