@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 #: Height of a fingertip that is not there, m; whatever is as high is simulated at next to no cost.
 PARKED = 1.0
-#: Height over the highest pin from which on a fingertip goes anywhere without touching, m; share of `growth`
-#: by which a pin that is felt comes in further a period.
-CLEAR, CREEP = 5e-3, 0.1
+#: Height over the highest pin from which on a fingertip goes anywhere without touching, m; how often a second
+#: a pin that is felt comes in by `growth`.
+CLEAR, CREEP = 5e-3, 20.0
 #: A finger is no farther aside from where it was named last, m, and m per s since, and no finger is nearer to
 #: another, m: what is farther has another one's name, or is none. Nothing tracked is farther from the bed, m.
 JUMP, PACE, APART, FAR = 6e-3, 0.25, 15e-3, 1e3
@@ -157,7 +157,7 @@ def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tupl
         goal[:, 2] += slip
     goal[~tracks.there, 2] = PARKED
     if tracking.coupling:
-        goal = give_way(goal, felt, tracking.coupling)
+        goal = give_way(goal, felt, tracking.coupling, time)
     there = held & (tracks.there | (felt.poses[:, 2] >= felt.peak + CLEAR))
     away = felt.poses.copy()
     away[:, 2] = PARKED
@@ -186,8 +186,8 @@ def _share(cutoff: float | Floats, time: float) -> float | Floats:
     return 1.0 / (1.0 + 1.0 / (2.0 * math.pi * time * cutoff))
 
 
-def give_way(goal: Floats, felt: Felt, coupling: float) -> Floats:
-    """Return the poses (f, 7) of fingertips on springs, N/m, from tracked ones.
+def give_way(goal: Floats, felt: Felt, coupling: float, time: float) -> Floats:
+    """Return the poses (f, 7) of fingertips on springs, N/m, from tracked ones, after a time, s.
 
     In balance with the force at the new height, which its stiffness foretells: no step is too long, and no
     force too large. A pin comes in by `growth`, then slowly: a fingertip goes over what stands in its way.
@@ -196,7 +196,7 @@ def give_way(goal: Floats, felt: Felt, coupling: float) -> Floats:
     meets, now = felt.meet(np.concatenate([goal, felt.poses])).reshape(2, -1)
     deep = np.maximum(now - here, 0.0)
     balanced = (coupling * height + felt.force + felt.stiffness * here) / (coupling + felt.stiffness)
-    lowest = meets - np.maximum(deep + CREEP * felt.growth, felt.growth)
+    lowest = meets - np.maximum(deep + CREEP * time * felt.growth, felt.growth)
     # The spring never pulls: clay does not stick to a fingertip.
     after[:, 2] = np.maximum(np.maximum(balanced, height), lowest)
     up = (lowest > here) & (np.linalg.norm(after[:, :3] - felt.poses[:, :3], axis=1) > felt.way)
