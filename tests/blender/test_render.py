@@ -129,6 +129,19 @@ def session(plane: Front) -> None:
     draw_force_plot(plane, time, 0.4 + 0.1 * np.sin(time), 0.4).show(15.92, 0.49)
 
 
+def test_several_fingertips_have_a_line_each_in_their_colors_up_to_the_instant() -> None:
+    plane, time = front(960, 600), np.linspace(0.0, 10.0, 51)
+    plot = draw_force_plot(plane, time, np.column_stack([0.4 + 0.0 * time, 0.1 + 0.02 * time]), 0.4, "forces")
+    plot.show(5.0, np.array([0.4, 0.2]))
+    assert "forces 0.20 to 0.40 N" in texts(plane)
+    one, two = (np.array([at.co for at in part.data.vertices])[1::2, 1] for part in plot.been)
+    assert two[[0, 25]] / one[[0, 25]] == pytest.approx([0.25, 0.5], rel=1e-6)  # of float32
+    assert not one[26:].any()
+    assert not two[26:].any()
+    colors = [tuple(part.data.materials[0].diffuse_color) for part in plot.been]
+    assert colors[0] != colors[1]
+
+
 def extent(plane: Front, part: Any) -> tuple[float, float, float, float]:
     """Return left, right, lower and upper edge of something on the plane, pixels from the middle."""
     plane.scene.view_layers[0].update()

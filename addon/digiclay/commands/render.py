@@ -164,8 +164,10 @@ def stage_moving(
     from ..pictures.film import stage_film, stage_turntable
 
     if isinstance(looks, Film):
-        number, worst = find_worst_finger(history, scene.set_point)
-        force = ("total force" if worst is history else f"force of finger {number}"), worst["total_force"]
+        _, worst = find_worst_finger(history, scene.set_point)
+        force = "total force", worst["total_force"]
+        if worst is not history:
+            force = "forces of fingertips", history["finger_force"]
         set_point = compute_metrics(worst, scene.set_point)["set_point"]
         return stage_film(history, looks, force, set_point=set_point, **sizes(scene))
     return stage_turntable(_find_instant(scene, history, looks, row), looks)

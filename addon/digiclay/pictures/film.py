@@ -106,7 +106,9 @@ def stage_film(
     history: Mapping[str, NDArray[Any]], looks: Film, plotted: tuple[str, Floats], *,
     set_point: float | None = None, **sizes: Any,
 ) -> Iterator[Shots]:  # fmt: skip
-    """Set the stage for the frames of a film. `plotted`: a force, (t,), N, and what it is called.
+    """Set the stage for the frames of a film.
+
+    `plotted`: what a force is called, and the force (t,), N, or the forces (t, f) of several fingertips.
 
     `sizes`: `pitch`, `actuator`, `finger` of `Instant.of`.
     """
@@ -129,7 +131,7 @@ def stage_film(
             row = int(rows[frame])
             view.show(bed, Instant.of(history, row, **sizes))
             if chart is not None:
-                chart.show(float(time[row]), float(force[row]))
+                chart.show(float(time[row]), force[row])
 
         yield Shots(scene, len(rows), show)
 

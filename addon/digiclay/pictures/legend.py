@@ -77,7 +77,7 @@ class Front:
         """Whether notes could be read."""
         return self.note >= READ_NOTE * self.pixel
 
-    def put(self, part: Any, x: float, y: float, color: Color, layer: int = 0) -> Any:
+    def put(self, part: Any, x: float, y: float, color: Color, layer: float = 0) -> Any:
         """Hang an object at a place of the plane; layers with a higher number lie behind."""
         behind = 1.0 + LAYER * layer
         part.parent = self.camera
@@ -166,89 +166,104 @@ def flat(name: str, color: Color) -> Any:
 SHARE, LETTERS = 0.20, 0.30
 #: Most columns the curve is drawn with.
 MOST = 600
-#: sRGB: the whole session's force, what of it has been, the set point, and what lies behind.
+#: sRGB: the whole session's force, what of it has been, the set point, and what lies behind; behind several.
 TO_COME, BEEN, ASKED, PAPER = (0.52, 0.57, 0.64), (0.00, 0.45, 0.70), (0.84, 0.37, 0.00), (0.93, 0.94, 0.95)
+DARK = (0.20, 0.22, 0.25)
 #: Least force the strip's height stands for, N.
 LEAST = 0.05
 
 
 @dataclass(frozen=True)
 class ForcePlot:
-    """Force plot of one film."""
+    """Force plot of one film: an area, or a line for each of several fingertips."""
 
     #: What the force is called.
     called: str
-    #: Objects that change from frame to frame.
-    been: Any
+    #: Objects that change from frame to frame, the first one for each curve.
+    been: Sequence[Any]
     cursor: Any
     force: Any
     time: Any
     #: (k,), where each column stands, plane units, and.
     place: Floats
-    #: (k,), how high it is.
-    height: Floats
+    #: (f, k), from where to where it reaches.
+    low: Floats
+    high: Floats
     #: Time of the left edge, s, and plane units of a second.
     first: float
     per_second: float
 
-    def show(self, time: float, force: float) -> None:
-        """Show an instant: its time, s, and the force then, N."""
+    def show(self, time: float, force: Any) -> None:
+        """Show an instant: its time, s, and the force then, N, or those (f,) of several fingertips."""
         now = (time - self.first) * self.per_second
         place = np.minimum(self.place, now)
-        # Columns still to come are drawn together at the cursor, as a face of no width.
-        flat = np.ascontiguousarray(_area(place, np.where(self.place <= now, self.height, 0.0)), np.float32)
-        self.been.data.vertices.foreach_set("co", flat.ravel())
-        self.been.data.update()
-        behind = self.cursor.location.z / self.been.location.z
-        self.cursor.location.x = (self.been.location.x + now) * behind
-        self.force.data.body = f"{self.called} {force:.2f} N"
+        for been, low, high in zip(self.been, self.low, self.high, strict=True):
+            # Columns still to come are drawn together at the cursor, as a face of no width.
+            ends = np.where(self.place <= now, (low, high), 0.0)
+            been.data.vertices.foreach_set("co", _area(place, *ends).astype(np.float32).ravel())
+            been.data.update()
+        behind = self.cursor.location.z / self.been[0].location.z
+        self.cursor.location.x = (self.been[0].location.x + now) * behind
+        forces = " to ".join(dict.fromkeys(f"{part:.2f}" for part in (np.min(force), np.max(force))))
+        self.force.data.body = f"{self.called} {forces} N"
         self.time.data.body = f"{time:.2f} s"
 
 
 def draw_force_plot(
     front: Front, time: Floats, force: Floats, set_point: float | None, called: str = "total force"
 ) -> ForcePlot:
-    """Draw the strip of a session: times (t,), s, forces (t,) and set point, N, and what they are called."""
+    """Draw the strip of a session: times (t,), s, forces (t,) and set point, N, and what they are called.
+
+    Forces (t, f) of several fingertips have a line each, in their colors.
+    """
     left, right = LEFT * front.width, -LEFT * front.width
     bottom = -0.95 * front.height
     full = 2.0 * SHARE * front.height
     rise = (1.0 - LETTERS) * full
     top = max(LEAST, 1.1 * float(force.max()), 1.4 * (set_point or 0.0))
-    moments, highest = reduce_columns(time, force)
+    thick = max(0.010 * full, 0.5 * front.pixel)
+    several, columns = force.ndim > 1, force.reshape(len(force), -1)
+    paper, ink = (DARK, PAPER) if several else (PAPER, INK)
+    moments, highest = reduce_columns(time, columns)
     lasts = max(float(time[-1] - time[0]), 1e-9)
-    place, height = (moments - time[0]) * ((right - left) / lasts), highest * (rise / top)
-    front.box("strip", (left, bottom), (right, bottom + rise), PAPER, 5)
-    areas = []
+    place, high = (moments - time[0]) * ((right - left) / lasts), highest.T * (rise / top)
+    low = np.zeros_like(high)
+    if several:  # a line that is steep reaches to the columns beside it
+        beside = np.clip(np.arange(len(place)) + np.array([[-1], [0], [1]]), 0, len(place) - 1)
+        low = np.maximum(high[:, beside].min(axis=1) - 3.0 * thick, 0.0)
+    front.box("strip", (left, bottom), (right, bottom + rise), paper, 6)
     corners = np.arange(len(place) - 1)[:, None] * 2 + [0, 2, 3, 1]
     faces: list[tuple[int, ...]] = [tuple(face) for face in corners.tolist()]
-    for name, color, layer in (("to come", TO_COME, 4), ("been", BEEN, 3)):
-        area = bpy.data.objects.new(name, bridge.mesh(name, (_area(place, height), faces)))
-        areas.append(front.put(area, left, bottom, color, layer))
-    thick = max(0.010 * full, 0.5 * front.pixel)
+    been = []
+    for curve, ends in enumerate(zip(low, high, strict=True)):
+        color, behind = palettes.finger_color(curve + 1) if several else BEEN, curve / len(high)
+        for name, own, layer in (("to come", TO_COME, 4), ("been", color, 3)):
+            part = bpy.data.objects.new(name, bridge.mesh(name, (_area(place, *ends), faces)))
+            area = front.put(part, left, bottom, own, layer + behind)
+        been.append(area)
     size = front.readable(0.80 * front.letter)
     above = bottom + rise + 0.35 * size
     if set_point is not None:
         at = bottom + set_point * rise / top
-        front.box("set point", (left, at - thick), (right, at + thick), ASKED, 2)
+        front.box("set point", (left, at - thick), (right, at + thick), ASKED, 5 if several else 2)
         front.write(f"set point {set_point:.2f} N", size, 0.0, above, ASKED, "CENTER")
-    cursor = front.box("cursor", (left, bottom), (left + 1.5 * thick, bottom + rise), INK, 1)
+    cursor = front.box("cursor", (left, bottom), (left + 1.5 * thick, bottom + rise), ink, 1)
     label = front.write(called, size, left, above, INK)
     moment = front.write("time", size, right, above, FADED, "RIGHT")
-    return ForcePlot(
-        called, areas[1], cursor, label, moment, place, height, float(time[0]), (right - left) / lasts
-    )
+    start, rate = float(time[0]), (right - left) / lasts
+    return ForcePlot(called, been, cursor, label, moment, place, low, high, start, rate)
 
 
 def reduce_columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:
-    """Return times and forces of at most so many columns, each with its largest force."""
+    """Return times and forces (t[, f]) of at most so many columns, each with its largest force."""
     count = len(time)
     starts = np.unique(np.linspace(0, count, min(count, most), endpoint=False).astype(np.intp))
-    return time[starts], np.maximum.reduceat(force, starts)
+    return time[starts], np.maximum.reduceat(force, starts, axis=0)
 
 
-def _area(place: Floats, height: Floats) -> Floats:
+def _area(place: Floats, low: Floats, high: Floats) -> Floats:
     """Return the lower and upper end of every column, alternating, (2 k, 3)."""
     points = np.zeros((2 * len(place), 3))
     points[:, 0] = np.repeat(place, 2)
-    points[1::2, 1] = height
+    points[::2, 1], points[1::2, 1] = low, high
     return points
