@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .doors import Doors
 from .protocol import name_flags, pack_frame
-from .served_session import PartWriter, Session, aim, follow, make_frame, record, reset, work_ahead
+from .served_session import PartWriter, Session, aim, follow, make_frame, record, reset
 
 #: Rounding errors of times count as whole periods when they are below this share of one.
 SLACK = 1e-6
@@ -157,7 +157,6 @@ def run_session(
             lateness.count(began - begin)
         if writer:
             session = _keep(session, writer, room, tell)
-        session = work_ahead(session)
     gc.unfreeze()
     _hand_over(session, writer)
     figures = {

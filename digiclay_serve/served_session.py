@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputError
-from digiclay.core.engine.simulation import begin, select_due, trace_fingers
+from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
 from digiclay.core.model.contact import Contact
@@ -178,18 +178,10 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
         back = go_back(session, session.kept)
         tracks = begin_tracks(back.poses)
         return replace(back, diverged=session.diverged + 1, refused=targets, tracks=tracks)
-    return replace(after, poses=ends, number=number, behind=not np.array_equal(ends, goals))
-
-
-def work_ahead(session: Session) -> Session:
-    """Keep the state, and select the active cells of several fingers, where it is due: while nobody waits."""
-    system, state = session.system, session.state
-    if state.period - session.kept.period >= KEEP / system.period:
-        session = replace(session, kept=_keep(session))
-    if system.fingers == 1:
-        return session
-    here = session.poses[None, None]
-    return replace(session, state=select_due(system, state, lambda: trace_fingers(system, here)[0]))
+    after = replace(after, poses=ends, number=number, behind=not np.array_equal(ends, goals))
+    if after.state.period - session.kept.period < KEEP / system.period:
+        return after
+    return replace(after, kept=_keep(after))
 
 
 def _keep(session: Session) -> Moment:

@@ -11,7 +11,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError
-from digiclay.core.engine.active_set import Selection
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
@@ -29,7 +28,6 @@ from digiclay_serve.served_session import (
     make_frame,
     record,
     reset,
-    work_ahead,
 )
 from digiclay_serve.tracked_fingers import PARKED
 from tests.scene_files import left
@@ -176,7 +174,7 @@ def test_a_session_that_diverges_goes_back_and_does_not_go_there_again() -> None
     session = record(begin_session(scene), 1000)
     high = session.poses
     for _ in range(15):  # a state is kept in between
-        session = work_ahead(follow(session, high, 1, 1))
+        session = follow(session, high, 1, 1)
     deep = np.array([[0.0, 0.0, 0.03, 1.0, 0.0, 0.0, 0.0]])
     for _ in range(100):
         session = session if session.diverged else follow(session, deep, 2, 1)
@@ -195,31 +193,6 @@ def taken(session: Session) -> Take:
     take = make_take(session.scene, session.recording, snapshot.dump(session.system, session.state))
     assert take is not None
     return take
-
-
-@pytest.mark.parametrize("fingers", [1, 3])
-@pytest.mark.parametrize("method", ["virtual_master", "cell_states", "hybrid"])
-def test_what_is_done_while_nobody_waits_changes_no_bit_and_is_not_done_again(
-    method: str, fingers: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    selected, select = [], Selection.choose
-    monkeypatch.setattr(Selection, "choose", lambda self, *given: selected.append(1) or select(self, *given))
-    scene = load(find("ridge_mound_valley"), [Setting("control.method", method)])
-    ends, waited = [], 0
-    for ahead in (False, True):
-        session = begin_session(replace(scene, fingers=scene.fingers * fingers))
-        for period in range(140):
-            selected.clear()
-            x = np.linspace(-0.02, 0.02, fingers) + 1e-5 * period
-            places = np.column_stack([x, 0.3 * x, np.full(fingers, 0.039)])
-            session = follow(session, np.hstack([places, np.tile(DOWN[:, 3:], (fingers, 1))]), period, 1)
-            # At first fingertips go far, and patches grow.
-            waited += ahead and period > 60 and bool(selected)
-            session = work_ahead(session) if ahead else session
-        ends.append(snapshot.dump(session.system, session.state))
-    assert ends[0] == ends[1]
-    # The cells of a single finger are those its path asks for.
-    assert bool(waited) == (fingers == 1)
 
 
 def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path: Path) -> None:

@@ -91,11 +91,7 @@ class HandSelection(Selection):
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
         """Take chosen cells out of the bed of a state whose set is released; see `Selection`."""
         taken = super().take(state, chosen)
-        near = taken.near if taken.reach else 0
-        pressing = taken.block[self.rows.pressing]
-        pressing[:, near:] = 0.0
-        if near:
-            pressing[:, :near] *= find_pairs(taken)
+        taken.block[self.rows.pressing] = 0.0
         return taken
 
 
@@ -135,13 +131,9 @@ class HandSystem(System):
 
     def move(self, active: ActiveSet, finger: Any) -> None:
         """Move active cells through a control period under their queued commands, in place."""
-        self.ready(active)(finger)
-
-    def ready(self, active: ActiveSet) -> Any:
-        """Return what moves active cells, made once for a set."""
         if self not in active.known:
             active.known[self] = HandMovement(self, active)
-        return active.known[self]
+        active.known[self](finger)
 
 
 class Pairs:

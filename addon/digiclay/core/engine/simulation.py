@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,25 +71,8 @@ def _are_finite(numbers: Floats) -> bool:
     return all(map(_are_finite, parts))
 
 
-def select_due(system: System, state: State, standing: Callable[[], Any]) -> State:
-    """Return a state, used up, whose active cells are selected anew if that is due.
-
-    By where several fingers are `standing` as a period begins: it may be done before their path is known.
-    """
-    if state.period < state.active.until:
-        return state
-    # What a controller remembers of a cell may change as it locates the fingers.
-    touched = system.sensors.read(state.copy().active.touched, state.period)
-    _, discs = system.controller.locate(state.memory, touched)
-    state = system.selection.update(state, standing(), discs)
-    system.ready(state.active)
-    return state
-
-
-def simulate_period(system: System, state: State, finger: Any) -> State:
+def simulate_period(system: System, state: State, finger: FingerPeriod | None) -> State:
     """Simulate one control period of a run, or of a batch, in the arrays of `state`."""
-    if finger and system.fingers > 1:
-        state = select_due(system, state, finger.stand)
     sensors, controller, period = system.sensors, system.controller, state.period
     memory, disc = controller.locate(state.memory, sensors.read(state.active.touched, period))
     state = system.selection.update(state, finger, disc)

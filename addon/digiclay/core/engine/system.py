@@ -53,18 +53,14 @@ class System:
 
     def move(self, active: ActiveSet, finger: FingerPeriod | None) -> None:
         """Move active cells through a control period under their queued commands, in place."""
-        movement = self.ready(active)
+        movement = active.movements.get(self.plan)
+        if movement is None:
+            movement = active.movements[self.plan] = self.prepare(active)
         if finger and active.near:
             under = finger.under(active.touched.quadratic_basis)
         else:
             under = np.empty((self.instants.size, 0, *active.cells.shape[1:]))
         active.touched.force[:] = movement(under)
-
-    def ready(self, active: ActiveSet) -> Any:
-        """Return what moves active cells, made once for a set."""
-        if self.plan not in active.movements:
-            active.movements[self.plan] = self.prepare(active)
-        return active.movements[self.plan]
 
     def prepare(self, active: ActiveSet) -> Movement:
         """Prepare to move active cells as often as their set serves."""

@@ -4,8 +4,6 @@ The pulp's memory belongs to a pair of fingertip and cell, so a cell has the fil
 the other. Where two fingertips meet over a cell, their forces add.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -60,9 +58,6 @@ class HandPath:
     paths: tuple[FingerPath, ...]
     windows: Floats
     """(t, 6, f)."""
-    touch: HandTouch
-    poses: Floats
-    """(t, p, f, 7)."""
 
     def __post_init__(self) -> None:
         self._ahead = Ahead()
@@ -85,11 +80,6 @@ class HandPeriod(NamedTuple):
     number: int
     window: Window
     """(6, f)."""
-
-    def stand(self) -> HandPeriod:
-        """Return a period in which the fingertips stay where they are as this one begins."""
-        path, now = self.path, slice(self.number, self.number + 1)
-        return trace_hands(path.touch, path.poses[now, :1])[0]
 
     def under(self, bases: Places) -> Floats:
         """Return the undersides over each finger's places, one after the other, (p, k), m."""
@@ -116,5 +106,5 @@ def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
             traced[i] = FingerPath(0, whole.forms[own], whole.join[own], whole.windows[own])
     paths = tuple(traced[i] for i in range(len(tips)))
     windows = np.stack([np.array(path.windows) for path in paths], axis=-1)
-    path = HandPath(paths, windows, touch, poses)
+    path = HandPath(paths, windows)
     return [HandPeriod(path, number, window) for number, window in enumerate(windows)]
