@@ -40,7 +40,9 @@ class Server:
         """Return a client's connection."""
         header = {"Authorization": f"Bearer {token}"} if token else {}
         address = f"ws://127.0.0.1:{self.port}/{wishes}"
-        return connect(address, additional_headers=header, compression=None, **options)
+        return connect(
+            address, additional_headers=header, compression=None, **{"close_timeout": 1.0, **options}
+        )
 
     def count(self, name: str) -> int:
         """Return a count of the doors."""

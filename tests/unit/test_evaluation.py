@@ -372,7 +372,8 @@ def give_slowly(number: int) -> Any:
     return SlowToSend()
 
 
-def test_a_scheduler_that_is_gone_ends_a_series_in_one_line():
+def test_a_scheduler_that_is_gone_ends_a_series_in_one_line(monkeypatch):
+    monkeypatch.setattr("digiclay.commands.cluster.PATIENCE", 3.0)
     with cluster_here(1) as other:
         address = other.scheduler_address
         with open_cluster(address, lambda: False, silent) as cluster:
