@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from digiclay.core.scene.assembly import assemble
+from digiclay.core.session.run_scene import run
 
-from benchmarks.several_fingers import PRESSED, TURN, feel, land, make_scene, measure_near, trace
+from benchmarks.several_fingers import TURN, make_scene, measure_near
 
 
 @pytest.mark.parametrize(
@@ -26,28 +26,29 @@ from benchmarks.several_fingers import PRESSED, TURN, feel, land, make_scene, me
         ("hybrid", "up beside down, 12", 1.1, 1.5),
         # Pins whose pulp one has pressed long carry nothing, until the other presses them.
         ("hybrid", "sinks beside a drag, 12", TURN, 1.5),
-        ("hybrid", "sinks beside a drag, 12", 4.0, 1.5),
+        ("hybrid", "sinks beside a drag, 12", 4.0, 2.0),
         ("hybrid", "approach and part, 6", TURN, 1.2),
         ("cell_states", "parallel, 18", TURN, 1.1),
-        # Not yet as alone: the fingertip that sinks beside the hill is felt late.
-        ("cell_states", "up beside down, 18", TURN, 1.2),
+        ("cell_states", "up beside down, 18", TURN, 1.1),
+        ("cell_states", "up beside down, 15", 2.0, 1.1),
+        ("cell_states", "crossing, 11", TURN, 1.1),
     ],
 )
 def test_no_finger_is_stolen_by_another_one_that_comes_near(
     method: str, case: str, turn: float, most: float
 ) -> None:
     together, alone = measure_near(method, case, turn)
-    assert together.largest < 2.0  # N: what fingers were measured up to
-    for own, single in zip(together.rfd, alone, strict=True):
-        assert own <= most * single.rfd[0]
+    for own, single in zip(together, alone, strict=True):
+        assert own["max_total_force"] < 2.0  # N: what fingers were measured up to
+        assert own["rfd"] <= most * single["rfd"]
 
 
 @pytest.mark.parametrize("turn", [TURN, 1.1, 2.0])
-def test_on_a_bed_of_a_few_pins_a_force_comes_to_rest_after_a_tremor(turn: float) -> None:
-    made = make_scene("hybrid", 1, 20)
-    system = assemble(replace(made, layout=replace(made.layout, pitch=6e-3)))
-    path = trace([[*land(0.4, 0.7), (4.0, 0.4, 0.7, PRESSED)]], system.period, turn)
-    path[400:403, 0, 2] += 0.2e-3  # for 15 ms
-    force = feel(system, path).force[500:600, 0]
+@pytest.mark.parametrize("pitch", [3e-3, 6e-3])
+def test_on_a_bed_of_a_few_pins_a_force_comes_to_rest_after_a_tremor(pitch: float, turn: float) -> None:
+    # Later ones end on coarse beds in a swing of 5 %: see docs/hybrid.md.
+    heights = {0.0: 43.0, 0.5: 38.5, 1.995: 38.5, 2.0: 38.7, 2.01: 38.7, 2.015: 38.5, 4.0: 38.5}  # s, mm
+    made = make_scene("hybrid", [[(time, 0.4, 0.7, z) for time, z in heights.items()]], 20, turn)
+    force = run(replace(made, layout=replace(made.layout, pitch=pitch))).history["total_force"][500:600]
     # A hundredth of the set point; it swung by 30 to 39 mN, from period to period.
     assert force.std() < 4e-3
