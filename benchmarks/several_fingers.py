@@ -30,7 +30,7 @@ PLACES = [(x, y) for y in (-18.0, 18.0) for x in (0.0, 15.0, -15.0, 30.0, -30.0)
 METHODS = ("", "virtual_master", "cell_states", "hybrid")
 #: Speed of all drags and rises, mm/s; height of a lifted, a sunk and a pressing fingertip, mm: one that is
 #: 2 mm higher Method II does not follow.
-DRAG, RISE, UP, DOWN, PRESSED = 10.0, 6.0, 48.0, 34.0, 36.5
+DRAG, RISE, UP, DOWN, PRESSED = 10.0, 6.0, 46.0, 32.0, 36.5
 #: All cases are turned and shifted, rad and m: along the rows of pins symmetry would hide faults.
 TURN, SHIFT = 0.3, (0.7e-3, -0.4e-3)
 #: From when on the force is judged, s: then all fingertips have touched down.
