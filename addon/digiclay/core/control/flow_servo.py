@@ -22,6 +22,8 @@ from .drive import OPENINGS, find_free_speeds
 INSTANTS = 64
 #: Speeds smaller than this share of the free speed are none: a valve must not stay open for them.
 STILL = 1e-6
+#: Share of the speed without load below which a load leaves a pin so slow that it rises more slowly still.
+LOADED = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,8 @@ class FlowServo:
         per_span, band, slowest, none = self._numbers[error.shape]
         speed = error * per_span
         np.maximum(speed, fall, out=speed)
-        np.minimum(speed, rise, out=speed)
+        # Raised at full opening, a loaded pin presses harder than its reservoir lifts, and is let down again.
+        np.minimum(speed, np.minimum(rise, rise * rise * (1.0 / (LOADED * self.rise))), out=speed)
         still = np.abs(error) <= band
         still |= np.abs(speed) < slowest
         np.putmask(speed, still, none)
