@@ -126,15 +126,13 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
     )
 
 
-def feel(scene: Scene) -> list[dict[str, float | None]]:
+def feel(scene: Scene) -> list[Row]:
     """Return the metrics of each fingertip of a scene, from when on all have touched down."""
     judged = select_rows(run(scene).history, JUDGED, math.inf)
     return [compute_metrics(own, scene.set_point) for own in split_fingers(judged)]
 
 
-def measure_near(
-    method: str, name: str, turn: float = TURN
-) -> tuple[list[dict[str, float | None]], list[dict[str, float | None]]]:
+def measure_near(method: str, name: str, turn: float = TURN) -> tuple[list[Row], list[Row]]:
     """Return the metrics of the two fingertips of a case, turned, together and each alone."""
     both = make_scene(method, CASES[name], turn=turn)
     return feel(both), [feel(replace(both, fingers=(finger,)))[0] for finger in both.fingers]

@@ -26,7 +26,7 @@ from benchmarks.several_fingers import TURN, make_scene, measure_near
         ("hybrid", "up beside down, 12", 1.1, 1.5),
         # Pins whose pulp one has pressed long carry nothing, until the other presses them.
         ("hybrid", "sinks beside a drag, 12", TURN, 1.5),
-        ("hybrid", "sinks beside a drag, 12", 4.0, 2.0),
+        ("hybrid", "sinks beside a drag, 12", 4.0, 1.5),
         ("hybrid", "approach and part, 6", TURN, 1.2),
         ("cell_states", "parallel, 18", TURN, 1.1),
         ("cell_states", "up beside down, 18", TURN, 1.1),

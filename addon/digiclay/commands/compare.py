@@ -122,7 +122,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             with Bar(sys.stderr, method, scene.simulation.control_period, quiet=arguments.quiet) as bar:
                 done = run(replace(scene, recorder=Recorder()), progress=bar)
             measured[method] = done.figures | (_speeds(scene) if arguments.speed else {})
-            _, worst = find_worst_finger(done.history, scene.set_point)
+            worst = find_worst_finger(done.history, scene.set_point)
             wanted = find_set_point(scene.set_point, sum_cells(worst).following)
             forces[method] = worst["time"], worst["total_force"], wanted
             beyond[method] = done.metrics.get("beyond_a_finger", "")

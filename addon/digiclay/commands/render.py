@@ -164,7 +164,7 @@ def stage_moving(
     from ..pictures.film import stage_film, stage_turntable
 
     if isinstance(looks, Film):
-        _, worst = find_worst_finger(history, scene.set_point)
+        worst = find_worst_finger(history, scene.set_point)
         force = "total force", worst["total_force"]
         if worst is not history:
             force = "forces of fingertips", history["finger_force"]

@@ -85,17 +85,20 @@ class FlowServo:
 
     @cached_property
     def _numbers(self) -> Constants:
-        """What `serve` is made with: one over the span, 1/s; the dead band, m; the slowest speed, m/s; 0."""
-        return Constants((1.0 / self.span, self.dead_band, STILL * self.rise, 0.0))
+        """What `serve` is made with: one over the span, 1/s; the dead band, m; the slowest speed, m/s; 0;
+        and one over the speed of a loaded pin, s/m.
+        """
+        slowest, loaded = STILL * self.rise, LOADED * self.rise
+        return Constants((1.0 / self.span, self.dead_band, slowest, 0.0, 1.0 / loaded))
 
     def serve(self, error: Floats, limits: Floats, force: Floats, speeds: Floats) -> Floats:
         """Return commands (m,) for errors off the coast (m,), m; speeds (q, m) get theirs in place."""
         fall, rise = limits
-        per_span, band, slowest, none = self._numbers[error.shape]
+        per_span, band, slowest, none, per_loaded = self._numbers[error.shape]
         speed = error * per_span
         np.maximum(speed, fall, out=speed)
         # Raised at full opening, a loaded pin presses harder than its reservoir lifts, and is let down again.
-        np.minimum(speed, np.minimum(rise, rise * rise * (1.0 / (LOADED * self.rise))), out=speed)
+        np.minimum(speed, np.minimum(rise, rise * rise * per_loaded), out=speed)
         still = np.abs(error) <= band
         still |= np.abs(speed) < slowest
         np.putmask(speed, still, none)

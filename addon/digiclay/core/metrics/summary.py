@@ -367,16 +367,14 @@ def take_worst(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | 
     return worst
 
 
-def find_worst_finger(
-    history: Mapping[str, Any], set_point: SetPoint | None
-) -> tuple[int, Mapping[str, Any]]:
-    """Return number, from 1 on, and history of the finger with the largest RFD, or, without any, force."""
+def find_worst_finger(history: Mapping[str, Any], set_point: SetPoint | None) -> Mapping[str, Any]:
+    """Return the history of the finger with the largest RFD, or, without any, force."""
 
-    def judge(one: tuple[int, Mapping[str, Any]]) -> tuple[float, float]:
-        found = compute_metrics(one[1], set_point)
+    def judge(own: Mapping[str, Any]) -> tuple[float, float]:
+        found = compute_metrics(own, set_point)
         return found["rfd"] or 0.0, found["max_total_force"] or 0.0
 
-    return max(enumerate(split_fingers(history), 1), key=judge)
+    return max(split_fingers(history), key=judge)
 
 
 #: All cells.
