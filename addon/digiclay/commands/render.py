@@ -62,7 +62,7 @@ OPTIONS: Options = {
     "--stop T": (seconds, "last instant of the film, s"),
     "--strip": {
         "action": argparse.BooleanOptionalAction,
-        "help": "plot of the total force over time; default: in films",
+        "help": "plot of the force over time, a line a fingertip; default: in films",
     },
 }  # fmt: skip
 #: What a picture is called by default.

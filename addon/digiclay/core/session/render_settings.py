@@ -76,7 +76,7 @@ class Film(Moving):
     """Session, or a part of it, from its recorded states."""
 
     arrows: bool = quantity(True, "whether arrows show the force on each pin")
-    strip: bool = quantity(True, "whether a strip in the picture shows the total force over time")
+    strip: bool = quantity(True, "whether a strip in the picture shows the force of each fingertip over time")
     speed: float = quantity(1.0, "simulated seconds shown in a second of film", at_least=1e-3, at_most=1e3)
     start: float = quantity(0.0, "simulated time of the first frame", unit="s", at_least=0.0, at_most=1e6)
     stop: float = quantity(
