@@ -205,7 +205,8 @@ def make_fingertip(collection: Any, bed: Any, number: int = 1, palm: Any = None)
     """Make a fingertip of a bed, or of a palm on it: an empty that is moved, in it an ellipsoid."""
     # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
     # of the device, kept in the ellipsoid's scale.
-    made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=palm or bed)
+    name = "Digital Clay Fingertip" + f" {number}" * (number > 1)
+    made = marked(None, name, FINGERTIP, collection, parent=palm or bed)
     hold_fingertip(bed, number, made)
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"

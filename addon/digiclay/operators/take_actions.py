@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,12 @@ class ExportTake(FileAction, bpy.types.Operator):
         take = takes.read(bed_of(context), entry.number)
         # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
         file = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".toml"))
-        write_whole(file, format_scene(to_scene(take, entry.name)).encode())
+        scene = to_scene(take, entry.name)
+        numbers = takes.list_fingers(bed_of(context), entry.number, len(take.scene.fingers))
+        if len(numbers) > 1 and numbers[-1] > len(numbers):  # a scene file counts its own from 1 on
+            were = "The fingers are these fingertips of the bed: " + ", ".join(map(str, numbers))
+            scene = replace(scene, description=were)
+        write_whole(file, format_scene(scene).encode())
         self.report({"INFO"}, localize("{} written to {}", entry.name, file))
 
 

@@ -5,6 +5,7 @@ A scene is made of them and of nothing else, so what the panels show is what is 
 
 import json
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -25,16 +26,19 @@ from .shown_units import convert_units
 _NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
 
 
-def relabel(error: ParameterError) -> ParameterError:
-    """Return an error of the core with its owner, field, rule and value as the panels show them."""
+def relabel(error: ParameterError, numbers: Sequence[int]) -> ParameterError:
+    """Return an error of the core as the panels show its owner, the number of a fingertip, rule and value."""
 
     def labeled(found: re.Match[str]) -> str:
         return f"{title(found[1])}: {title(found[2])}" if found[2] in _known(found[1]) else found[0]
 
-    owner, field = error.owner, title(error.field)
+    *finger, owner = re.split(rf"^{FINGERS} #(\d+)\.", error.owner)
+    field = title(error.field)
     if owner in SECTIONS:
         owner = f"{title(owner)}: {field}" if field else title(owner)
         field = ""
+    if finger:
+        owner = f"Fingertip {numbers[int(finger[-1]) - 1]}: {owner}"
     rule = convert_units(_NAME.sub(labeled, error.rule))
     return ParameterError(owner, field, rule, convert_units(error.value), error.hint)
 
@@ -86,7 +90,7 @@ def read_scene(bed: Any) -> Scene:
     try:
         return resolve(table_of(bed))
     except ParameterError as error:
-        raise relabel(error) from None
+        raise relabel(error, tuple(fingertips_of(bed))) from None
 
 
 def table_of(bed: Any) -> dict[str, Any]:
@@ -99,14 +103,15 @@ def table_of(bed: Any) -> dict[str, Any]:
     fingers: list[dict[str, Any]] = [{} for _ in each]
     for section in SECTIONS:
         holders = zip(each, fingers, strict=True) if section in FINGER_PARTS else [(settings, table)]
-        for own, part in holders:
+        for row, (own, part) in enumerate(holders, 1):
+            owner = f"{FINGERS} #{row}.{section}" if section in FINGER_PARTS and len(each) > 1 else section
             if section in OPTIONAL and not getattr(settings, f"use_{section}"):
                 part[section] = ABSENT
             elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
                 continue
             elif section != "blister" or formed:
                 kind, notes = import_parameters(section, method), _notes(own).get(_key(section, method), {})
-                values = read(part_group(own, section), kind, notes, section)
+                values = read(part_group(own, section), kind, notes, owner)
                 part[section] = {key: _path(value) for key, value in values.items()}
     if settings.use_control:
         table["control"]["method"] = method

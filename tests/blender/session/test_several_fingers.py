@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge, roles
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import COLORS
 from digiclay.core.scene.scene_source import load
 from digiclay.device import parts, unit
@@ -19,6 +20,7 @@ from digiclay.overlay import views
 from digiclay.recorded import takes
 from digiclay.roles import fingertips_of
 from digiclay.sessions import running, sculpting
+from digiclay.settings import properties
 from digiclay.strokes.stroke import make_images
 
 from tests.blender.at_hand import looked, select
@@ -225,8 +227,8 @@ def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_thei
         np.testing.assert_allclose(size, tip[bridge.AXES], rtol=1e-5)
 
 
-def test_a_take_moves_the_fingertips_it_is_of_though_another_one_has_come_between(
-    pair: Any, clock: Clock
+def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_after_a_take(
+    pair: Any, clock: Clock, tmp_path: Path
 ) -> None:
     bpy.ops.digiclay.add_fingertip()
     bpy.data.objects.remove(fingertips_of(pair)[2])
@@ -236,6 +238,15 @@ def test_a_take_moves_the_fingertips_it_is_of_though_another_one_has_come_betwee
     press(pair, clock, 3)
     tick.stop(pair.session_uid)
     select(pair)
+    bpy.ops.digiclay.take_export(filepath=str(tmp_path / "take.toml"))  # a scene file counts from 1 on
+    assert load(tmp_path / "take.toml").description.endswith(": 1, 3")
+    third = fingertips_of(pair)[3]
+    assert third.name.endswith("Fingertip 3")
+    for typed in ("0.1, 0.2", "soft"):
+        usual, third.digiclay.relaxation.weights = third.digiclay.relaxation.weights, typed
+        with pytest.raises(ParameterError, match=r"^Fingertip 3: Relaxation: Weights must "):
+            properties.scene_of(pair)
+        third.digiclay.relaxation.weights = usual
     bpy.ops.digiclay.add_fingertip()
     looked()
     before = bridge.poses(pair)
