@@ -72,18 +72,22 @@ class Columns:
         self.double, self.copies = find_copies(self.flat)
         # Of cells in several columns: the fingers these are of, (c, g), and their places, (2, g), m.
         self.named, self.places = self.finger[self.copies], basis[1:3, self.double]
+        # Of each cell the one command, or one of those for it.
+        self.obeyed = np.empty(basis.shape[1], np.intp)
+        self.obeyed[self.flat] = np.arange(self.flat.size)
         self._basis = basis
 
     @cached_property
-    def padded(self) -> tuple[Flags, Cells, Floats]:
-        """The columns side by side, (w, f): which entries are cells; the cells; their basis, (6, w, f)."""
+    def padded(self) -> tuple[Cells, Flags, Floats, Cells]:
+        """The columns side by side, (w, f): cells; entries that are none; basis, (6, w, f); all cells' places."""
         sizes = np.count_nonzero(self.inside, axis=1)
-        present = np.arange(sizes.max())[:, None] < sizes
-        cells = np.zeros(present.shape, np.intp)
-        cells.T[present.T] = self.flat
+        absent = np.arange(sizes.max())[:, None] >= sizes
+        cells = np.zeros(absent.shape, np.intp)
+        cells.T[~absent.T] = self.flat
         basis = self._basis[:, cells]
-        basis[:, ~present] = OUTSIDE
-        return present, cells, basis
+        basis[:, absent] = OUTSIDE
+        finger, place = (~absent.T).nonzero()
+        return cells, absent, basis, place * len(sizes) + finger
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,22 +124,14 @@ class HandControl:
     def locate(self, memory: Hands, touched: Measurement) -> tuple[Hands, Any]:
         """Divide the pressed pins among the fingers, and let each controller take in its own."""
         (pressed,) = touched.force.nonzero()
-        owner, shares = np.full(touched.force.size, NOBODY), np.zeros((len(self.runs), 0))
-        divided = None
+        owner, under, divided = np.full(pressed.size, NOBODY), np.zeros((len(self.runs), 0)), None
         if pressed.size:
-            basis, force = touched.quadratic_basis[:, pressed], touched.force[pressed]
-            who = touched.pressing[:, pressed].argmax(axis=0)
-            under = self._predict_under(memory, basis)
+            under = self._predict_under(memory, touched.quadratic_basis.take(pressed, 1))
             if self._predicts:
                 under[under > touched.height[pressed] + REACHED] = np.inf
-            owner[pressed] = self._find_new(basis, force, find_lowest(under), who)
-            shares, known = self._share(under, owner[pressed], touched, pressed)
-            if self._predicts:
-                # What a finger that is not found yet presses would draw the estimates of the others to it.
-                shares[:, owner[pressed] == NOBODY] = 0.0
-                shares[:, ~known] = HIDDEN
-            divided = touched.cells[pressed], owner[pressed]
-        located = self.locate_each(memory.fingers, touched, owner, pressed, shares)
+            owner = self._find_new(touched, pressed, find_lowest(under))
+            divided = touched.cells[pressed], owner
+        located = self.locate_each(memory.fingers, touched, pressed, owner, under)
         discs = [disc for _, disc in located]
         return Hands(
             tuple(own for own, _ in located), tuple(disc or NO_DISC for disc in discs), divided
@@ -144,22 +140,19 @@ class HandControl:
     def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
         """Let each controller command the pins around its finger; of two for one pin obey one."""
         columns = self.arrange("all", seen)
-        double, shares = columns.double, np.ones((len(self.runs), seen.force.size))
         # What stands in one column alone is no other finger's; nor is what is free, if no underside is known.
-        owner = np.full(double.size, NOBODY)
-        if self._predicts and double.size:
-            owner, shares[:, double] = self._claim(memory, seen, double)
+        owner, shares = np.full(columns.double.size, NOBODY), None
+        if self._predicts and owner.size:
+            owner, shares = self._claim(memory, seen, columns.double)
         elif memory.pressed:
-            (pins, of), cells = memory.pressed, seen.cells[double]
+            (pins, of), cells = memory.pressed, seen.cells[columns.double]
             at = np.minimum(pins.searchsorted(cells), pins.size - 1)
             owner = np.where(pins[at] == cells, of[at], NOBODY)
-            shares[:, double] = self._hide(owner)
-        fingers, given = self.command_each(memory.fingers, seen, shares, columns)
+        fingers, given = self.command_each(memory.fingers, seen, columns, owner, shares)
         memory = memory._replace(fingers=tuple(fingers), pressed=None)
-        chosen = np.empty(seen.target.size, np.intp)
-        chosen[columns.flat] = np.arange(columns.flat.size)
-        if double.size:
-            chosen[double] = self._choose(memory, seen, owner, columns, given.target)
+        chosen = columns.obeyed.copy()
+        if owner.size:
+            chosen[columns.double] = self._choose(memory, seen, owner, columns, given.target)
         # What is remembered of a pin's command is that of the command obeyed, for all fingers.
         count = int(self.runs[0].rows)
         for row in getattr(self.runs[0], "pin_rows", ()):
@@ -167,15 +160,23 @@ class HandControl:
         return memory, Commands(given.target[chosen], given.mode[chosen], given.command[chosen])
 
     def locate_each(
-        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells, shares: Floats
+        self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
     ) -> list[tuple[Any, Disc | None]]:
-        """Return memory and disc of each finger; `owner` (m,) of the cells; `shares` of those `pressed`."""
+        """Return memory and disc of each finger; pressed cells (q,), their owners, undersides (f, q), m."""
         raise NotImplementedError
 
     def command_each(
-        self, memory: tuple[Any, ...], seen: Measurement, shares: Floats, columns: Columns
+        self,
+        memory: tuple[Any, ...],
+        seen: Measurement,
+        columns: Columns,
+        owner: Cells,
+        shares: Floats | None,
     ) -> tuple[list[Any], Commands]:
-        """Return the memories, and commands for the cells of all columns, one after the other."""
+        """Return the memories, and commands for the cells of all columns, one after the other.
+
+        Cells in several columns have owners, (g,), and are seen in shares, (f, g); None: those of `_hide`.
+        """
         raise NotImplementedError
 
     def _claim(self, memory: Hands, seen: Measurement, double: Cells) -> tuple[Cells, Floats]:
@@ -209,7 +210,9 @@ class HandControl:
         known = np.ones(pins.size, np.bool_)
         if self._predicts:
             height = measured.height[pins]
-            (both,) = (np.count_nonzero(under < height + UNCLEAR, axis=0) > 1).nonzero()
+            (both,) = (np.add.reduce(under < height + UNCLEAR, axis=0) > 1).nonzero()
+            if not both.size:
+                return shares, known
             forces = np.maximum(height[both] - under[:, both], 0.0)
             rows = measured.own[:, pins[both]].reshape(len(self.runs), int(self.runs[0].rows), both.size)
             for run, alike in self._alike:
@@ -264,19 +267,19 @@ class HandControl:
         under[far] = np.inf
         return under
 
-    def _find_new(self, basis: Floats, force: Floats, owner: Cells, who: Cells) -> Cells:
-        """Return the owners of pressed pins, those of new fingers among them: about the strongest forces.
-
-        `who` presses a pin is but the name of the new one, so that figures of finger and controller agree.
-        """
+    def _find_new(self, touched: Measurement, pressed: Cells, owner: Cells) -> Cells:
+        """Return the owners of pressed pins, those of new fingers among them: about the strongest forces."""
+        left, seeds = np.where(owner == NOBODY, touched.force[pressed], 0.0), []
+        if left.max() < self.felt:
+            return owner
         free = [i for i in range(len(self.runs)) if not (owner == i).any()]
-        left, seeds = np.where(owner == NOBODY, force, 0.0), []
+        x, y = touched.quadratic_basis[1:3, pressed]
         while free and left.max() >= self.felt:
             strongest = int(left.argmax())
-            named = int(who[strongest])
+            # Who presses is but the name of the new one, so that figures of finger and controller agree.
+            named = int(touched.pressing[:, pressed[strongest]].argmax())
             finger = free.pop(free.index(named) if named in free else 0)
-            x, y = basis[1:3, strongest]
-            apart = np.hypot(basis[1] - x, basis[2] - y)
+            apart = np.hypot(x - x[strongest], y - y[strongest])
             apart[apart > NEW * self.capture[finger]] = np.inf
             np.putmask(left, apart < np.inf, 0.0)
             seeds.append((finger, apart))
@@ -332,10 +335,10 @@ class HandTogether(HandControl):
     """The method's of all of them."""
 
     def locate_each(
-        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells, shares: Floats
+        self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see the pressed cells, without the forces on those of the others."""
-        own = owner[pressed, None] == self._sizes[0].T
+        own = owner[:, None] == self._sizes[0].T
         columns = touched._replace(
             quadratic_basis=touched.quadratic_basis[:, pressed, None],
             height=touched.height[pressed, None],
@@ -344,28 +347,29 @@ class HandTogether(HandControl):
         return list(zip(*self.together.locate(list(memory), columns), strict=True))
 
     def command_each(
-        self, memory: tuple[Any, ...], seen: Measurement, shares: Floats, columns: Columns
+        self,
+        memory: tuple[Any, ...],
+        seen: Measurement,
+        columns: Columns,
+        owner: Cells,
+        shares: Floats | None,
     ) -> tuple[list[Any], Commands]:
         """Let each command its column, without the forces on cells of the others."""
-        (present, at, basis), count = columns.padded, int(self.runs[0].rows)
-        fingers = np.arange(len(self.runs))
-        rows = np.arange(count)[:, None, None] + count * fingers
-        own = seen.own[rows, at]
-        shown = Measurement(
-            basis,
-            seen.height[at],
-            np.where(present, seen.force[at] * np.maximum(shares[fingers, at], 0.0), 0.0),
-            seen.target[at],
-            seen.mode[at],
-            own,
-            seen.cells[at],
-        )
+        (at, absent, basis, back), count = columns.padded, int(self.runs[0].rows)
+        fingers, who = np.arange(len(self.runs)), np.full(seen.force.size, NOBODY)
+        who[columns.double] = owner
+        of = who[at]
+        hidden = of != fingers
+        hidden &= of != NOBODY
+        hidden |= absent
+        force = seen.force[at]
+        np.putmask(force, hidden, 0.0)
+        own = seen.own[np.arange(count)[:, None, None] + count * fingers, at]
+        shown = Measurement(basis, seen.height[at], force, seen.target[at], seen.mode[at], own, seen.cells[at])
         after, orders = self.together.command(list(memory), shown)
-        if count:
-            finger, place = present.T.nonzero()
-            for row in range(count):
-                seen.own[row + count * finger, columns.flat] = own[row, place, finger]
-        return after, Commands(*(np.ascontiguousarray(one.T)[present.T] for one in orders))
+        for row in range(count):
+            seen.own[row + count * columns.finger, columns.flat] = own[row].take(back)
+        return after, Commands(*(one.take(back) for one in orders))
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,17 +377,22 @@ class HandInGroups(HandControl):
     """Controller of several fingers, for other methods; those `sort`ed alike are served together, if any."""
 
     def locate_each(
-        self, memory: tuple[Any, ...], touched: Measurement, owner: Cells, pressed: Cells, shares: Floats
+        self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see its column without the cells of the others, and what it presses elsewhere."""
-        fingers = np.arange(len(self.runs))[:, None]
-        seen, parts = np.zeros((len(self.runs), owner.size), np.bool_), np.ones((len(self.runs), owner.size))
+        shares, known = self._share(under, owner, touched, pressed)
+        if self._predicts:
+            # What a finger that is not found yet presses would draw the estimates of the others to it.
+            shares[:, owner == NOBODY] = 0.0
+            shares[:, ~known] = HIDDEN
+        shape = len(self.runs), touched.force.size
+        seen, parts = np.zeros(shape, np.bool_), np.ones(shape)
         if touched.discs is not None:
             followed = np.array([own.place is not None for own in memory])[:, None]
-            free = (owner == NOBODY) | (owner == fingers)
-            seen = self.arrange("touched", touched).inside & free & followed
+            seen = self.arrange("touched", touched).inside & followed
+            seen[:, pressed] &= self._hide(owner) > 0.0
         parts[:, pressed] = shares
-        seen[:, pressed] |= (owner[pressed] != NOBODY) & (shares > 0.0)
+        seen[:, pressed] |= (owner != NOBODY) & (shares > 0.0)
         seen[:, pressed] &= shares != HIDDEN
         located: dict[int, tuple[Any, Disc | None]] = {}
         finger, cells = seen.nonzero()
@@ -398,11 +407,18 @@ class HandInGroups(HandControl):
         return [located[i] for i in range(len(memory))]
 
     def command_each(
-        self, memory: tuple[Any, ...], seen: Measurement, shares: Floats, columns: Columns
+        self,
+        memory: tuple[Any, ...],
+        seen: Measurement,
+        columns: Columns,
+        owner: Cells,
+        shares: Floats | None,
     ) -> tuple[list[Any], Commands]:
         """Let each command its column, without the forces on cells of the others."""
         finger, cells = columns.finger, columns.flat
-        parts = shares[finger, cells]
+        whole = np.ones((len(self.runs), seen.force.size))
+        whole[:, columns.double] = self._hide(owner) if shares is None else shares
+        parts = whole[finger, cells]
         force = seen.force[cells] * np.maximum(parts, 0.0)
         fingers = list(memory)
         given = Commands(np.empty(cells.size), np.empty(cells.size, np.int8), np.empty(cells.size))
