@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import TINY, Cells, Flags, Floats, find_copies
+from ..base.arrays import TINY, Cells, Flags, Floats, any_true, find_copies
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.fingertip import JOIN
 from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .finger_sections import Sections, Whole
+from .travel import measure_square
 
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
 CAPTURE = 1.2
@@ -186,19 +187,25 @@ class HandControl:
         a blister raised it to its top, is that fingertip's. Where one blister would press it into another's
         fingertip, and not the other way round, it is the other's alone: it cannot be high for the one.
         """
-        basis = seen.quadratic_basis[:, double]
+        basis = seen.quadratic_basis.take(double, 1)
         under = self._predict_under(memory, basis)
         owner = find_lowest(under)
         shares, _ = self._share(under, owner, seen, double)
-        x, y, radius, ground, top = self._find_blisters(memory)[..., None]
-        inside = np.hypot(basis[1] - x, basis[2] - y) <= radius
-        tops = np.where(inside, np.maximum(top, ground), -np.inf)
-        low, second = np.partition(under, 1, axis=0)[:2]
-        harms = tops > np.where(under == low, second, low)
-        harms &= ~(harms | np.isinf(under)).all(axis=0)
-        shares = np.where(harms, HIDDEN, shares)
-        claimed = (seen.force[double] != 0.0) | (tops > low).any(axis=0)
-        return np.where(claimed, find_lowest(np.where(harms, np.inf, under)), NOBODY), shares
+        others = under.copy()
+        others[owner, np.arange(owner.size)] = np.inf
+        low, second = np.minimum.reduce(under), np.minimum.reduce(others)
+        x, y, radius, ground, top = self._find_blisters(memory)
+        inside = measure_square(x, y, basis) <= (radius * np.abs(radius))[:, None]
+        tops = np.where(inside, np.maximum(top, ground)[:, None], -np.inf)
+        harms = tops > low
+        claimed = (seen.force[double] != 0.0) | np.logical_or.reduce(harms)
+        harms &= (under > low) | (tops > second)
+        harms &= ~np.logical_and.reduce(harms | np.isinf(under))
+        if any_true(harms):
+            np.putmask(shares, harms, HIDDEN)
+            np.putmask(under, harms, np.inf)
+            owner = find_lowest(under)
+        return np.where(claimed, owner, NOBODY), shares
 
     def _share(self, under: Floats, owner: Cells, measured: Measurement, pins: Cells) -> tuple[Floats, Flags]:
         """Return the shares of fingers in the forces of pins (q,), (f, q), and of which pins they are known.
@@ -244,11 +251,8 @@ class HandControl:
 
     def _predict_under(self, memory: Hands, basis: Floats) -> Floats:
         """Return the undersides of fingers over pins, (f, q), m; infinite where one is not near."""
-        places = np.array([own.place or (BEYOND, BEYOND) for own in memory.fingers])[:, :, None]
-        square, other = basis[1:3, None] - places.transpose(1, 0, 2)
-        square *= square
-        other *= other
-        square += other
+        places = np.array([own.place or (BEYOND, BEYOND) for own in memory.fingers])
+        square = measure_square(*places.T, basis)
         _, size, reach = self._sizes
         far: Flags = square > reach
         if not self._predicts:
@@ -365,7 +369,9 @@ class HandTogether(HandControl):
         force = seen.force[at]
         np.putmask(force, hidden, 0.0)
         own = seen.own[np.arange(count)[:, None, None] + count * fingers, at]
-        shown = Measurement(basis, seen.height[at], force, seen.target[at], seen.mode[at], own, seen.cells[at])
+        shown = Measurement(
+            basis, seen.height[at], force, seen.target[at], seen.mode[at], own, seen.cells[at]
+        )
         after, orders = self.together.command(list(memory), shown)
         for row in range(count):
             seen.own[row + count * columns.finger, columns.flat] = own[row].take(back)
