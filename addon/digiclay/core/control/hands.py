@@ -70,9 +70,14 @@ class Columns:
             own[more] = True
         self.inside = inside
         self.finger, self.flat = inside.nonzero()
-        self.double, self.copies = find_copies(self.flat)
-        # Of cells in several columns: the fingers these are of, (c, g), and their places, (2, g), m.
-        self.named, self.places = self.finger[self.copies], basis[1:3, self.double]
+        # Cells (g,) in several columns; these (p,) entries; which of them are each cell's, (c, g).
+        self.double, copies = find_copies(self.flat)
+        self.pairs, inverse = np.unique(copies, return_inverse=True)
+        self.copies = inverse.reshape(copies.shape)
+        # Of the entries: their fingers, which of the cells in several columns, and their places, (2, p), m.
+        self.named = self.finger[self.pairs]
+        self.which = self.double.searchsorted(self.flat[self.pairs])
+        self.places = basis[1:3, self.double[self.which]]
         # Of each cell the one command, or one of those for it.
         self.obeyed = np.empty(basis.shape[1], np.intp)
         self.obeyed[self.flat] = np.arange(self.flat.size)
@@ -80,7 +85,7 @@ class Columns:
 
     @cached_property
     def padded(self) -> tuple[Cells, Flags, Floats, Cells]:
-        """The columns side by side, (w, f): cells; entries that are none; basis, (6, w, f); all cells' places."""
+        """The columns side by side, (w, f): cells; which are none; basis, (6, w, f); where all are."""
         sizes = np.count_nonzero(self.inside, axis=1)
         absent = np.arange(sizes.max())[:, None] >= sizes
         cells = np.zeros(absent.shape, np.intp)
@@ -251,8 +256,8 @@ class HandControl:
 
     def _predict_under(self, memory: Hands, basis: Floats) -> Floats:
         """Return the undersides of fingers over pins, (f, q), m; infinite where one is not near."""
-        places = np.array([own.place or (BEYOND, BEYOND) for own in memory.fingers])
-        square = measure_square(*places.T, basis)
+        places = [own.place for own in memory.fingers]
+        square = measure_square(*np.array([place or (BEYOND, BEYOND) for place in places]).T, basis)
         _, size, reach = self._sizes
         far: Flags = square > reach
         if not self._predicts:
@@ -265,7 +270,7 @@ class HandControl:
             return heights
         under = np.full(square.shape, np.inf)
         for run, alike in self._alike:
-            own = [i for i in alike if memory.fingers[i].place]
+            own = [i for i in alike if places[i]]
             if own:
                 under[own] = run.predict_under([memory.fingers[i] for i in own], basis)
         under[far] = np.inf
@@ -298,7 +303,7 @@ class HandControl:
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
     ) -> Cells:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
-        copies, fingers, (x, y) = columns.copies, columns.named, columns.places
+        fingers, which, (x, y) = columns.named, columns.which, columns.places
         at_x, at_y, radius, ground, _ = self._find_blisters(memory)
         limits = radius * np.abs(radius), UNDER**2 * self._sizes[2][:, 0]
         at_x, at_y, ground, edge, under = np.array((at_x, at_y, ground, *limits)).take(fingers, axis=1)
@@ -306,14 +311,15 @@ class HandControl:
         square += (y - at_y) ** 2
         inside = square <= edge
         # Outside of all blisters pins are led, or left as they are; of two the nearer one is obeyed.
-        asked = target.take(copies)
-        aside = np.where(asked == seen.target.take(columns.double), -1.0, -0.5)
+        asked = target.take(columns.pairs)
+        aside = np.where(asked == seen.target.take(columns.double).take(which), -1.0, -0.5)
         off = np.where(inside, np.abs(asked - ground), aside - square)
         # Under a fingertip its own blister is obeyed, and where it presses before all.
         inside &= square <= under
         off = np.where(inside, 1.0 - square, off)
-        off[owner == fingers] = 2.0
-        chosen: Cells = copies[off.argmax(axis=0), np.arange(owner.size)]
+        off[owner.take(which) == fingers] = 2.0
+        best = columns.copies[off.take(columns.copies).argmax(axis=0), np.arange(owner.size)]
+        chosen: Cells = columns.pairs[best]
         return chosen
 
     def arrange(self, part: str, seen: Measurement) -> Columns:
@@ -422,9 +428,8 @@ class HandInGroups(HandControl):
     ) -> tuple[list[Any], Commands]:
         """Let each command its column, without the forces on cells of the others."""
         finger, cells = columns.finger, columns.flat
-        whole = np.ones((len(self.runs), seen.force.size))
-        whole[:, columns.double] = self._hide(owner) if shares is None else shares
-        parts = whole[finger, cells]
+        parts, shares = np.ones(cells.size), self._hide(owner) if shares is None else shares
+        parts[columns.pairs] = shares[columns.named, columns.which]
         force = seen.force[cells] * np.maximum(parts, 0.0)
         fingers = list(memory)
         given = Commands(np.empty(cells.size), np.empty(cells.size, np.int8), np.empty(cells.size))
@@ -448,16 +453,17 @@ class HandInGroups(HandControl):
         `cells` (m,), those of each `finger` one after the other, with the `force` shown of each. What changes
         of the controllers' rows is kept as soon as the next fingers are asked for.
         """
-        counts = np.bincount(finger, minlength=len(self.runs))
+        counts, count = np.bincount(finger, minlength=len(self.runs)), int(self.runs[0].rows)
         groups: dict[Any, list[int]] = {}
         for i, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
             alike = run.sort(own) if counts[i] and hasattr(run, "sort") else None
             groups.setdefault(i if alike is None else (run, alike), []).append(i)
-        ends = np.cumsum(counts)
-        columns, rows_of = np.split(cells, ends[:-1]), np.split(seen.own, len(self.runs))
+        parts = Sections(counts.tolist()).parts
+        columns = [cells[part] for part in parts]
+        rows_of = [seen.own[i * count : (i + 1) * count] for i in range(len(columns))]
         for first, *more in groups.values():
             group = [first, *more]
-            chosen: Any = slice(ends[first] - counts[first], ends[first])
+            chosen: Any = parts[first]
             if more:
                 chosen = slice(None) if len(group) == len(memory) else np.isin(finger, group)
             at, sections = cells[chosen], Sections(counts[group].tolist())
@@ -491,11 +497,11 @@ def find_lowest(under: Floats) -> Cells:
 
 def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float, float]:
     """Return where a blister is, x, y and radius, m, below 0: none; the heights of its ground and top, m."""
-    x, y = memory.place or (BEYOND, BEYOND)
+    place = memory.place
+    x, y = place or (BEYOND, BEYOND)
     # That of a method without a master reaches from the pressed cells on.
-    radius = run.blister.radius + getattr(run.parameters, "jump", 0.0)
-    top = getattr(memory, "top", getattr(memory, "height", memory.edge))
-    return x, y, radius if memory.place else -1.0, memory.edge, top
+    radius = run.blister.radius + getattr(run.parameters, "jump", 0.0) if place else -1.0
+    return x, y, radius, memory.edge, getattr(memory, "top", getattr(memory, "height", memory.edge))
 
 
 def follows_finger(controller: Controller) -> bool:
