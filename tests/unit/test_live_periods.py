@@ -67,6 +67,12 @@ def test_as_much_is_simulated_as_time_goes_by():
     # More than the most is dropped and not made up for; the time of a pause does not count.
     counts, clock = looked([0.0, 10.0, 10.01], most=20)
     assert (counts, clock.factor) == ([0, 20, 2], pytest.approx(0.011, abs=1e-3))
+    # The time of an animation counts, whatever the wall's is; backwards, and until it ends.
+    clock, counts = Clock(), []
+    for time, moment in ((0.0, None), (0.01, 7.0), (0.5, 7.04), (0.6, 7.04), (0.7, 6.9), (0.71, None)):
+        count, clock = periods_due(clock, time, PERIOD, 20, moment)
+        counts.append(count)
+    assert counts == [0, 2, 8, 0, 20, 2]
     _, clock = looked([0.0, 0.02])
     assert looked([100.0, 100.01], clock=clock.stopped())[0] == [0, 2]
 

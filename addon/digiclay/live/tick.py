@@ -163,8 +163,9 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         poses = session.poses if session.strokes else bridge.poses(bed)
         if followed is not None and not session.strokes:
             poses = follow.place(session.uid, poses)
+        moment = find_moment(context) if followed is None else None
         later = sculpting.advance(
-            session, poses, now, most, view.picked_pins(bed), loop.find_interval(context)
+            session, poses, now, most, view.picked_pins(bed), loop.find_interval(context), moment
         )
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.poses)
@@ -184,6 +185,14 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         view.show_state(bed, later.system, later.state)
     if moved:  # One evaluation of pins and fingertip takes less time than one of each.
         _evaluate(context)
+
+
+def find_moment(context: Any) -> float | None:
+    """Return the time of the scene's frame, s, while an animation plays; None: none does."""
+    scene, screen = context.scene, context.screen
+    if screen is None or not screen.is_animation_playing:
+        return None
+    return float(scene.frame_current_final * scene.render.fps_base / scene.render.fps)
 
 
 def _visible_rows(session: Running) -> Floats:

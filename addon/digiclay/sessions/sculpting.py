@@ -113,11 +113,12 @@ def match_poses(poses: Floats, was: Numbers, others: Floats, numbers: Numbers) -
 
 def advance(
     running: Running, pose: Floats, now: float, most: int, pins: Sequence[int] | None = None,
-    interval: float = INTERVAL,
+    interval: float = INTERVAL, moment: float | None = None,
 ) -> Running:  # fmt: skip
     """Let a session follow the fingertip to a pose (7,) until `now`, s, monotonic; uses `running` up.
 
-    Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s.
+    Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s. `moment`:
+    time of an animation that plays, s.
     """
     if pins is not None:
         running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))
@@ -127,7 +128,7 @@ def advance(
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:
-        count, clock = live_session.periods_due(running.clock, now, running.system.period, most)
+        count, clock = live_session.periods_due(running.clock, now, running.system.period, most, moment)
     running = replace(running, clock=clock, steps=0)
     return follow_finger(running, pose, count) if count else running
 

@@ -7,12 +7,15 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from digiclay import bridge
+from digiclay.compat import curves
 from digiclay.core.session import snapshot
 from digiclay.live import beds
+from digiclay.recorded import bake
 from digiclay.roles import fingertip_of
-from digiclay.sessions import running
+from digiclay.sessions import running, sculpting
 
-from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
+from tests.blender.session.live import FLOAT32, TICK, Clock, exact, move, press, shown, started
 
 
 def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_session_is(
@@ -67,6 +70,45 @@ def test_the_bed_follows_a_fingertip_moved_by_other_means(bed: Any, clock: Clock
         clock.tick()
     clock.tick(5)
     assert exact(bed).min() < 39e-3
+
+
+#: A playback: time between two ticks, s, ticks from a frame that is shown to the next, and frames till then.
+PLAYBACKS = {
+    "in time": (TICK, 1.25, 1),
+    "at a tenth of the speed": (10.0 / 24.0, 1.0, 1),
+    "at a tenth of the speed, ticks between": (TICK, 12.5, 1),
+    "five of six frames left out": (6.0 / 24.0, 1.0, 6),
+}
+
+
+@pytest.mark.parametrize("how", PLAYBACKS)
+def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed: Any, clock: Clock, how: str) -> None:
+    wall, ticks, frames = PLAYBACKS[how]
+    tip, scene = fingertip_of(bed), bpy.context.scene
+    for frame, z in ((1, 46.0), (13, 37.0), (25, 37.0), (49, 43.0)):
+        tip.location.z = (z + 8.0) * 1e-3 * bridge.SCALE
+        tip.keyframe_insert("location", frame=frame)
+    for key in (key for group in curves(tip) for curve in group for key in curve.keyframe_points):
+        key.interpolation = "LINEAR"
+    scene.frame_set(1)
+    started(bed)
+    period = running.find(bed).system.period
+    *_, baked = bake.sample_path(scene, bed, 1, 49, period)
+    clock.tick(3)
+    bpy.ops.screen.animation_play()
+    clock.tick()
+    running.put(sculpting.set_recording(running.find(bed), True))
+    for count in range(int(ticks * 48 / frames) + 2):
+        scene.frame_set(min(1 + frames * int(count / ticks), 49))
+        clock.now += wall - TICK
+        assert clock.tick() == []
+    bpy.ops.screen.animation_cancel(restore_frame=False)
+    path = running.find(bed).recording.path
+    assert len(path) == len(baked)
+    # A frame lasts no whole number of periods: the way of one, at 18 mm/s, may be gone a period early.
+    np.testing.assert_allclose(path, baked, rtol=0, atol=18e-3 * period)
+    clock.tick(3)
+    assert len(running.find(bed).recording.path) == len(path) + 20  # 0.1 s by the wall's clock
 
 
 def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_other(

@@ -46,6 +46,8 @@ class Clock:
 
     seen: float | None = None
     """When the clock was last looked at, s; None: it starts with the next look."""
+    moment: float | None = None
+    """Time shown by an animation that played then, s; None: none did."""
     left: float = 0.0
     """Time gone by that is not simulated yet, less than a control period, s."""
     cost: float = 0.0
@@ -63,20 +65,29 @@ class Clock:
 
     def stopped(self) -> Clock:
         """Return the clock of a session that pauses: the time of the pause will not count."""
-        return replace(self, seen=None, left=0.0, spent=0.0, ticks=())
+        return replace(self, seen=None, moment=None, left=0.0, spent=0.0, ticks=())
 
 
-def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int, Clock]:
-    """Return how many control periods, s, to simulate now, s, at `most`, and the clock after them."""
+def periods_due(
+    clock: Clock, now: float, period: float, most: int, moment: float | None = None
+) -> tuple[int, Clock]:
+    """Return how many control periods, s, to simulate now, s, at `most`, and the clock after them.
+
+    `moment`: time of an animation that plays, s, which counts instead of the wall's: what is keyed moves as
+    fast as keyed, however slowly it is drawn, and without the rests between two frames.
+    """
     if clock.seen is None:
-        return 0, replace(clock, seen=now)
-    gone = max(0.0, now - clock.seen)
-    whole = math.floor((clock.left + gone) / period + SLACK)
+        return 0, replace(clock, seen=now, moment=moment)
+    gone = passed = max(0.0, now - clock.seen)
     affordable = max(1, int(SHARE * max(gone, SHORTEST) / clock.cost)) if clock.cost > 0.0 else most
-    count = max(0, min(whole, most, affordable))
-    left = max(0.0, clock.left + gone - whole * period)
+    limit = min(most, affordable)
+    if moment is not None and clock.moment is not None:
+        passed, limit = abs(moment - clock.moment), max(most, affordable)
+    whole = math.floor((clock.left + passed) / period + SLACK)
+    count = max(0, min(whole, limit))
+    left = max(0.0, clock.left + passed - whole * period)
     ticks = _extend_window(clock.ticks, gone, count * period)
-    return count, replace(clock, seen=now, left=left, spent=0.0, ticks=ticks)
+    return count, replace(clock, seen=now, moment=moment, left=left, spent=0.0, ticks=ticks)
 
 
 def _extend_window(ticks: Ticks, gone: float, done: float) -> Ticks:
@@ -96,7 +107,7 @@ def find_spare(clock: Clock, now: float, interval: float) -> float:
 
 def count_queue(clock: Clock, now: float, done: float, spent: float) -> Clock:
     """Return the clock after a queue's periods: simulated, and by the wall, s; a wait does not count."""
-    clock = replace(clock, left=0.0, spent=spent)
+    clock = replace(clock, moment=None, left=0.0, spent=spent)
     if done > 0.0:
         gone = spent if clock.seen is None else max(spent, now - clock.seen)
         clock = replace(clock, ticks=_extend_window(clock.ticks, gone, done))
