@@ -96,18 +96,19 @@ def begin_tracks(poses: Floats) -> Tracks:
 def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -> Tracks:
     """Return the tracks after a message: identities, none twice, and their poses (7,).
 
-    A known identity keeps its fingertip, a new one gets the first that is free; without any it waits. What is
-    elsewhere all at once counts as not named.
+    A known identity keeps its fingertip, a new one gets that of one gone from its place, or the first that is
+    free; without any it waits. What is elsewhere all at once counts as not named.
     """
     given = np.array([pose for _, pose in named]).reshape(-1, 7)
     given[:, :3] = given[:, :3].clip(-FAR, FAR)
     poses, ids = {one: given[row] for row, (one, _) in enumerate(named)}, tracks.identities.copy()
     unnamed, tracked, fresh = tracks.unnamed.copy(), tracks.tracked.copy(), np.zeros(len(ids), bool)
+    most = np.minimum(JUMP + PACE * unnamed, APART)
     _put_back_exchanged(ids, tracked, poses)
+    _hand_over(ids, tracked, poses, most)
     known = {identity: slot for slot, identity in enumerate(ids.tolist())}
     free = iter(np.flatnonzero(ids < 0).tolist())
     taken = {one: known[one] if one in known else next(free, None) for one in poses}
-    most = np.minimum(JUMP + PACE * unnamed, APART)
     found = {
         one: slot for one, slot in taken.items() if slot is not None
         and (ids[slot] < 0 or math.dist(poses[one][:2], tracked[slot, :2]) <= most[slot])
@@ -138,6 +139,19 @@ def _put_back_exchanged(ids: NDArray[np.int64], tracked: Floats, poses: Mapping[
     for _ in place:
         ring = place[ring]
     ids[known[place[ring]]] = ids[known[ring]]
+
+
+def _hand_over(ids: NDArray[np.int64], tracked: Floats, poses: Mapping[int, Floats], most: Floats) -> None:
+    """Give identities (f,) that are not named to new ones that are nearest to them, `most` (f,) m away."""
+    held = np.flatnonzero(ids >= 0)
+    new = [one for one in poses if one not in ids]
+    if not (new and held.size):
+        return
+    way = np.linalg.norm(np.array([poses[one][:3] for one in new])[:, None] - tracked[held, :3], axis=2)
+    for row, place in enumerate(way.argmin(axis=1).tolist()):
+        slot = held[place]
+        if ids[slot] not in poses and way[row, place] <= min(most[slot], way[:, place].min()):
+            ids[slot] = new[row]
 
 
 def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tuple[Tracks, Floats]:

@@ -41,6 +41,8 @@ class Stream:
     gone: tuple[float, float] = (0.0, 0.0)
     #: The hands have each other's identity.
     exchanged: tuple[float, float] = (0.0, 0.0)
+    #: The second hand has another identity when it is named again.
+    renamed: bool = False
     #: No message comes.
     silent: tuple[float, float] = (0.0, 0.0)
     #: Fingers besides, which are none.
@@ -58,7 +60,8 @@ class Stream:
                 shape(max(0.0, time - DELAY), side) + off + random.normal(0.0, JITTER, 3)
                 for side, off in zip((-1.0, 1.0), bias, strict=True)
             ]
-            names = (2, 1) if self.exchanged[0] <= time < self.exchanged[1] else (1, 2)
+            names = (1, 50) if self.renamed and time >= self.gone[1] else (1, 2)
+            names = names[::-1] if self.exchanged[0] <= time < self.exchanged[1] else names
             for hand, side in enumerate((-1.0, 1.0)):
                 places[hand][0] += side * self.beside * np.interp(time, [0.3, 0.6], [40e-3, 0.0])
                 places[hand][1] += self.astray * (round(time * self.rate) % 30 == 7 * hand) * 20e-3
@@ -117,6 +120,8 @@ STREAMS = {
     "two hands at 30 Hz": Stream(30.0),
     "two hands at 90 Hz": Stream(90.0),
     "dropouts of 60 ms, exchanged identities, hostile fingers": Stream(60.0, **WORSE),
+    "another identity after a dropout of 60 ms": Stream(60.0, gone=(4.0, 4.06), renamed=True),
+    "and in the next message, then exchanged": Stream(90.0, (5.0, 5.0), (6.0, 6.5), renamed=True),
     "hands that come from beside the bed": Stream(60.0, beside=True),
     "places that are none": Stream(60.0, astray=True),
 }

@@ -1,11 +1,9 @@
-"""Fingers with identities: requests, slots, clutch, filter, coupling; lines of a Quest and of touch pads."""
+"""Fingers with identities: requests; lines of a Quest and of touch pads."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +18,6 @@ from digiclay_serve.doors import LAYOUT, Order, make_slot, pack_order, unpack_or
 from digiclay_serve.hts import Hands
 from digiclay_serve.osc_door import read_osc, read_request
 from digiclay_serve.protocol import Bed, Poses, check_fingers, read_json
-from digiclay_serve.tracked_fingers import (
-    PARKED,
-    Felt,
-    Tracking,
-    advance,
-    begin_tracks,
-    give_way,
-    name_fingers,
-)
 from digiclay_serve.tuio import Pad
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -131,170 +120,6 @@ def test_an_order_keeps_what_is_alive_and_its_bytes_are_read_as_they_were_writte
     assert unpack_order(pack_order(order)) == order
     order, _ = order.name(Poses((), ()), 2)
     assert order.fingers == ()
-
-
-# From tracked to simulated
-
-
-def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.04) -> Felt:
-    """Return what fingertips feel, all the same."""
-    each = np.ones(len(poses))
-    forces = force * each, force * each, stiffness * each
-    return Felt(
-        np.array(poses, float),
-        *forces,
-        top * each,
-        5e-4,
-        top,
-        lambda there: np.full(len(there), top),
-        1.25e-3,
-    )
-
-
-def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]]]:
-    """Return fingers 1, 2, ... at places."""
-    return [(1 + row, (*place, *LEVEL)) for row, place in enumerate(places)]
-
-
-def test_a_finger_that_is_not_named_lifts_after_100_ms_and_its_fingertip_is_free() -> None:
-    simulated, tracks = np.tile([0.0, 0.0, 0.05, *LEVEL], (2, 1)), begin_tracks(np.zeros((2, 7)))
-    tracks = name_fingers(tracks, at((0.0, 0.0, 0.05), (0.02, 0.0, 0.05)))
-    lifted = []
-    for step in range(40):
-        if step in (5, 19):  # 70 ms without are a dropout that nobody feels
-            tracks = name_fingers(tracks, at((0.0, 0.0, 0.05))[:1])
-        tracks, targets = advance(tracks, Tracking(), felt(simulated), 5e-3)
-        lifted.append([bool(z == PARKED) for z in targets[:, 2]])
-    # At first it is not there either.
-    assert [both.index(True, 1) for both in zip(*lifted, strict=True)] == [38, 19]
-    tracks = name_fingers(tracks, [(9, (*PLACE, *LEVEL))])
-    assert tracks.identities.tolist() == [9, -1]
-
-
-EXCHANGED = [
-    ("two change places", (0.0, 0.04), (0.04, 0.0), (2, 1)),
-    ("neighbors change places", (0.0, 0.018), (0.017, 0.001), (2, 1)),
-    ("all go on as they were", (0.0, 0.018), (0.004, 0.022), (1, 2)),
-    ("they meet and part", (0.0, 0.018), (0.008, 0.010), (1, 2)),
-    ("they pass each other quickly", (0.0, 0.020), (0.0105, 0.0095), (1, 2)),
-    ("three go around", (0.0, 0.018, 0.036), (0.018, 0.036, 0.0), (3, 1, 2)),
-    ("two hands change places", (0.0, 0.018, 0.1, 0.118), (0.1, 0.118, 0.0, 0.018), (3, 4, 1, 2)),
-]
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "held"), [r[1:] for r in EXCHANGED], ids=[r[0] for r in EXCHANGED]
-)
-@pytest.mark.parametrize("turn", [0.0, 2.0])
-def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(
-    before: Any, after: Any, held: tuple[int, ...], turn: float
-) -> None:
-    way = np.array([math.cos(turn), math.sin(turn), 0.0])
-    start, now = ([tuple(np.array([0, 0, 0.04]) + x * way) for x in xs] for xs in (before, after))
-    poses = np.array([[*place, *LEVEL] for place in start])
-    tracks = name_fingers(begin_tracks(poses), at(*start))
-    tracks = replace(tracks, there=np.ones(len(start), bool))
-    tracks, targets = advance(name_fingers(tracks, at(*now)), Tracking(), felt(poses), 5e-3)
-    assert tuple(tracks.identities.tolist()) == held
-    assert np.linalg.norm(targets[:, :3] - poses[:, :3], axis=1).max() < 0.011  # of what each has moved
-
-
-@pytest.mark.parametrize("far", [0.02, 1e300])
-def test_a_finger_that_is_elsewhere_all_at_once_is_not_believed_and_rises_if_it_stays(far: float) -> None:
-    here, there, found = np.array([[0.0, 0.0, 0.038, *LEVEL]]), (far, 0.0, 0.038), []
-    tracks = replace(name_fingers(begin_tracks(here), at((0.0, 0.0, 0.038))), there=np.ones(1, bool))
-    for _ in range(20):
-        tracks, targets = advance(name_fingers(tracks, at(there)), Tracking(), felt(here), 5e-3)
-        found.append(targets[0, :3].tolist())
-    assert found == [[0.0, 0.0, 0.038]] * 19 + [[0.0, 0.0, PARKED]]
-    for _ in range(2):
-        tracks, targets = advance(name_fingers(tracks, at(there)), Tracking(), felt(here + 0.01), 5e-3)
-    assert targets[0, :3].tolist() == [min(far, 1e3), 0.0, 0.038]
-
-
-@pytest.mark.parametrize("bias", [-0.011, 0.0, 0.011, 1.06])
-def test_a_clutch_takes_away_any_bias_of_height_and_slips_where_the_hand_is_raised(bias: float) -> None:
-    tracks, heights = begin_tracks(np.array([[0.0, 0.0, PARKED, *LEVEL]])), []
-    for height in (0.060, 0.055, 0.045, 0.070, 0.060):
-        for step in range(2):  # at first it goes over its place, whose pins it feels then
-            tracks = name_fingers(tracks, at((0.0, 0.0, height + bias)))
-            pins = felt([[0, 0, 1.0, *LEVEL]], top=0.02 if step == 0 and not heights else 0.04)
-            tracks, targets = advance(tracks, Tracking(clutch=0.01), pins, 5e-3)
-        heights.append(float(targets[0, 2]))
-    assert heights == pytest.approx([0.05, 0.045, 0.035, 0.05, 0.04], abs=1e-12)
-
-
-def filtered(signal: Callable[[float], float], cutoff: float, seconds: float, step: float) -> np.ndarray:
-    """Return what the 1-euro filter makes of a height over time."""
-    tracks, found = begin_tracks(np.zeros((1, 7))), []
-    for time in np.arange(0.0, seconds, step):
-        tracks = name_fingers(tracks, at((0.0, 0.0, signal(time))))
-        tracks, targets = advance(tracks, Tracking(cutoff=cutoff), felt([[0, 0, 1.0, *LEVEL]]), step)
-        found.append(targets[0, 2])
-    return np.array(found[1:])
-
-
-@pytest.mark.parametrize("step", [1e-3, 5e-3])
-def test_the_filter_calms_a_trembling_hand_and_follows_a_quick_one(step: float) -> None:
-    still = filtered(lambda _: 0.05, 1.0, 0.5, step)
-    assert np.ptp(still) == 0.0
-    # A tremor of 0.1 mm at 10 Hz, of 4 mm/s, raises the cutoff of 1 Hz by 0.1 Hz at most: a tenth passes.
-    tremor = filtered(lambda time: 0.05 + 1e-4 * math.sin(20.0 * math.pi * time), 1.0, 4.0, step)[
-        -int(1.0 / step) :
-    ]
-    assert 0.08 < np.ptp(tremor) / 2e-4 < 0.13
-    # A hand at 0.1 m/s has a cutoff of 3 Hz: it is followed by 1 / (2 pi 3 Hz), 53 ms.
-    ramp = filtered(lambda time: 0.1 * time, 1.0, 4.0, step)
-    assert 0.1 * (4.0 - step) - ramp[-1] == pytest.approx(0.1 / (2.0 * math.pi * 3.0), rel=0.02)
-
-
-def test_a_turn_and_its_negative_are_one_to_the_filter() -> None:
-    turn = np.array([0.8, 0.0, 0.0, 0.6])
-    tracks = name_fingers(begin_tracks(np.zeros((1, 7))), [(1, (*PLACE, *turn))])
-    tracks = name_fingers(tracks, [(1, (*PLACE, *-np.array([0.6, 0.0, 0.0, 0.8])))])
-    _, targets = advance(tracks, Tracking(cutoff=1.0), felt([[0, 0, 1.0, *LEVEL]]), 5e-3)
-    assert 0.6 < targets[0, 3] < 0.8
-    assert 0.6 < targets[0, 6] < 0.8
-
-
-@pytest.mark.parametrize("deep", [1e-4, 1e-3, 5e-3, 20e-3])
-@pytest.mark.parametrize("far", [1.0, 4.0])
-def test_the_coupling_comes_to_its_balance_from_any_force(deep: float, far: float) -> None:
-    exponent, unit, spring = 2000.0, 0.5, 100.0  # of the whole fingertip's force, N; N/m
-
-    def press(height: float) -> float:
-        return unit * math.expm1(exponent * max(0.04 - height, 0.0))
-
-    height, forces = 0.04 - deep, []
-    for _ in range(200):
-        force = press(height)
-        forces.append(force)
-        # The stiffness that is foretold is up to four times too large: relaxed pulp.
-        contact = felt([[0, 0, height, *LEVEL]], force, far * exponent * (force + unit))
-        height = float(give_way(np.array([[0, 0, 0.03, *LEVEL]]), contact, spring, 5e-3)[0, 2])
-    balance = press(height)
-    assert max(forces[1:]) <= max(forces[0], 1.3 * balance)  # what it swings over when it lands
-    assert spring * (height - 0.03) == pytest.approx(balance, rel=1e-3)
-
-
-def test_a_coupled_fingertip_lands_a_growth_of_force_deep_and_then_goes_slowly() -> None:
-    contact = felt([[0, 0, 0.041, *LEVEL], [0, 0, 0.0385, *LEVEL]])
-    for time, then in ((5e-3, 0.03845), (1e-3, 0.03849)):
-        after = give_way(np.tile([0, 0, 0.03, *LEVEL], (2, 1)), contact, 100.0, time)
-        assert after[:, 2] == pytest.approx([0.0395, then], abs=1e-12)
-
-
-def test_a_coupled_fingertip_rises_before_it_goes_over_what_stands_in_its_way() -> None:
-    contact = felt([[0, 0, 0.04, *LEVEL]])._replace(meet=lambda at: np.where(at[:, 0] > 1e-3, 0.06, 0.04))
-    goal = np.array([[0.02, 0, 0.03, *LEVEL]])
-    assert give_way(goal, contact, 100.0, 5e-3)[0, :3].tolist() == [0.0, 0.0, 0.0595]
-    over = give_way(goal, contact._replace(poses=np.array([[0, 0, 0.0595, *LEVEL]])), 100.0, 5e-3)
-    assert over[0, :3].tolist() == [0.02, 0.0, 0.0595]
-
-
-def test_clay_does_not_stick_to_a_coupled_fingertip() -> None:
-    contact = felt([[0, 0, 0.04, *LEVEL]], 0.4, 4000.0)
-    assert give_way(np.array([[0, 0, 0.045, *LEVEL]]), contact, 50.0, 5e-3)[:, 2].tolist() == [0.045]
 
 
 # Lines of a Quest

@@ -183,14 +183,16 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
 def place(uid: int, poses: Floats) -> Floats:
     """Return the poses (f, 7) of a bed's fingertips with those of the server: one for each identity.
 
-    An identity that appears gets the first that has none; the fingertip of one that is gone is lifted.
+    An identity that appears gets that of one that is gone, whose place it may have taken, or else the first
+    that has none; the fingertip of one that is gone is lifted.
     """
     following, placed = SERVERS.by_bed[uid], poses.copy()
     before = (*following.seats, *[None] * len(poses))[: len(poses)]
     seats = [one if one in following.fingers else None for one in before]
     for one in following.fingers:
-        if one not in seats and None in seats:
-            seats[seats.index(None)] = one
+        free = [row for row, seat in enumerate(seats) if seat is None]
+        if one not in seats and free:
+            seats[min(free, key=lambda row: before[row] is None)] = one
     for row, (was, now) in enumerate(zip(before, seats, strict=True)):
         if now is not None:
             placed[row] = following.fingers[now]

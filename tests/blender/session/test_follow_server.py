@@ -109,7 +109,8 @@ def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
         (named((7, 0.041), (1, 0.039)), [(70.0, 41.0), (10.0, 39.0)]),
         (named((7, float("nan")), (1, 0.04)), [(70.0, 1000.0), (10.0, 40.0)]),
         ([named((1, 0.02))[1][:-4], named((1, 0.041))[1] + b"\0"], [(70.0, 1000.0), (10.0, 40.0)]),
-        (named(), [(0.0, 1000.0), (10.0, 1000.0)]),
+        (named((8, 0.042)), [(70.0, 1000.0), (80.0, 42.0)]),  # in the place of 1
+        (named(), [(0.0, 1000.0), (80.0, 1000.0)]),
     ]
     for datagrams, places in frames:
         arrived(server, address, *datagrams)
