@@ -63,7 +63,7 @@ class VirtualMasterBatch(VirtualMasterControl):
     lead = _decide_by_run(VirtualMasterControl.lead)
     find_disc = _decide_by_run(VirtualMasterControl.find_disc)
     is_active = _decide_by_run(VirtualMasterControl.is_active, any)
-    get_pose = _decide_by_run(VirtualMasterControl.get_pose, _gather)
+    get_pose = _decide_by_run(VirtualMasterControl.get_pose, lambda poses: np.array(list(poses)).T)
     set_edge = _decide_by_run(VirtualMasterControl.set_edge)
     get_heights = _decide_by_run(VirtualMasterControl.get_heights, _gather)
 

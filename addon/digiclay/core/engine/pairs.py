@@ -55,7 +55,7 @@ class HandSelection(Selection):
 
     def join(self, control: Any) -> Discs | None:
         """Return the controlled discs as arrays."""
-        return join_discs(control if isinstance(control, list) else [control])
+        return join_discs([control] if isinstance(control, tuple) else control)
 
     def pick(
         self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
