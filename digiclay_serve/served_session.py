@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputError
+from digiclay.core.control.travel import measure_square
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
@@ -126,18 +127,16 @@ def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, fl
 def feel(session: Session, time: float) -> Felt:
     """Return what the fingertips feel, by the laws of the first, before a time, s."""
     state, system, poses = session.state, session.system, session.poses
-    heights, pressed = state.row(0), state.row(system.rows.force) > 0.0
-    x, y = system.grid.positions.T
-    near = (x - poses[:, :1]) ** 2 + (y - poses[:, 1:2]) ** 2 < AROUND**2
+    basis, heights, forces = system.grid.basis, state.row(0), state.row(system.rows.force)
+    near, peak = measure_square(*poses[:, :2].T, basis) < AROUND**2, float(heights.max())
+    (cells,) = np.logical_or.reduce(near).nonzero()
+    near, basis, heights, forces = near[:, cells], basis[:, cells], heights[cells], forces[cells]
     first = session.scene.fingers[0]
     force, law, tip = state.finger_forces(), first.contact or Contact(), first.fingertip or Fingertip()
     # What grows is the tension: the force and what has relaxed of it meanwhile. Twice that never swings.
     tension = force + session.relaxed @ _read_pulp(session.scene)[0]
-    stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * (near & pressed).sum(1))
-    peak = float(heights.max())
-    top = np.where(near.any(1), np.where(near, heights, 0.0).max(1), peak)
-    cells = np.flatnonzero(near.any(0))
-    basis, heights = system.grid.compute_basis(cells), heights[cells]
+    stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * near @ (1.0 * (forces > 0.0)))
+    top = np.where(near.any(1), np.where(near, heights, 0.0).max(1, initial=0.0), peak)
 
     def meet(there: Floats) -> Any:
         under = compute_underside(*compute_forms(tip.outline(there)), basis)

@@ -101,21 +101,22 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     """
     given = np.array([pose for _, pose in named]).reshape(-1, 7)
     given[:, :3] = given[:, :3].clip(-FAR, FAR)
-    poses, ids = {one: given[row] for row, (one, _) in enumerate(named)}, tracks.identities.copy()
+    rows, ids = {one: row for row, (one, _) in enumerate(named)}, tracks.identities.copy()
     unnamed, tracked, fresh = tracks.unnamed.copy(), tracks.tracked.copy(), np.zeros(len(ids), bool)
     most = np.minimum(JUMP + PACE * unnamed, APART)
-    _put_back_exchanged(ids, tracked, poses)
-    _hand_over(ids, tracked, poses, most)
+    _put_back_exchanged(ids, tracked, rows, given)
+    _hand_over(ids, tracked, rows, given, most)
     known = {identity: slot for slot, identity in enumerate(ids.tolist())}
     free = iter(np.flatnonzero(ids < 0).tolist())
-    taken = {one: known[one] if one in known else next(free, None) for one in poses}
+    taken = {one: known[one] if one in known else next(free, None) for one in rows}
+    here, there = given[:, :2].tolist(), tracked[:, :2].tolist()
     found = {
         one: slot for one, slot in taken.items() if slot is not None
-        and (ids[slot] < 0 or math.dist(poses[one][:2], tracked[slot, :2]) <= most[slot])
+        and (one not in known or math.dist(here[rows[one]], there[slot]) <= most[slot])
     }  # fmt: skip
-    slots, now = [*found.values()], np.array([poses[one] for one in found]).reshape(-1, 7)
+    slots = [*found.values()]
     fresh[slots] = ids[slots] < 0
-    ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, now
+    ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, given[[rows[one] for one in found]]
     was = fresh[:, None]
     return replace(
         tracks, identities=ids, unnamed=unnamed, tracked=tracked, there=tracks.there & ~fresh,
@@ -124,10 +125,12 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     )  # fmt: skip
 
 
-def _put_back_exchanged(ids: NDArray[np.int64], tracked: Floats, poses: Mapping[int, Floats]) -> None:
-    """Put back identities (f,) that have changed places in a message."""
-    known = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in poses], np.intp)
-    now = np.array([poses[identity][:3] for identity in ids[known].tolist()]).reshape(-1, 3)
+def _put_back_exchanged(
+    ids: NDArray[np.int64], tracked: Floats, rows: Mapping[int, int], given: Floats
+) -> None:
+    """Put back identities (f,) that have changed places in a message: their rows in what is given."""
+    known = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in rows], np.intp)
+    now = given[[rows[identity] for identity in ids[known].tolist()], :3]
     own = np.linalg.norm(now - tracked[known, :3], axis=1)
     if own.max(initial=0.0) <= JUMP:
         return
@@ -141,16 +144,19 @@ def _put_back_exchanged(ids: NDArray[np.int64], tracked: Floats, poses: Mapping[
     ids[known[place[ring]]] = ids[known[ring]]
 
 
-def _hand_over(ids: NDArray[np.int64], tracked: Floats, poses: Mapping[int, Floats], most: Floats) -> None:
+def _hand_over(
+    ids: NDArray[np.int64], tracked: Floats, rows: Mapping[int, int], given: Floats, most: Floats
+) -> None:
     """Give identities (f,) that are not named to new ones that are nearest to them, `most` (f,) m away."""
     held = np.flatnonzero(ids >= 0)
-    new = [one for one in poses if one not in ids]
+    named = set(ids.tolist())
+    new = [one for one in rows if one not in named]
     if not (new and held.size):
         return
-    way = np.linalg.norm(np.array([poses[one][:3] for one in new])[:, None] - tracked[held, :3], axis=2)
+    way = np.linalg.norm(given[[rows[one] for one in new], None, :3] - tracked[held, :3], axis=2)
     for row, place in enumerate(way.argmin(axis=1).tolist()):
         slot = held[place]
-        if ids[slot] not in poses and way[row, place] <= min(most[slot], way[:, place].min()):
+        if int(ids[slot]) not in rows and way[row, place] <= min(most[slot], way[:, place].min()):
             ids[slot] = new[row]
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Cells, Flags, Floats, any_true, find_copies
-from ..model.fingers import HandPeriod, HandTouch
+from ..model.fingers import HandPeriod, HandTouch, gather_places
 from ..model.fingertip import compute_reach
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
 from ..model.physics import Cell
@@ -142,10 +142,10 @@ class Pairs:
     def __init__(self, system: HandSystem, active: ActiveSet, fingers: list[int], others: Cells) -> None:
         cell, rows, width = system.cells[fingers[0]], system.rows, active.cells.size
         inside = find_pairs(active) if active.near else np.zeros((system.fingers, 0), np.bool_)
-        near = active.quadratic_basis[:, : active.near]
-        self.bases = [(finger, near[:, inside[finger]]) for finger in fingers if any_true(inside[finger])]
         finger, self.cells = (part.astype(np.intp) for part in inside[fingers].nonzero())
         self.fingers = np.array(fingers)[finger]
+        self.places = gather_places(inside[fingers], active.quadratic_basis[:, : active.near])
+        self.places = self.places._replace(fingers=np.array(fingers)[self.places.fingers])
         self.columns = columns = np.concatenate([self.cells, others])
         filters = np.arange(cell.pulp_rows.start, cell.pulp_rows.stop)[:, None]
         common = [0, *range(system.rows.physics)[system.cell.lag_rows], *range(rows.count)[rows.commands]]
@@ -166,8 +166,8 @@ class Pairs:
         np.take(flat, self.index, out=self.own, mode="clip")  # another mode copies
         before, forces = self.own.copy(), flat.take(self.forces)
         under = np.empty((instants, 0))
-        if self.bases and finger is not None:
-            under = finger.under(self.bases)
+        if self.cells.size and finger is not None:
+            under = finger.under(self.places)
         after = self.move(under)
         flat[self.forces] = after
         flat[self.filters] = self.own[self.pulp, :count]

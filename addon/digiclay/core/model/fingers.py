@@ -11,15 +11,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats
-from .fingertip import Window
+from ..base.arrays import Cells, Flags, Floats
+from .fingertip import Fingertip, Window, compute_underside
 from .interfaces import Pulp
-from .touch import Ahead, FingerPath, Touch, trace_finger
+from .touch import Ahead, Touch, trace_finger
 
-#: Fingers, and for each the basis of places, (6, k), see `FingerPath.under`.
-Places = list[tuple[int, Floats]]
 #: Most fingers of a scene.
 MOST_FINGERS = 32
+
+
+class Places(NamedTuple):
+    """Places under g fingers, which have up to w each."""
+
+    fingers: Cells
+    basis: Floats
+    """(g, 6, w): See `FingerPath.under`; places that make up the number are any."""
+    at: Cells
+    """(k,): Which of all g w are places, those of the first finger first."""
+
+
+def gather_places(inside: Flags, basis: Floats) -> Places:
+    """Return which of places with a basis (6, k) are under each of the fingers that have any, (f, k)."""
+    (fingers,) = inside.any(axis=1).nonzero()
+    sizes = np.count_nonzero(inside[fingers], axis=1)
+    present = np.arange(sizes.max(initial=0)) < sizes[:, None]
+    cells = np.zeros(present.shape, np.intp)
+    cells[present] = inside[fingers].nonzero()[1]
+    return Places(fingers, np.ascontiguousarray(np.moveaxis(basis[:, cells], 0, 1)), np.flatnonzero(present))
 
 
 @dataclass(frozen=True)
@@ -50,27 +68,36 @@ class HandTouch(Touch):
     each: tuple[Touch, ...]
     """Those of the fingers."""
 
+    @cached_property
+    def shapes(self) -> list[tuple[Fingertip, list[int]]]:
+        """The shapes of the fingertips, and which fingers have each."""
+        tips = [own.fingertip for own in self.each]
+        return [(tip, [i for i, other in enumerate(tips) if other == tip]) for tip in dict.fromkeys(tips)]
+
 
 @dataclass(eq=False)
 class HandPath:
-    """Paths of f fingertips over t control periods."""
+    """Paths of f fingertips over t control periods, at p instants of each; see `touch.FingerPath`."""
 
-    paths: tuple[FingerPath, ...]
+    forms: Floats
+    """(f, t, 2 p, 6)."""
+    join: Floats
+    """(f, t, 2, p, 1)."""
     windows: Floats
     """(t, 6, f)."""
 
     def __post_init__(self) -> None:
         self._ahead = Ahead()
 
-    def under(self, number: int, bases: Places) -> Floats:
+    def under(self, number: int, places: Places) -> Floats:
         """Return the undersides in a period over each finger's places, one after the other, (p, k), m."""
-        cells = sum(basis.shape[1] for _, basis in bases)
-        return self._ahead.find(number, bases, self.paths[0].join.shape[2] * cells, self._compute)
+        return self._ahead.find(number, places, self.join.shape[3] * places.basis.size, self._compute)
 
-    def _compute(self, several: slice, bases: Places) -> Floats:
+    def _compute(self, several: slice, places: Places) -> Floats:
         """Return the undersides in several periods, (t, p, k), m."""
-        parts = [self.paths[finger].compute(several, basis) for finger, basis in bases]
-        return np.concatenate(parts, axis=2)
+        own = self.forms[places.fingers, several], self.join[places.fingers, several]
+        under = np.moveaxis(compute_underside(*own, places.basis[:, None]), 0, 2)
+        return under.reshape(*under.shape[:2], -1).take(places.at, axis=2)
 
 
 class HandPeriod(NamedTuple):
@@ -81,9 +108,9 @@ class HandPeriod(NamedTuple):
     window: Window
     """(6, f)."""
 
-    def under(self, bases: Places) -> Floats:
+    def under(self, places: Places) -> Floats:
         """Return the undersides over each finger's places, one after the other, (p, k), m."""
-        return self.path.under(self.number, bases)
+        return self.path.under(self.number, places)
 
 
 def join_touches(touches: Sequence[Touch]) -> HandTouch:
@@ -96,15 +123,14 @@ def join_touches(touches: Sequence[Touch]) -> HandTouch:
 
 def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
     """Return the paths of f fingertips in each of t periods, of poses (t, p, f, 7)."""
-    count, traced = len(poses), {}
-    tips = [own.fingertip for own in touch.each]
-    for tip in dict.fromkeys(tips):  # those of one shape at once: as periods after each other
-        alike = [i for i, other in enumerate(tips) if other == tip]
-        whole = trace_finger(tip, np.concatenate([poses[:, :, i] for i in alike]))
-        for place, i in enumerate(alike):
-            own = slice(place * count, place * count + count)
-            traced[i] = FingerPath(0, whole.forms[own], whole.join[own], whole.windows[own])
-    paths = tuple(traced[i] for i in range(len(tips)))
-    windows = np.stack([np.array(path.windows) for path in paths], axis=-1)
-    path = HandPath(paths, windows)
-    return [HandPeriod(path, number, window) for number, window in enumerate(windows)]
+    periods, instants, fingers, _ = poses.shape
+    forms = np.empty((fingers, periods, 2 * instants, 6))
+    join, windows = np.empty((fingers, periods, 2, instants, 1)), np.empty((fingers, periods, 6))
+    for tip, own in touch.shapes:  # those of one shape at once: as periods after each other
+        traced = trace_finger(tip, poses[:, :, own].transpose(2, 0, 1, 3).reshape(-1, instants, 7))
+        for rows, made in zip(
+            (forms, join, windows), (traced.forms, traced.join, traced.windows), strict=True
+        ):
+            rows[own] = np.reshape(made, (len(own), *rows.shape[1:]))
+    path = HandPath(forms, join, np.ascontiguousarray(windows.transpose(1, 2, 0)))
+    return [HandPeriod(path, number, window) for number, window in enumerate(path.windows)]

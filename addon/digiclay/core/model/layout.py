@@ -118,6 +118,12 @@ class Grid:
         """Position of the first cell, m."""
         return float(self.x[0]), float(self.y[0])
 
+    @cached_property
+    def basis(self) -> Floats:
+        """Rows 1, x, y, x², x y, y² of all cells, (6, n)."""
+        x, y = self.x, self.y
+        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
+
     @property
     def positions(self) -> Floats:
         """Positions of the cells, shape (n, 2), m."""
@@ -168,8 +174,7 @@ class Grid:
 
     def compute_basis(self, cells: Cells) -> Floats:
         """Return rows 1, x, y, x², x y, y² of cells (m,) or (m, b), shape (6, m) or (6, m, b)."""
-        x, y = self.x.take(cells), self.y.take(cells)
-        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
+        return self.basis.take(cells, axis=1)
 
 
 def make_grid(layout: Layout) -> Grid:
