@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from bpy_extras.object_utils import world_to_camera_view
 from digiclay.cli import main
 from digiclay.commands.gallery import WIDTH as THUMBNAIL
 from digiclay.commands.job_steps import Work, find_frames, is_done
@@ -18,7 +19,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.files.formats import is_whole_picture
 from digiclay.core.files.run_folder import lock_name
-from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.finished_run import read_run
@@ -27,8 +28,8 @@ from digiclay.core.session.run_scene import run as simulate
 from digiclay.core.studies.job_table import read_outputs
 from digiclay.device.instant import Instant
 from digiclay.pictures import film, still
-from digiclay.pictures.film import draw_frames
-from digiclay.roles import BED, ROLE, fingertips_of
+from digiclay.pictures.film import draw_frames, stage_film
+from digiclay.roles import BED, ROLE, ellipsoid, fingertips_of
 
 from tests.blender.at_hand import film_strip, inventory, read_picture
 
@@ -204,6 +205,39 @@ def test_a_film_of_two_fingers_shows_both_and_plots_the_force_of_each():
         words = {thing.data.body for thing in shots.scene.objects if thing.type == "FONT"}
     least, most = history["finger_force"][-1]
     assert f"forces of fingertips {least:.2f} to {most:.2f} N" in words
+
+
+#: Where the second fingertip is at the end, when it has left, m.
+PLACES = {
+    "low over the bed": (0.01, 0.0, 0.041),
+    "lifted": (0.01, 0.0, 0.048),
+    "lifted behind the bed": (-0.01, 0.014, 0.046),
+    "parked": (0.01, 0.0, 1.0),
+}
+
+
+def test_fingertips_stay_in_the_frame_and_the_bed_is_not_made_small_for_one_that_is_parked(history):
+    history["fingertip"] = np.repeat(history["fingertip"][:, None], 2, axis=1)
+    history["finger_force"] = np.repeat(history["total_force"][:, None] / 2, 2, axis=1)
+    widths = {}
+    history["total_force"][-1] = 0.0
+    for name, place in PLACES.items():
+        history["fingertip"][:, :, :3], history["fingertip"][-1, 1, :3] = (-0.01, 0.0, 0.04), place
+        sizes = {"finger": (Fingertip(), Fingertip())}
+        with stage_film(history, Film(**SMALL), ("forces", history["finger_force"]), **sizes) as shots:
+            shots.show(shots.count - 1)
+            bed = next(thing for thing in shots.scene.objects if thing.get(ROLE) == BED)
+            shots.scene.view_layers[0].update()
+            parts, seen = (bed, ellipsoid(fingertips_of(bed)[2])), []
+            for part in parts:
+                corners = [part.matrix_world @ vertex.co for vertex in part.data.vertices]
+                look = [world_to_camera_view(shots.scene, shots.scene.camera, at)[:2] for at in corners]
+                seen.append(np.array(look))
+        assert ((seen[1] > 0.0) & (seen[1] < 1.0)).all() == (name != "parked"), name
+        widths[name] = np.ptp(seen[0][:, 0])
+    low, lifted, behind, parked = widths.values()
+    assert low == pytest.approx(parked, rel=0.02)  # the ellipsoid is 1 mm higher
+    assert max(lifted, behind) < low
 
 
 JOBS = """

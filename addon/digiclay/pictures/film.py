@@ -84,6 +84,8 @@ def is_whole_film(data: bytes) -> bool:
     return at == len(data) and b"moov" in kinds
 
 
+#: How far from the pins a fingertip may be that is to be in the frame, m: for more the bed would be small.
+NEAR = 0.01
 Progress = Callable[[int, int], None]
 
 #: Angles at which a turning bed's outline is looked at for the frame it needs.
@@ -157,14 +159,17 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
 def _visible_points(
     bed: Any, history: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], sizes: Mapping[str, Any]
 ) -> Floats:
-    """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertip where it touches."""
+    """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertips that are near."""
     used = slice(int(rows[0]), int(rows[-1]) + 1)
-    touching = rows[history["total_force"][rows] > 0.0]
-    poses = history["fingertip"][touching if touching.size else rows]
-    places = poses.reshape(-1, 7)[:, :3]  # of all fingertips, a row a pose
-    extremes = np.unique([places.argmin(axis=0), places.argmax(axis=0)]) // (len(places) // len(poses))
     instant = Instant.of(history, int(rows[0]), **sizes)
     position, height = np.asarray(history["position"]), history["height"][used]
+    poses = history["fingertip"][rows]
+    places = poses.reshape(-1, 7)[:, :3]  # of all fingertips, a row a pose
+    middle = np.array([*position.mean(axis=0), height.max()])
+    reach = np.array([*np.abs(position - middle[:2]).max(axis=0), 0.0]) + NEAR
+    places[(np.abs(places - middle) > reach).any(axis=1)] = middle
+    ways = np.indices((3, 3, 3)).reshape(3, -1) - 1.0
+    extremes = np.unique((places @ ways).argmax(axis=0) // (len(places) // len(poses)))
     clouds = [
         np.column_stack([position, level]) * SCALE for level in (height.min(axis=0), height.max(axis=0))
     ]
