@@ -199,6 +199,9 @@ def test_a_disc_has_all_cells_within_its_radius_and_bounds_hold_it_closely(layou
     for found in (np.isin(np.arange(bed.count), disc), covered):
         assert np.all(found >= surely)
         assert np.all(found <= perhaps)
+    several = np.array([(x, y, radius), (-y, x, radius / 3), (0.0, 0.0, -np.inf)]).T
+    both = np.union1d(disc, bed.disc(-y, x, radius / 3))
+    assert np.array_equal(np.flatnonzero(bed.cover(several)), both)
     assert np.isin(disc, cells).all()
     assert np.all(np.diff(cells) > 0)
     # Rows that are shifted share the columns of those that are not: half a pitch more.

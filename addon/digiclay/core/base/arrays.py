@@ -6,7 +6,7 @@ which numpy puts against the last axis; a linear map (o, i) that does is an arra
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,14 +65,29 @@ def count_true(test: NDArray[np.bool_]) -> Any:
     return test.tobytes().count(1) if test.ndim == 1 else np.count_nonzero(test, axis=0).tolist()
 
 
-def find_copies(cells: Cells) -> tuple[Cells, Cells]:
-    """Return cells (g,) that occur more than once, and where, (c, g), the first place repeated."""
-    order = np.argsort(cells, kind="stable")
-    unique, first, count = np.unique(cells[order], return_index=True, return_counts=True)
-    several = count > 1
-    most = int(count.max(initial=1))
-    step = np.arange(most)[:, None]
-    return unique[several], order[first[several] + np.where(step < count[several], step, 0)]
+class Copies(NamedTuple):
+    """Cells (g,) that several of f rows have, and their p entries, in the order of rows."""
+
+    cells: Cells
+    row: Cells
+    which: Cells
+    number: Cells
+    """(p,): Of the entries: their rows, which of these cells, and numbers among the entries of all cells."""
+    entries: Cells
+    """(c, g): Which are each cell's; the first one makes up the number."""
+
+
+def find_copies(inside: Flags) -> Copies:
+    """Return which cells several rows have, (f, n)."""
+    (cells,) = (np.add.reduce(inside, axis=0, dtype=np.intp) > 1).nonzero()
+    own = inside[:, cells]
+    row, which = own.nonzero()
+    number, rank = np.cumsum(inside).reshape(inside.shape), np.cumsum(own, axis=0)
+    entries = np.empty((rank.max(initial=1), cells.size), np.intp)
+    order = np.arange(row.size)
+    entries[:, which[::-1]] = order[::-1]
+    entries[rank[row, which] - 1, which] = order
+    return Copies(cells, row, which, number[row, cells[which]] - 1, entries)
 
 
 def per_row(values: Floats, dimensions: int) -> Floats:

@@ -65,18 +65,13 @@ class Columns:
         inside = (basis[1] - x) ** 2 + (basis[2] - y) ** 2 <= radius * np.abs(radius) * (
             1.0 + RELATIVE_TOLERANCE
         )
-        left = np.array_split(np.flatnonzero(~inside.any(axis=0)), len(inside))
-        for own, more in zip(inside, left, strict=True):
-            own[more] = True
+        (left,) = (~np.logical_or.reduce(inside)).nonzero()
+        inside[np.arange(left.size) * len(inside) // max(left.size, 1), left] = True
         self.inside = inside
         self.finger, self.flat = inside.nonzero()
-        # Cells (g,) in several columns; these (p,) entries; which of them are each cell's, (c, g).
-        self.double, copies = find_copies(self.flat)
-        self.pairs, inverse = np.unique(copies, return_inverse=True)
-        self.copies = inverse.reshape(copies.shape)
-        # Of the entries: their fingers, which of the cells in several columns, and their places, (2, p), m.
-        self.named = self.finger[self.pairs]
-        self.which = self.double.searchsorted(self.flat[self.pairs])
+        # Cells (g,) in several columns; of their (p,) entries: fingers, which of these cells, and numbers in
+        # `flat`; which entries are each cell's, (c, g); places of the entries, (2, p), m.
+        self.double, self.named, self.which, self.pairs, self.copies = find_copies(inside)
         self.places = basis[1:3, self.double[self.which]]
         # Of each cell the one command, or one of those for it.
         self.obeyed = np.empty(basis.shape[1], np.intp)

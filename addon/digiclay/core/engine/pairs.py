@@ -61,20 +61,11 @@ class HandSelection(Selection):
         self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
     ) -> tuple[Cells, int]:
         """Return the near cells, then the moving and the controlled ones, and the number of near ones."""
-        near = self._cover(reach)
-        (first,) = near.nonzero()
-        others = self._cover(control)
+        (first,) = self.grid.cover(reach).nonzero()
+        others = self.grid.cover(control)
         others[active.cells[moving]] = True
         others[first] = False
         return np.concatenate([first, *others.nonzero()]), first.size
-
-    def _cover(self, discs: Discs | None) -> Flags:
-        """Return which cells are in some disc, (n,)."""
-        inside = np.zeros(self.grid.count, np.bool_)
-        for x, y, radius in [] if discs is None else np.transpose(discs).tolist():
-            if radius >= 0.0:
-                inside[self.grid.disc(x, y, radius)] = True
-        return inside
 
     def release(self, state: State) -> Flags:
         """Put the active cells back; the pulp of a fingertip out of reach has aged since they were taken."""
@@ -107,7 +98,8 @@ def count_inside(active: ActiveSet, windows: Floats) -> int:
 
 def find_pairs(active: ActiveSet) -> Flags:
     """Return which near cells each of the fingertips may touch, (f, k)."""
-    assert active.reach is not None
+    if active.reach is None:
+        return np.zeros((active.rows.fingers, 0), np.bool_)
     x, y, radius = (np.asarray(part)[:, None] for part in active.reach)
     _, at_x, at_y = active.quadratic_basis[:3, : active.near]
     inside: Flags = (at_x - x) ** 2 + (at_y - y) ** 2 <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
@@ -141,7 +133,7 @@ class Pairs:
 
     def __init__(self, system: HandSystem, active: ActiveSet, fingers: list[int], others: Cells) -> None:
         cell, rows, width = system.cells[fingers[0]], system.rows, active.cells.size
-        inside = find_pairs(active) if active.near else np.zeros((system.fingers, 0), np.bool_)
+        inside = find_pairs(active)
         finger, self.cells = (part.astype(np.intp) for part in inside[fingers].nonzero())
         self.fingers = np.array(fingers)[finger]
         self.places = gather_places(inside[fingers], active.quadratic_basis[:, : active.near])
@@ -201,7 +193,9 @@ class HandMovement:
         self._groups = [Pairs(system, active, groups[0], others)]
         self._groups += [Pairs(system, active, fingers, others[:0]) for fingers in groups[1:]]
         self._fingers = np.concatenate([group.fingers for group in self._groups])
-        self._double, self._copies = find_copies(np.concatenate([group.cells for group in self._groups]))
+        order = [finger for fingers in groups for finger in fingers]
+        copies = find_copies(find_pairs(active)[order])
+        self._double, self._copies = copies.cells, copies.number[copies.entries]
         # The first pair of a cell also makes up the number of those of others.
         self._distinct = self._copies != self._copies[0]
         self._distinct[0] = True

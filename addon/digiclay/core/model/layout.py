@@ -146,6 +146,27 @@ class Grid:
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + RELATIVE_TOLERANCE)]
 
+    def cover(self, discs: Discs | None) -> Flags:
+        """Return which cells are in some of f discs, (n,); a negative radius: nothing is in it."""
+        covered = np.zeros(self.count, np.bool_)
+        if discs is None:
+            return covered
+        plan, (left, bottom) = self.layout, self.corner
+        x, y, radius = (np.asarray(part)[:, None, None] for part in discs)
+        size = max(0.0, float(radius.max()))
+
+        def span(first: Floats, width: float, count: int) -> Cells:
+            """Return as many rows, or columns, of each disc as the widest has, (f, 1, k)."""
+            most = min(int(min(width, count)) + 2, count)
+            return np.clip(np.ceil(first - RELATIVE_TOLERANCE), 0, count - most).astype(int) + np.arange(most)
+
+        row = span((y - size - bottom) / plan.row_spacing, 2.0 * size / plan.row_spacing, plan.rows)
+        first, width = (x - size - left - plan.shift) / plan.pitch, (2.0 * size + plan.shift) / plan.pitch
+        cells = row.transpose(0, 2, 1) * plan.columns + span(first, width, plan.columns)
+        square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
+        covered[cells[square <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)]] = True
+        return covered
+
     def enclose(self, cells: Cells) -> Disc | None:
         """Return a disc that holds the axes of some cells, m; None without any."""
         if not cells.size:
