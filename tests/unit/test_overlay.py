@@ -14,6 +14,7 @@ from digiclay.overlay.picture import (
     Picture,
     choose_colors,
     contrast,
+    move_apart,
     round_axis,
     scale_curve,
 )  # fmt: skip
@@ -192,3 +193,31 @@ def test_the_set_point_is_the_dashed_line_at_its_height() -> None:
     axis = next(words.text for words in picture.words if re.fullmatch(r"0\.\d+ N", words.text))
     top = float(axis.removesuffix(" N"))
     assert share == pytest.approx(0.25 / top, rel=1e-9)
+
+
+#: Balls of 10 pixels as a window of 1000 pixels shows them, whose numbers have a radius of 9.5.
+CROWDS = {
+    "far apart": [(0, 0), (80, 0)],
+    "a hand": [(265, 358), (289, 335), (316, 357), (337, 344), (338, 326), (314, 307)],
+    "in a row": [(20.0 * place, 0) for place in range(6)],
+    "one behind the other": [(0, 0), (0, 4), (0, 9)],
+    "at one place": [(0, 0)] * 3,
+    "one behind the camera": [(0, 0), (np.nan, np.nan), (5, 5)],
+    "none": [],
+}
+
+
+@pytest.mark.parametrize("crowd", CROWDS)
+def test_numbers_of_fingertips_cover_neither_each_other_nor_a_fingertip(crowd: str) -> None:
+    balls = np.array(CROWDS[crowd], float).reshape(-1, 2)
+    above = balls + np.array([0.0, 19.5])
+    found = move_apart(above, 9.5, balls, np.full(len(balls), 10.0))
+    seen = np.isfinite(balls[:, 0])
+    assert np.isfinite(found[seen]).all()
+    away = np.linalg.norm(found[seen, None] - np.concatenate([found, balls])[np.tile(seen, 2)], axis=2)
+    np.fill_diagonal(away, np.inf)
+    count = int(seen.sum())
+    assert away[:, :count].min(initial=np.inf) > 19.0 - 1.0  # half a pixel each is not seen
+    assert away[:, count:].min(initial=np.inf) > 19.5 - 1.0
+    moved = np.linalg.norm(found - above, axis=1)[seen]
+    assert moved.max(initial=0.0) < (0.1 if crowd == "far apart" else 60.0)

@@ -18,6 +18,8 @@ CURVES: tuple[Color, ...] = (
     (0.84, 0.37, 0.00),
     (0.95, 0.90, 0.25),
 )
+#: How often discs that overlap are moved apart at most: a hand takes some ten.
+ROUNDS = 40
 #: Contrast that the Web Content Accessibility Guidelines ask of letters, if possible, at least, and of lines.
 INK, LETTERS, LINES = 7.0, 4.5, 3.0
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -148,3 +150,18 @@ def scale_curve(
     x = (time[shown] - window[0]) / (window[1] - window[0])
     y = np.clip((value[shown] - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
     return np.column_stack([box.x + x * box.width, box.y + y * box.height])
+
+
+def move_apart(places: Floats, radius: float, balls: Floats, radii: Floats) -> Floats:
+    """Return centers (k, 2) of discs of a radius, moved off each other and off balls (m, 2)."""
+    at = places + np.outer(np.arange(len(places)), [0.0, 0.01])  # also of those at one place
+    least = np.concatenate([np.full(len(at), 2.0 * radius), radius + radii])
+    for _ in range(ROUNDS):
+        away = at[:, None] - np.concatenate([at, balls])
+        far = np.linalg.norm(away, axis=2)
+        np.fill_diagonal(far, np.inf)
+        lack = np.fmax(least - far, 0.0)  # 0 for NaN: what is behind the camera
+        if lack.max(initial=0.0) < 0.5:
+            break
+        at += 0.5 * np.einsum("kn,kni->ki", lack / np.fmax(far, 1.0), np.nan_to_num(away))
+    return at

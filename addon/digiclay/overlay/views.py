@@ -23,9 +23,11 @@ from ..device.instant import find_ellipsoids
 from ..device.node_tree import TOP_FORCE
 from ..roles import bed_of, fingertips_of
 from ..sessions import running
-from .picture import BLACK, WHITE, Dot, Look, Picture, Words, choose_colors, contrast
+from .picture import BLACK, WHITE, Dot, Look, Picture, Words, choose_colors, contrast, move_apart
 from .sections import COMPACT, FULL, Readings, Room, find_covered, find_room, lay_out
 
+#: Radius of the number of a fingertip at a UI scale of 1, pixels.
+NUMBER = 8.0
 #: How often the views are redrawn while nothing moves in them, s: the curves continue.
 QUIET = 0.25
 
@@ -192,18 +194,24 @@ def _draw() -> None:
 def _mark(
     context: Any, bed: Any, session: running.Running, colors: Look, picture: Picture, scale: float
 ) -> None:
-    """Add dots on picked pins in the colors of their curves, and numbered ones on several fingertips.
+    """Add dots on picked pins in the colors of their curves, and numbered ones beside several fingertips.
 
-    None covers the boxes of the picture.
+    None covers the boxes of the picture, and no number a fingertip.
     """
     pins, boxes = list(session.trace.pins), tuple(picture.boxes)
     tops = np.column_stack([session.system.grid.positions[pins], session.state.row(0)[pins]])
     numbers = _list_numbers(session)
-    tips = session.poses[: len(session.numbers), :3].copy()
-    tips[:, 2] += [2.0 * finger.height for finger in find_ellipsoids(session.scene)]
+    sizes = np.array([[own.length, own.width, own.height] for own in find_ellipsoids(session.scene)])
+    middles = session.poses[: len(numbers), :3] + [0.0, 0.0, 1.0] * sizes[: len(numbers)]
+    around = middles[:, None] + sizes[: len(numbers), None] * np.vstack([np.zeros(3), np.eye(3)])
     marks = [(color, 4.0, "") for _, color in zip(pins, colors.pins, strict=False)]
-    marks += [(palettes.finger_color(number), 9.0, f"{number}") for number in numbers]
-    places = project(context, bed, np.concatenate([tops, tips[: len(numbers)]]))
+    marks += [(palettes.finger_color(number), NUMBER, f"{number}") for number in numbers]
+    places = project(context, bed, np.concatenate([tops, around.reshape(-1, 3)]))
+    balls = places[len(pins) :].reshape(-1, 4, 2)
+    radii = np.linalg.norm(balls - balls[:, :1], axis=2).max(axis=1, initial=0.0)
+    radius = (NUMBER + 1.5) * scale
+    above = balls[:, 0] + np.outer(radii + radius, [0.0, 1.0])
+    places = np.concatenate([places[: len(pins)], move_apart(above, radius, balls[:, 0], radii)])
     for (x, y), (color, radius, text) in zip(places, marks, strict=True):
         hidden = any(0 <= x - box.x < box.width and 0 <= y - box.y < box.height for box in boxes)
         if math.isfinite(x) and not hidden:
@@ -211,5 +219,5 @@ def _mark(
             picture.dots += [rim, Dot(x, y, radius * scale, color)]
             if text:
                 ink = max(BLACK, WHITE, key=lambda ink: contrast(ink, color))
-                size, wide = 12.0 * scale, 3.4 * len(text) * scale
+                size, wide = 11.0 * scale, 3.1 * len(text) * scale
                 picture.words.append(Words(x - wide, y - 0.36 * size, size, ink, text))
