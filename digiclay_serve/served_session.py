@@ -9,6 +9,7 @@ import threading
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ from .tracked_fingers import (
     CLEAR,
     PARKED,
     TRACKING,
+    Around,
     Felt,
     Tracking,
     Tracks,
@@ -127,24 +129,27 @@ def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, fl
 def feel(session: Session, time: float) -> Felt:
     """Return what the fingertips feel, by the laws of the first, before a time, s."""
     state, system, poses = session.state, session.system, session.poses
-    basis, heights, forces = system.grid.basis, state.row(0), state.row(system.rows.force)
-    near, peak = measure_square(*poses[:, :2].T, basis) < AROUND**2, float(heights.max())
-    (cells,) = np.logical_or.reduce(near).nonzero()
-    near, basis, heights, forces = near[:, cells], basis[:, cells], heights[cells], forces[cells]
-    first = session.scene.fingers[0]
-    force, law, tip = state.finger_forces(), first.contact or Contact(), first.fingertip or Fingertip()
-    # What grows is the tension: the force and what has relaxed of it meanwhile. Twice that never swings.
+    first, heights, force = session.scene.fingers[0], state.row(0), state.finger_forces()
+    law, tip, peak = first.contact or Contact(), first.fingertip or Fingertip(), float(heights.max())
+    # What grows is the tension: the force and what has relaxed of it meanwhile.
     tension = force + session.relaxed @ _read_pulp(session.scene)[0]
-    stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * near @ (1.0 * (forces > 0.0)))
-    top = np.where(near.any(1), np.where(near, heights, 0.0).max(1, initial=0.0), peak)
 
-    def meet(there: Floats) -> Any:
-        under = compute_underside(*compute_forms(tip.outline(there)), basis)
-        return there[:, 2] + (heights - under).max(1, initial=-math.inf)
+    def look() -> Around:
+        near = measure_square(poses[:, 0], poses[:, 1], system.grid.basis) < AROUND**2
+        (cells,) = np.logical_or.reduce(near).nonzero()
+        near, basis, tops = near[:, cells], system.grid.compute_basis(cells), heights[cells]
+        pressed = near @ (1.0 * (state.row(system.rows.force)[cells] > 0.0))
+        highest = np.where(near.any(1), np.where(near, tops, 0.0).max(1, initial=0.0), peak)
 
-    return Felt(
-        poses, force, tension, stiffness, top, 1.0 / law.exponent, peak, meet, session.limits.speed * time
-    )
+        def meet(there: Floats) -> Any:
+            under = compute_underside(*compute_forms(tip.outline(there)), basis)
+            return there[:, 2] + (tops - under).max(1, initial=-math.inf)
+
+        # Twice what the tension grows by never swings.
+        stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * pressed)
+        return Around(stiffness, highest, meet)
+
+    return Felt(poses, force, tension, 1.0 / law.exponent, peak, cache(look), session.limits.speed * time)
 
 
 def _read_pulp(scene: Scene) -> tuple[Floats, Floats]:

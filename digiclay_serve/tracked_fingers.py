@@ -44,23 +44,30 @@ class Tracking:
 TRACKING = Tracking()
 
 
+class Around(NamedTuple):
+    """Pins around the fingertips: a row a finger."""
+
+    #: (f,): how much the force grows with depth at once, N/m; highest pin, m, of the bed where there is none.
+    stiffness: Floats
+    top: Floats
+    #: Heights (k,), m, at which fingertips at poses (k, 7) touch a pin first.
+    meet: Callable[[Floats], Floats]
+
+
 class Felt(NamedTuple):
     """What the fingertips feel: a row a finger."""
 
     #: (f, 7), simulated.
     poses: Floats
-    #: (f,), N; with what has relaxed of it; and how much it grows with depth at once, N/m.
+    #: (f,), N; and with what has relaxed of it.
     force: Floats
     tension: Floats
-    stiffness: Floats
-    #: (f,): highest pin around each, m; of the bed, where there is none.
-    top: Floats
     #: Depth in which the force of a pin grows e times, m.
     growth: float
     #: Highest pin of the bed, m.
     peak: float
-    #: Heights (k,), m, at which fingertips at poses (k, 7) touch a pin first.
-    meet: Callable[[Floats], Floats]
+    #: Looks at the pins around, which clutch and coupling need.
+    look: Callable[[], Around]
     #: Way that a fingertip can go, m.
     way: float
 
@@ -172,7 +179,7 @@ def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tupl
     slip = np.zeros(len(ids))
     if tracking.clutch:
         # What is not there yet feels other pins than it will.
-        most = np.where(tracks.there, felt.top + tracking.clutch - goal[:, 2], math.inf)
+        most = np.where(tracks.there, felt.look().top + tracking.clutch - goal[:, 2], math.inf)
         slip = np.minimum(tracks.slip, most)
         goal[:, 2] += slip
     goal[~tracks.there, 2] = PARKED
@@ -213,9 +220,10 @@ def give_way(goal: Floats, felt: Felt, coupling: float, time: float) -> Floats:
     force too large. A pin comes in by `growth`, then slowly: a fingertip goes over what stands in its way.
     """
     here, height, after = felt.poses[:, 2], goal[:, 2], goal.copy()
-    meets, now = felt.meet(np.concatenate([goal, felt.poses])).reshape(2, -1)
+    around = felt.look()
+    meets, now = around.meet(np.concatenate([goal, felt.poses])).reshape(2, -1)
     deep = np.maximum(now - here, 0.0)
-    balanced = (coupling * height + felt.force + felt.stiffness * here) / (coupling + felt.stiffness)
+    balanced = (coupling * height + felt.force + around.stiffness * here) / (coupling + around.stiffness)
     lowest = meets - np.maximum(deep + CREEP * time * felt.growth, felt.growth)
     # The spring never pulls: clay does not stick to a fingertip.
     after[:, 2] = np.maximum(np.maximum(balanced, height), lowest)

@@ -12,6 +12,7 @@ import pytest
 
 from digiclay_serve.tracked_fingers import (
     PARKED,
+    Around,
     Felt,
     Tracking,
     advance,
@@ -27,16 +28,8 @@ PLACE = (0.01, -0.02, 0.05)
 def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.04) -> Felt:
     """Return what fingertips feel, all the same."""
     each = np.ones(len(poses))
-    forces = force * each, force * each, stiffness * each
-    return Felt(
-        np.array(poses, float),
-        *forces,
-        top * each,
-        5e-4,
-        top,
-        lambda there: np.full(len(there), top),
-        1.25e-3,
-    )
+    around = Around(stiffness * each, top * each, lambda there: np.full(len(there), top))
+    return Felt(np.array(poses, float), force * each, force * each, 5e-4, top, lambda: around, 1.25e-3)
 
 
 def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]]]:
@@ -205,7 +198,8 @@ def test_a_coupled_fingertip_lands_a_growth_of_force_deep_and_then_goes_slowly()
 
 
 def test_a_coupled_fingertip_rises_before_it_goes_over_what_stands_in_its_way() -> None:
-    contact = felt([[0, 0, 0.04, *LEVEL]])._replace(meet=lambda at: np.where(at[:, 0] > 1e-3, 0.06, 0.04))
+    around = Around(np.zeros(1), np.full(1, 0.04), lambda at: np.where(at[:, 0] > 1e-3, 0.06, 0.04))
+    contact = felt([[0, 0, 0.04, *LEVEL]])._replace(look=lambda: around)
     goal = np.array([[0.02, 0, 0.03, *LEVEL]])
     assert give_way(goal, contact, 100.0, 5e-3)[0, :3].tolist() == [0.0, 0.0, 0.0595]
     over = give_way(goal, contact._replace(poses=np.array([[0, 0, 0.0595, *LEVEL]])), 100.0, 5e-3)

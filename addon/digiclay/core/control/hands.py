@@ -252,7 +252,8 @@ class HandControl:
     def _predict_under(self, memory: Hands, basis: Floats) -> Floats:
         """Return the undersides of fingers over pins, (f, q), m; infinite where one is not near."""
         places = [own.place for own in memory.fingers]
-        square = measure_square(*np.array([place or (BEYOND, BEYOND) for place in places]).T, basis)
+        x, y = np.array([place or (BEYOND, BEYOND) for place in places]).T
+        square = measure_square(x, y, basis)
         _, size, reach = self._sizes
         far: Flags = square > reach
         if not self._predicts:

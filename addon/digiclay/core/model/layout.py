@@ -158,7 +158,9 @@ class Grid:
         def span(first: Floats, width: float, count: int) -> Cells:
             """Return as many rows, or columns, of each disc as the widest has, (f, 1, k)."""
             most = min(int(min(width, count)) + 2, count)
-            return np.clip(np.ceil(first - RELATIVE_TOLERANCE), 0, count - most).astype(int) + np.arange(most)
+            least = np.clip(np.ceil(first - RELATIVE_TOLERANCE), 0, count - most)
+            lines: Cells = least.astype(np.intp) + np.arange(most)
+            return lines
 
         row = span((y - size - bottom) / plan.row_spacing, 2.0 * size / plan.row_spacing, plan.rows)
         first, width = (x - size - left - plan.shift) / plan.pitch, (2.0 * size + plan.shift) / plan.pitch
