@@ -73,6 +73,11 @@ def test_as_much_is_simulated_as_time_goes_by():
         count, clock = periods_due(clock, time, PERIOD, 20, moment)
         counts.append(count)
     assert counts == [0, 2, 8, 0, 20, 2]
+    # One that stands is that of another scene.
+    for time in (1.0, 2.0, 2.98, 3.01, 3.03):
+        count, clock = periods_due(clock, time, PERIOD, 20, 7.0)
+        counts.append(count)
+    assert counts[6:] == [20, 0, 0, 6, 4]
     _, clock = looked([0.0, 0.02])
     assert looked([100.0, 100.01], clock=clock.stopped())[0] == [0, 2]
 

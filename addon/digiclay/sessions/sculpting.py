@@ -118,7 +118,7 @@ def advance(
     """Let a session follow the fingertip to a pose (7,) until `now`, s, monotonic; uses `running` up.
 
     Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s. `moment`:
-    time of an animation that plays, s.
+    see `live_session.periods_due`.
     """
     if pins is not None:
         running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))

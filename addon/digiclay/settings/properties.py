@@ -32,8 +32,7 @@ def relabel(error: ParameterError, numbers: Sequence[int]) -> ParameterError:
     def labeled(found: re.Match[str]) -> str:
         return f"{title(found[1])}: {title(found[2])}" if found[2] in _known(found[1]) else found[0]
 
-    *finger, owner = re.split(rf"^{FINGERS} #(\d+)\.", error.owner)
-    field = title(error.field)
+    (*finger, owner), field = re.split(rf"^{FINGERS} #(\d+)\.", error.owner), title(error.field)
     if owner in SECTIONS:
         owner = f"{title(owner)}: {field}" if field else title(owner)
         field = ""

@@ -31,6 +31,8 @@ LEAST = 0.5
 DRAWN = 0.9
 #: Shortest time between two ticks that is counted with, s: ticks may come in a burst.
 SHORTEST = 1e-2
+#: An animation whose frame does not change for so long is another scene's, s: software draws one a second.
+STANDS = 2.0
 #: Rounding errors of times count as whole periods when they are below this share of one.
 SLACK = 1e-6
 
@@ -46,8 +48,8 @@ class Clock:
 
     seen: float | None = None
     """When the clock was last looked at, s; None: it starts with the next look."""
-    moment: float | None = None
-    """Time shown by an animation that played then, s; None: none did."""
+    moment: tuple[float, float] | None = None
+    """Time of an animation that played then, and when it came to that, s; None: none did."""
     left: float = 0.0
     """Time gone by that is not simulated yet, less than a control period, s."""
     cost: float = 0.0
@@ -76,18 +78,20 @@ def periods_due(
     `moment`: time of an animation that plays, s, which counts instead of the wall's: what is keyed moves as
     fast as keyed, however slowly it is drawn, and without the rests between two frames.
     """
+    last, shown = clock.moment, None if moment is None else (moment, now)
+    shown = last if last and last[0] == moment else shown
     if clock.seen is None:
-        return 0, replace(clock, seen=now, moment=moment)
+        return 0, replace(clock, seen=now, moment=shown)
     gone = passed = max(0.0, now - clock.seen)
     affordable = max(1, int(SHARE * max(gone, SHORTEST) / clock.cost)) if clock.cost > 0.0 else most
     limit = min(most, affordable)
-    if moment is not None and clock.moment is not None:
-        passed, limit = abs(moment - clock.moment), max(most, affordable)
+    if last and shown and now - shown[1] < STANDS:
+        passed, limit = abs(shown[0] - last[0]), max(most, affordable)
     whole = math.floor((clock.left + passed) / period + SLACK)
     count = max(0, min(whole, limit))
     left = max(0.0, clock.left + passed - whole * period)
     ticks = _extend_window(clock.ticks, gone, count * period)
-    return count, replace(clock, seen=now, moment=moment, left=left, spent=0.0, ticks=ticks)
+    return count, replace(clock, seen=now, moment=shown, left=left, spent=0.0, ticks=ticks)
 
 
 def _extend_window(ticks: Ticks, gone: float, done: float) -> Ticks:
