@@ -117,8 +117,7 @@ def advance(
 ) -> Running:  # fmt: skip
     """Let a session follow the fingertip to a pose (7,) until `now`, s, monotonic; uses `running` up.
 
-    Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s. `moment`:
-    see `live_session.periods_due`.
+    Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s.
     """
     if pins is not None:
         running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))

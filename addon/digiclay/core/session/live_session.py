@@ -75,8 +75,7 @@ def periods_due(
 ) -> tuple[int, Clock]:
     """Return how many control periods, s, to simulate now, s, at `most`, and the clock after them.
 
-    `moment`: time of an animation that plays, s, which counts instead of the wall's: what is keyed moves as
-    fast as keyed, however slowly it is drawn, and without the rests between two frames.
+    `moment`: time of an animation that plays, s, which counts instead: what is keyed moves as fast as keyed.
     """
     last, shown = clock.moment, None if moment is None else (moment, now)
     shown = last if last and last[0] == moment else shown
