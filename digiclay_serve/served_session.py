@@ -135,9 +135,10 @@ def feel(session: Session, time: float) -> Felt:
     tension = force + session.relaxed @ _read_pulp(session.scene)[0]
 
     def look() -> Around:
-        near = measure_square(poses[:, 0], poses[:, 1], system.grid.basis) < AROUND**2
+        basis = system.grid.compute_basis(np.arange(system.grid.count))
+        near = measure_square(poses[:, 0], poses[:, 1], basis) < AROUND**2
         (cells,) = np.logical_or.reduce(near).nonzero()
-        near, basis, tops = near[:, cells], system.grid.compute_basis(cells), heights[cells]
+        near, basis, tops = near[:, cells], basis[:, cells], heights[cells]
         pressed = near @ (1.0 * (state.row(system.rows.force)[cells] > 0.0))
         highest = np.where(near.any(1), np.where(near, tops, 0.0).max(1, initial=0.0), peak)
 

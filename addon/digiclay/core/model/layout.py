@@ -118,12 +118,6 @@ class Grid:
         """Position of the first cell, m."""
         return float(self.x[0]), float(self.y[0])
 
-    @cached_property
-    def basis(self) -> Floats:
-        """Rows 1, x, y, x², x y, y² of all cells, (6, n)."""
-        x, y = self.x, self.y
-        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
-
     @property
     def positions(self) -> Floats:
         """Positions of the cells, shape (n, 2), m."""
@@ -197,7 +191,8 @@ class Grid:
 
     def compute_basis(self, cells: Cells) -> Floats:
         """Return rows 1, x, y, x², x y, y² of cells (m,) or (m, b), shape (6, m) or (6, m, b)."""
-        return self.basis.take(cells, axis=1)
+        x, y = self.x.take(cells), self.y.take(cells)
+        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
 
 
 def make_grid(layout: Layout) -> Grid:
