@@ -1,4 +1,4 @@
-"""Cells of several fingers, one after the other, in the formulas of one finger: numbers of each, and sums.
+"""Cells of several fingers, one after the other or in columns, in the formulas of one finger, and sums.
 
 Arrays are (m,) or (r, m), of m cells; numbers of the fingers are lists of f.
 """
@@ -6,12 +6,18 @@ Arrays are (m,) or (r, m), of m cells; numbers of the fingers are lists of f.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Cells, Flags, Floats, count_true
+from ..base.arrays import Cells, Flags, Floats, count_true, find_copies
+from ..model.layout import RELATIVE_TOLERANCE
+
+#: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
+BEYOND = 1e3
+OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
 
 
 class Whole:
@@ -111,3 +117,37 @@ class Shared(Whole):
 
 
 WHOLE, SHARED = Whole(), Shared()
+
+
+class Columns:
+    """The active cells in columns, one a finger: those in its disc, and its share of those in none."""
+
+    def __init__(self, basis: Floats, discs: tuple[Floats, Floats, Floats]) -> None:
+        x, y, radius = (part[:, None] for part in discs)
+        inside = (basis[1] - x) ** 2 + (basis[2] - y) ** 2 <= radius * np.abs(radius) * (
+            1.0 + RELATIVE_TOLERANCE
+        )
+        (left,) = (~np.logical_or.reduce(inside)).nonzero()
+        inside[np.arange(left.size) * len(inside) // max(left.size, 1), left] = True
+        self.inside = inside
+        self.finger, self.flat = inside.nonzero()
+        # Cells (g,) in several columns; of their (p,) entries: fingers, which of these cells, and numbers in
+        # `flat`; which entries are each cell's, (c, g); places of the entries, (2, p), m.
+        self.double, self.named, self.which, self.pairs, self.copies = find_copies(inside)
+        self.places = basis[1:3, self.double[self.which]]
+        # Of each cell the one command, or one of those for it.
+        self.obeyed = np.empty(basis.shape[1], np.intp)
+        self.obeyed[self.flat] = np.arange(self.flat.size)
+        self._basis = basis
+
+    @cached_property
+    def padded(self) -> tuple[Cells, Flags, Floats, Cells]:
+        """The columns side by side, (w, f): cells; which are none; basis, (6, w, f); where all are."""
+        sizes = np.count_nonzero(self.inside, axis=1)
+        absent = np.arange(sizes.max())[:, None] >= sizes
+        cells = np.zeros(absent.shape, np.intp)
+        cells.T[~absent.T] = self.flat
+        basis = self._basis[:, cells]
+        basis[:, absent] = OUTSIDE
+        finger, place = (~absent.T).nonzero()
+        return cells, absent, basis, place * len(sizes) + finger

@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import TINY, Cells, Flags, Floats, any_true, find_copies
+from ..base.arrays import TINY, Cells, Flags, Floats, any_true
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.fingertip import JOIN
-from ..model.layout import RELATIVE_TOLERANCE, Disc
-from .finger_sections import Sections, Whole
+from ..model.layout import Disc
+from .finger_sections import BEYOND, OUTSIDE, Columns, Sections, Whole
 from .travel import measure_square
 
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
@@ -31,9 +31,6 @@ NEW, UNDER = 0.65, 0.5
 REACHED = 6e-3
 #: Slope of an underside beyond the join, see `model.fingertip`.
 STEEP = 0.5 / (1.0 - JOIN) ** 0.5
-#: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
-BEYOND = 1e3
-OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
 #: How near a pressed pin two undersides must be for both to be able to press it, m.
 UNCLEAR = 0.2e-3
 #: Share of a pin that a finger does not see.
@@ -55,40 +52,6 @@ class Hands(NamedTuple):
     def losses(self) -> int:
         """How often a finger was lost."""
         return sum(getattr(one, "losses", 0) for one in self.fingers)
-
-
-class Columns:
-    """The active cells in columns, one a finger: those in its disc, and its share of those in none."""
-
-    def __init__(self, basis: Floats, discs: tuple[Floats, Floats, Floats]) -> None:
-        x, y, radius = (part[:, None] for part in discs)
-        inside = (basis[1] - x) ** 2 + (basis[2] - y) ** 2 <= radius * np.abs(radius) * (
-            1.0 + RELATIVE_TOLERANCE
-        )
-        (left,) = (~np.logical_or.reduce(inside)).nonzero()
-        inside[np.arange(left.size) * len(inside) // max(left.size, 1), left] = True
-        self.inside = inside
-        self.finger, self.flat = inside.nonzero()
-        # Cells (g,) in several columns; of their (p,) entries: fingers, which of these cells, and numbers in
-        # `flat`; which entries are each cell's, (c, g); places of the entries, (2, p), m.
-        self.double, self.named, self.which, self.pairs, self.copies = find_copies(inside)
-        self.places = basis[1:3, self.double[self.which]]
-        # Of each cell the one command, or one of those for it.
-        self.obeyed = np.empty(basis.shape[1], np.intp)
-        self.obeyed[self.flat] = np.arange(self.flat.size)
-        self._basis = basis
-
-    @cached_property
-    def padded(self) -> tuple[Cells, Flags, Floats, Cells]:
-        """The columns side by side, (w, f): cells; which are none; basis, (6, w, f); where all are."""
-        sizes = np.count_nonzero(self.inside, axis=1)
-        absent = np.arange(sizes.max())[:, None] >= sizes
-        cells = np.zeros(absent.shape, np.intp)
-        cells.T[~absent.T] = self.flat
-        basis = self._basis[:, cells]
-        basis[:, absent] = OUTSIDE
-        finger, place = (~absent.T).nonzero()
-        return cells, absent, basis, place * len(sizes) + finger
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ from .active_set import Selection
 from .state import ActiveSet, State
 from .system import System
 
+#: How many times as long as that of one finger a set is kept.
+LONGER = 3
 #: Moves cells that several fingers press: heights (g,), openings and commands (l, g), filters (r, c, g),
 #: undersides at the period's instants (p, c, g), fingers (c, g); returns heights, filters, forces (c, g), N.
 PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, Floats, Floats]]
@@ -30,6 +33,11 @@ PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, 
 @dataclass(frozen=True, eq=False)
 class HandSelection(Selection):
     """Selection of the active cells of a bed under f fingertips, one disc each: arrays (f,)."""
+
+    @cached_property
+    def kept(self) -> int:
+        """Control periods for which a set is kept: to make one takes as long as a period of ten fingers."""
+        return LONGER * super().kept
 
     def update(self, state: State, finger: Any, control: Any) -> State:
         """Return a state whose active cells are all that can change in a period; see `Selection`."""
@@ -131,10 +139,11 @@ class HandSystem(System):
 class Pairs:
     """The pairs of fingers that are alike, prepared to be moved as the cells of one bed."""
 
-    def __init__(self, system: HandSystem, active: ActiveSet, fingers: list[int], others: Cells) -> None:
+    def __init__(
+        self, system: HandSystem, active: ActiveSet, inside: Flags, fingers: list[int], others: Cells
+    ) -> None:
         cell, rows, width = system.cells[fingers[0]], system.rows, active.cells.size
-        inside = find_pairs(active)
-        finger, self.cells = (part.astype(np.intp) for part in inside[fingers].nonzero())
+        finger, self.cells = inside[fingers].nonzero()
         self.fingers = np.array(fingers)[finger]
         self.places = gather_places(inside[fingers], active.quadratic_basis[:, : active.near])
         self.places = self.places._replace(fingers=np.array(fingers)[self.places.fingers])
@@ -189,12 +198,13 @@ class HandMovement:
         for finger, plan in enumerate(system.plans):
             alike.setdefault(id(plan), []).append(finger)
         others = np.arange(active.near, active.cells.size)
-        groups = list(alike.values())
-        self._groups = [Pairs(system, active, groups[0], others)]
-        self._groups += [Pairs(system, active, fingers, others[:0]) for fingers in groups[1:]]
+        groups, inside = list(alike.values()), find_pairs(active)
+        self._groups = [
+            Pairs(system, active, inside, fingers, others if fingers is groups[0] else others[:0])
+            for fingers in groups
+        ]
         self._fingers = np.concatenate([group.fingers for group in self._groups])
-        order = [finger for fingers in groups for finger in fingers]
-        copies = find_copies(find_pairs(active)[order])
+        copies = find_copies(inside[[finger for fingers in groups for finger in fingers]])
         self._double, self._copies = copies.cells, copies.number[copies.entries]
         # The first pair of a cell also makes up the number of those of others.
         self._distinct = self._copies != self._copies[0]
