@@ -6,9 +6,9 @@ hand has not drawn further, it waits, and the session with it. So what it does f
 Depth counts from the surface as it was when the finger began, or when its pass did: pins that give way do not
 draw the fingertip after them. No Blender in here.
 
-Each image of a path has a fingertip, as far as there are any, and all go at once. Of two that come near each
-other the one of the later image lifts, and waits above until the other one is away; where images coincide,
-one of them is gone along.
+Each image of a path has a fingertip, as far as there are any, and all go at once, side by side as well. None
+comes down where a method would take it for another one; of two that meet the one of the later image lifts,
+and waits above until the other one is away; where images coincide, one of them is gone along.
 
 A brush that raises presses until the blister starts, and rises to its height there. Every brush then goes
 along at its height, up and down over what is formed.
@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -61,16 +62,18 @@ TURN = 3.0
 #: for pins at their stops never do, and how fast it gains speed, m/s². On "design" two of 15 valleys of 6 mm
 #: that begin on the flank of another one take more than 1 N, one of them 76 N; before, six did, up to 535 N.
 FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
-
+#: Force above which one of several that are near each other waits, on even ground or pressing, N: alone it is
+#: 0.9 N at most. Without that, one whose pins another one has taken runs into clay, with 9 N.
+HARD = 1.0
 
 #: Fastest drag where no blister follows, m/s and half widths a second, and fastest press there, m/s. Pressed
 #: faster, the fingertip runs into pins whose valves have not opened yet.
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3
-#: An image so near to another one that blisters overlap yields; without blisters, in largest diameters of the
-#: fingertip. One that is so near, in pitches, is the same.
-TOO_NEAR, SAME = 0.75, 0.5
+#: An image comes down no nearer to another one, and yields to one that comes so near, in largest semi-axes of
+#: the fingertip; one that is so near, in pitches, is the same.
+APART, MEETING, SAME = 1.0, 0.15, 0.5
 #: Phases in which it touches, or is about to.
 DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
 
@@ -136,23 +139,25 @@ def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | Non
 
 
 def follow(
-    stroke: Stroke, device: Device, now: Floats, pose: Floats, count: int, period: float, force: float = 0.0
-) -> tuple[Stroke, Floats]:
+    stroke: Stroke, device: Device, now: Floats, pose: Floats, count: int, period: float, force: float = 0.0,
+    hard: float = math.inf,
+) -> tuple[Stroke, Floats]:  # fmt: skip
     """Advance the fingertip along a stroke that has begun; return it and the path (k + 1, 7), k <= count.
 
     The path ends where the hand has not drawn further, and where the fingertip begins something else: it
     comes down to the pins that stand there, `now` (n,), m. On uneven ground it is dragged one period at a
-    time: what it does depends on the force, N.
+    time: what it does depends on the force, N; elsewhere it does on one above `hard`, N.
     """
     if stroke.phase == PRESSING and stroke.standing is None:
         stroke = replace(stroke, standing=now.copy())
-    if stroke.tracking and stroke.phase == DRAGGING:
-        firm = force > FIRM and _is_uneven(stroke, device, pose)
+    if stroke.tracking and stroke.phase in (PRESSING, DRAGGING):
+        drags = stroke.phase == DRAGGING
+        firm = force > (FIRM if drags and _is_uneven(stroke, device, pose) else hard)
         if firm and stroke.waited * period < PATIENCE:
             return replace(stroke, waited=stroke.waited + 1, pace=0.0), np.array([pose, pose])
         stroke = stroke if firm else replace(stroke, waited=0)
         # No farther than to where the force may count.
-        count = 1 if _is_uneven(stroke, device, pose, count * period) else count
+        count = 1 if drags and _is_uneven(stroke, device, pose, count * period) else count
     way, path = Way(device, period, find_safe(stroke, device, now)), [pose]
     while len(path) <= count and stroke.phase not in (FINISHING, DONE):
         step = _step(stroke, way, path[-1][:3].tolist())
@@ -176,13 +181,17 @@ def follow_images(
     They begin with the first m images, and go on with those m further on. Where one waits for the hand, all
     do: what they do follows from the path alone. Otherwise as `follow`.
     """
-    path = [poses]
+    path, hard = [poses], math.inf
+    if stroke.tracking:
+        gap = min((math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf)
+        count = 1 if gap < 2.0 * stroke.tracking.reach(count * period) else count
+        hard = HARD if gap < 2.0 * stroke.tracking.radius else hard
     for part in stroke.parts:
         dragged, at = part.tracking and part.phase == DRAGGING, poses[part.image % len(poses)]
         if part.phase in (ABOVE, YIELDING) or (dragged and _is_uneven(part, device, at, count * period)):
             count = 1
     while len(path) <= count and stroke.parts:
-        before, (stroke, places) = stroke, _follow_once(stroke, device, now, path[-1], period, forces)
+        before, (stroke, places) = stroke, _follow_once(stroke, device, now, path[-1], period, forces, hard)
         if stroke is before:
             break
         path.append(places)
@@ -192,7 +201,7 @@ def follow_images(
 
 
 def _follow_once(
-    stroke: Stroke, device: Device, now: Floats, poses: Floats, period: float, forces: Floats
+    stroke: Stroke, device: Device, now: Floats, poses: Floats, period: float, forces: Floats, hard: float
 ) -> tuple[Stroke, Floats]:
     """Advance fingertips by a period; return the stroke, as it is where one waits, and their poses (m, 7)."""
     parts, count, after = list(stroke.parts), len(poses), poses.copy()
@@ -202,7 +211,7 @@ def _follow_once(
         part = replace(parts[image], samples=stroke.samples, held=stroke.held)
         down = [at[other.image] for other in parts[:image] if other.image in at and other.phase in DOWN]
         part = _yield(part, parts[:image], down, device, now, pose)
-        part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]))
+        part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]), hard)
         if len(path) == 1 and not part.left:
             return stroke, poses
         parts[image], after[image % count] = part, path[-1]
@@ -219,8 +228,8 @@ def _yield(
 
     Above, it comes as far along its path as it coincides with what an earlier one has gone along.
     """
-    wide = TOO_NEAR * max(device.finger.length, device.finger.width)
-    least = 2.0 * (part.tracking.radius if part.tracking else wide)
+    least = MEETING if part.phase in (RISING, DRAGGING) else APART
+    least *= max(device.finger.length, device.finger.width)
     near = any(math.dist(pose[:2], other[:2]) < least for other in down)
     if near and part.phase in (PRESSING, RISING, DRAGGING):
         return replace(part, phase=YIELDING, standing=None, climb=0.0, pace=0.0)
@@ -244,8 +253,7 @@ def _is_uneven(stroke: Stroke, device: Device, pose: Floats, time: float = 0.0) 
     """Tell whether the ground is uneven that the blister is over, or comes over in a time, s."""
     assert stroke.ground is not None
     assert stroke.tracking is not None
-    fastest = max(stroke.tracking.drag, stroke.tracking.push)
-    near = device.grid.disc(pose[0], pose[1], stroke.tracking.radius + fastest * time)
+    near = device.grid.disc(pose[0], pose[1], stroke.tracking.reach(time))
     return near.size > 0 and bool(np.ptp(stroke.ground[near]) > UNEVEN)
 
 
@@ -255,7 +263,8 @@ def find_safe(stroke: Stroke, device: Device, now: Floats) -> float:
     highest = float(stroke.height.max())
     # Before the fingertip is down for the first time nothing is raised, and not all of the path is known.
     if len(stroke.images) > 1 and stroke.phase in (ABOVE, YIELDING):
-        highest = max(highest, float(now.max()))
+        # In whole steps, else it would wait until pins that others form have crept to their heights.
+        highest = CLEARANCE * math.ceil(max(highest, float(now.max())) / CLEARANCE)
     elif stroke.brush.rises and stroke.phase != ABOVE:
         raised = max(sample.depth for sample in stroke.samples)
         highest = device.highest if stroke.accumulate else min(highest + raised, device.highest)

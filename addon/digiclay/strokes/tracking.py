@@ -67,6 +67,10 @@ class Tracking:
     #: Whether pins ahead stand so that they come to any height in time.
     ready: bool = False
 
+    def reach(self, time: float) -> float:
+        """Return how far from a fingertip its blister may come in a time, s, m."""
+        return self.radius + max(self.drag, self.push) * time
+
     def limit_drag(self, change: float, *, pressed: bool) -> float:
         """Return the fastest drag, m/s, where pins ahead are to come to heights `change` away, m."""
         fastest = self.push if pressed else self.drag
