@@ -168,6 +168,21 @@ def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, 
             assert np.linalg.norm(pressed_at - image.place(*place), axis=1).min() < 1.5e-3
 
 
+def test_one_that_waits_comes_down_although_pins_creep_up() -> None:
+    places = 1e-3 * np.linspace([4.0, -28.0], [4.0, 28.0], 57)
+    stroke = lay_path(start(1, 0.0, 0.0, 4e-3, make_images("X")), places)
+    stroke, poses, periods = begin(stroke, HEIGHT, AT[3:], None), np.repeat(AT[None], 2, axis=0), 0
+    while not stroke.done and periods < 400:  # as after a raise, by a nanometer a millisecond
+        now = HEIGHT + 5e-9 * periods
+        if stroke.parts:
+            stroke, path = follow_images(stroke, DEVICE, now, poses, 1, PERIOD, np.zeros(2))
+        else:
+            stroke, path = follow(stroke, DEVICE, now, poses[0], 1, PERIOD)
+            path = np.repeat(path[:, None], 2, axis=1)
+        poses, periods = path[-1], periods + 1
+    assert stroke.done
+
+
 def test_the_finger_crosses_the_bed_above_all_pins() -> None:
     _, poses = path(release(line()), np.array([-0.02, -0.02, 0.030, *LEVEL]))
     for before, after in pairwise(poses):

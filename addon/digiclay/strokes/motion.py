@@ -62,9 +62,6 @@ TURN = 3.0
 #: for pins at their stops never do, and how fast it gains speed, m/s². On "design" two of 15 valleys of 6 mm
 #: that begin on the flank of another one take more than 1 N, one of them 76 N; before, six did, up to 535 N.
 FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
-#: Force above which one of several that are near each other waits, on even ground or pressing, N: alone it is
-#: 0.9 N at most. Without that, one whose pins another one has taken runs into clay, with 9 N.
-HARD = 1.0
 
 #: Fastest drag where no blister follows, m/s and half widths a second, and fastest press there, m/s. Pressed
 #: faster, the fingertip runs into pins whose valves have not opened yet.
@@ -185,7 +182,7 @@ def follow_images(
     if stroke.tracking:
         gap = min((math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf)
         count = 1 if gap < 2.0 * stroke.tracking.reach(count * period) else count
-        hard = HARD if gap < 2.0 * stroke.tracking.radius else hard
+        hard = stroke.tracking.hard if gap < 2.0 * stroke.tracking.radius else hard
     for part in stroke.parts:
         dragged, at = part.tracking and part.phase == DRAGGING, poses[part.image % len(poses)]
         if part.phase in (ABOVE, YIELDING) or (dragged and _is_uneven(part, device, at, count * period)):

@@ -7,6 +7,7 @@ finger that goes along at one height.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,9 @@ MARGIN = 0.5e-3
 #: Fastest press, as a share of the speed of pins without load, and greatest acceleration of a fingertip up
 #: and down, m/s²: at 5 m/s² pins of the bed "design" lose it where a press ends.
 PRESS, SUDDEN = 0.5, 2.0
+#: Force, in set points, above which a fingertip near another one waits, on even ground or pressing: alone 2.2
+#: at most. Without that, one whose pins the other has taken runs into clay. Method II holds each pin's force.
+HARD = 2.5
 #: Changes of height less than this share of the blister's radius are none.
 NEAREST = 1e-9
 #: Samples across a fingertip, and halvings, in the search for its sink.
@@ -64,6 +68,8 @@ class Tracking:
     highest: float
     #: How long the method looks for a fingertip that has left, s.
     search: float
+    #: Force above which a fingertip that is near another one waits, N.
+    hard: float
     #: Whether pins ahead stand so that they come to any height in time.
     ready: bool = False
 
@@ -105,9 +111,10 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
     drag, push = (min(pace.fastest, radii * blister.radius) for radii in (pace.drag, pace.push))
     gain, down = min(lift / pace.gain, SUDDEN), min(pace.press, PRESS * speed)
     radius, highest = blister.radius, system.cell.actuator.stroke
+    hard = math.inf if isinstance(control, CellStates) else HARD * asked
     search = 0.0 if isinstance(control, CellStates) else control.loss_time
     return Tracking(
-        sink, press, speed, lift, gain, down, drag, push, slope, radius, highest, search, pace.ready
+        sink, press, speed, lift, gain, down, drag, push, slope, radius, highest, search, hard, pace.ready
     )
 
 
