@@ -165,7 +165,7 @@ NEAR = {
     "two fingertips, mm apart": "case", "method": "method",
     "RFD alone, mN": "alone_N .0f 1e3", "other": "alone_other_N .0f 1e3",
     "together, mN": "together_N .0f 1e3", "other's": "together_other_N .0f 1e3",
-    "largest force, N": "force_N .2f",
+    "largest force, N": "force_N .2f", "in contact, of alone, %": "contact .0f 100",
 }  # fmt: skip
 
 
@@ -187,7 +187,10 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
             names = "together_N", "together_other_N", "alone_N", "alone_other_N"
             rfd = dict(zip(names, (one["rfd"] for one in together + alone), strict=True))
             largest = max(one["max_total_force"] or 0.0 for one in together)
-            near.append({"case": name, "method": method, **rfd, "force_N": largest})
+            # The RFD leaves out the time without contact: one that is lost has a small one.
+            both = zip(together, alone, strict=True)
+            contact = min((own["contact_share"] or 0.0) / (one["contact_share"] or 1.0) for own, one in both)
+            near.append({"case": name, "method": method, **rfd, "force_N": largest, "contact": contact})
         steps(name)
     return [
         Report(tabulate(costs, COST), costs, name="fingers_cost"),

@@ -452,6 +452,18 @@ def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_a
         assert [one["lag_mean"] for one in each] == [lag and pytest.approx(lag, abs=1e-12) for lag in lags]
 
 
+def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low() -> None:
+    given = of_two(
+        (-5e-3, 8e-3), {1: 0.1, 2: 0.2, 4: 0.3}, (0.1, 0.5)
+    )  # the second pin is 5 and 8 mm from them
+    given = of_two((-5e-3, 8e-3), {1: 0.1, 2: 0.2, 4: 0.3}, (0.1, 0.5))
+    given["fingertip"][:, 1, 2] = 35e-3
+    given["height"] += [0.0, 41e-3, 40e-3, 0.0, 36e-3]
+    mine, lower = split_fingers(given)
+    np.testing.assert_allclose(mine["force"][0], [0.0, 0.1, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(lower["force"][0], [0.0, 0.0, 0.2, 0.0, 0.3])
+
+
 @pytest.mark.parametrize(
     ("name", "each", "worst"),
     [

@@ -158,9 +158,9 @@ class CellStatesControl:
     floor: float = 0.0
     """Force from which on the reading of a cell is no noise, N."""
 
-    #: A cell remembers how many periods it has been critical.
+    #: A cell remembers how many periods it has been critical, and of several fingers whose it is.
     rows = 1
-    pin_rows = (0,)
+    whose = 0
 
     def begin(self) -> Patch:
         """Return the memory before a session."""

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import TINY, Cells, Flags, Floats, any_true
-from ..model.control_interface import Commands, Controller, Measurement
-from ..model.fingertip import JOIN
+from ..model.control_interface import Commands, Measurement
+from ..model.fingertip import continue_ball
 from ..model.layout import Disc
 from .finger_sections import BEYOND, OUTSIDE, Columns, Sections, Whole
 from .travel import measure_square
@@ -29,8 +29,6 @@ CAPTURE = 1.2
 NEW, UNDER = 0.65, 0.5
 #: How far above a pressed pin a predicted underside may be that presses it, m.
 REACHED = 6e-3
-#: Slope of an underside beyond the join, see `model.fingertip`.
-STEEP = 0.5 / (1.0 - JOIN) ** 0.5
 #: How near a pressed pin two undersides must be for both to be able to press it, m.
 UNCLEAR = 0.2e-3
 #: Share of a pin that a finger does not see.
@@ -90,9 +88,10 @@ class HandControl:
         (pressed,) = touched.force.nonzero()
         owner, under, divided = np.full(pressed.size, NOBODY), np.zeros((len(self.runs), 0)), None
         if pressed.size:
-            under = self._predict_under(memory, touched.quadratic_basis.take(pressed, 1))
+            height = touched.height[pressed]
+            under = self._predict_under(memory, touched.quadratic_basis.take(pressed, 1), height)
             if self._predicts:
-                under[under > touched.height[pressed] + REACHED] = np.inf
+                under[under > height + REACHED] = np.inf
             owner = self._find_new(touched, pressed, find_lowest(under))
             divided = touched.cells[pressed], owner
         located = self.locate_each(memory.fingers, touched, pressed, owner, under)
@@ -117,11 +116,14 @@ class HandControl:
         chosen = columns.obeyed.copy()
         if owner.size:
             chosen[columns.double] = self._choose(memory, seen, owner, columns, given.target)
-        # What is remembered of a pin's command is that of the command obeyed, for all fingers.
+        self._remember(seen.own, columns.finger[chosen])
+        return memory, Commands(given.target[chosen], given.mode[chosen], given.command[chosen])
+
+    def _remember(self, own: Floats, obeyed: Cells) -> None:
+        """Keep of each pin's command, in rows (r, m), what the finger obeyed remembers, (m,), for all."""
         count = int(self.runs[0].rows)
         for row in getattr(self.runs[0], "pin_rows", ()):
-            seen.own[row::count] = seen.own[columns.finger[chosen] * count + row, np.arange(chosen.size)]
-        return memory, Commands(given.target[chosen], given.mode[chosen], given.command[chosen])
+            own[row::count] = own[obeyed * count + row, np.arange(obeyed.size)]
 
     def locate_each(
         self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
@@ -151,7 +153,7 @@ class HandControl:
         fingertip, and not the other way round, it is the other's alone: it cannot be high for the one.
         """
         basis = seen.quadratic_basis.take(double, 1)
-        under = self._predict_under(memory, basis)
+        under = self._predict_under(memory, basis, seen.height[double])
         owner = find_lowest(under)
         shares, _ = self._share(under, owner, seen, double)
         others = under.copy()
@@ -212,24 +214,28 @@ class HandControl:
         followed = zip(self.runs, memory.fingers, strict=True)
         return np.array([find_blister(run, own) for run, own in followed]).T
 
-    def _predict_under(self, memory: Hands, basis: Floats) -> Floats:
-        """Return the undersides of fingers over pins, (f, q), m; infinite where one is not near."""
-        places = [own.place for own in memory.fingers]
-        x, y = np.array([place or (BEYOND, BEYOND) for place in places]).T
+    def _place(self, memory: Hands) -> Floats:
+        """Return where all fingers are, (f, 2), m; `BEYOND`: not found."""
+        places: Floats = np.array([own.place or (BEYOND, BEYOND) for own in memory.fingers])
+        return places
+
+    def _predict_under(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
+        """Return the undersides of fingers over pins of a `height`, (f, q), m; infinite where one is far."""
+        x, y = self._place(memory).T
         square = measure_square(x, y, basis)
         _, size, reach = self._sizes
         far: Flags = square > reach
         if not self._predicts:
             tops = np.array([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
             square /= size * size
-            heights: Floats = continue_ellipsoid(square)
+            heights = continue_ball(square)
             heights *= size
             heights += tops + size
             heights[far] = np.inf
             return heights
         under = np.full(square.shape, np.inf)
         for run, alike in self._alike:
-            own = [i for i in alike if places[i]]
+            own = [i for i in alike if memory.fingers[i].place]
             if own:
                 under[own] = run.predict_under([memory.fingers[i] for i in own], basis)
         under[far] = np.inf
@@ -440,13 +446,6 @@ class HandInGroups(HandControl):
                 rows_of[i][:, columns[i]] = own
 
 
-def continue_ellipsoid(reduced: Floats) -> Floats:
-    """Return the underside of a ball of radius 1 at squared distances of its axis; see `model.fingertip`."""
-    low = np.sqrt(np.maximum(1.0 - reduced, 1.0 - JOIN))
-    under: Floats = STEEP * np.maximum(reduced - JOIN, 0.0) - low
-    return under
-
-
 def find_lowest(under: Floats) -> Cells:
     """Return the finger with the lowest of undersides (f, q), (q,); `NOBODY`: all are infinite."""
     lowest: Cells = under.argmin(axis=0)
@@ -461,8 +460,3 @@ def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float, flo
     # That of a method without a master reaches from the pressed cells on.
     radius = run.blister.radius + getattr(run.parameters, "jump", 0.0) if place else -1.0
     return x, y, radius, memory.edge, getattr(memory, "top", getattr(memory, "height", memory.edge))
-
-
-def follows_finger(controller: Controller) -> bool:
-    """Tell whether a controller follows one fingertip, and several need one each."""
-    return hasattr(controller, "blister") and hasattr(controller.begin(), "place")

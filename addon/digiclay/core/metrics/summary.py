@@ -21,6 +21,8 @@ from ..model.layout import find_grid_shape
 
 #: How far the fingertip must have gone on from a cell for it to count as left behind, m.
 AWAY = 12e-3
+#: Radius of the ball a fingertip is taken for, m, where it is asked which of several presses a pin.
+BALL = 10e-3
 #: Distances from a finger to cells looked at at a time: those of a long session on a large bed would not fit
 #: in memory.
 AT_ONCE = 2**17
@@ -324,6 +326,7 @@ def measure_touchdown(
 def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     """Give the history of each finger; a pin's force counts for the nearest, where two press it.
 
+    That is the nearest ball on a lowest point: what a lower fingertip presses may be beneath the other one.
     Where two are equally near it counts for both, and for a finger without any the nearest that is pressed.
     """
     if "finger_force" not in history:
@@ -332,11 +335,13 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     common = {name: values for name, values in history.items() if name != "finger_force"}
     felt = (history["force"] > 0.0) | (history["mode"] == Mode.FORCE_FOLLOW)
     cells = np.flatnonzero(felt.any(axis=0))  # of a large bed they are few
-    tips, (x, y), given = history["fingertip"], history["position"][cells].T, history["force"][:, cells]
+    tips, (x, y) = history["fingertip"], history["position"][cells].T
+    given, low = history["force"][:, cells], history["height"][:, cells] - BALL
     pressed, least = given > 0.0, np.full(given.shape, np.inf)
 
     def square(finger: int) -> Floats:
-        apart: Floats = (x - tips[:, finger, :1]) ** 2 + (y - tips[:, finger, 1:2]) ** 2
+        beside, along, above = tips[:, finger, :3].T[:, :, None]
+        apart: Floats = (x - beside) ** 2 + (y - along) ** 2 + (low - above) ** 2
         return apart
 
     for finger in range(tips.shape[1]):

@@ -33,6 +33,13 @@ _ROOT = (1.0 - JOIN) ** 0.5
 _SLOPE = 0.5 / _ROOT
 
 
+def continue_ball(square: Floats) -> Floats:
+    """Return the underside of a ball of radius 1 about 0, continued, at squared distances of its axis."""
+    low = np.sqrt(np.maximum(1.0 - square, 1.0 - JOIN))
+    under: Floats = _SLOPE * np.maximum(square - JOIN, 0.0) - low
+    return under
+
+
 def require_one(fingers: Sequence[Item]) -> Item:
     """Return the only item of a list of one a finger, or raise ParameterError; see docs/architecture.md."""
     if len(fingers) != 1:

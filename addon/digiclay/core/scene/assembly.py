@@ -230,15 +230,16 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     touches = [device.cell.touch for device in devices]
     if len(controllers) == 1 or not all(touches):
         return controllers[0]
-    from ..control.hands import HandInGroups, HandTogether, follows_finger
+    from ..control.cell_hands import CellHands
+    from ..control.hands import HandInGroups, HandTogether
     from ..control.servo import BatchControl
     from .columns import join_controllers
 
-    if not follows_finger(controllers[0]):
-        return controllers[0]
+    if not (hasattr(controllers[0], "blister") and hasattr(controllers[0].begin(), "place")):
+        return controllers[0]  # it follows no fingertip
     sizes = [max(touch.fingertip.length, touch.fingertip.width) for touch in touches if touch]
     felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
     common = tuple(controllers), tuple(sizes), felt
     if isinstance(controllers[0], BatchControl):
         return HandTogether(*common, join_controllers(controllers))
-    return HandInGroups(*common)
+    return (CellHands if hasattr(controllers[0], "whose") else HandInGroups)(*common)
