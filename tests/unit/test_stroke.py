@@ -75,11 +75,13 @@ def path(
 
 
 def lead(
-    stroke: Stroke, at: NDArray[np.float64], chunk: int = 4000, bed: NDArray[np.float64] = HEIGHT
-) -> tuple[Stroke, NDArray[np.float64]]:
+    stroke: Stroke, at: NDArray[np.float64], chunk: int = 4000, bed: NDArray[np.float64] = HEIGHT,
+    creep: float = 0.0,
+) -> tuple[Stroke, NDArray[np.float64]]:  # fmt: skip
     """Let fingers at poses (m, 7) go on along a stroke that has begun; return their poses (t, m, 7)."""
     poses, part, forces = [at], at[None], np.zeros(len(at))
-    while not stroke.done and (len(part) > 1 or len(poses) == 1):
+    while not stroke.done and (len(part) > 1 or len(poses) == 1) and len(poses) < 4000:
+        bed = bed + creep
         if stroke.parts:
             stroke, part = follow_images(stroke, DEVICE, bed, poses[-1], chunk, PERIOD, forces)
         else:
@@ -171,16 +173,8 @@ def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, 
 def test_one_that_waits_comes_down_although_pins_creep_up() -> None:
     places = 1e-3 * np.linspace([4.0, -28.0], [4.0, 28.0], 57)
     stroke = lay_path(start(1, 0.0, 0.0, 4e-3, make_images("X")), places)
-    stroke, poses, periods = begin(stroke, HEIGHT, AT[3:], None), np.repeat(AT[None], 2, axis=0), 0
-    while not stroke.done and periods < 400:  # as after a raise, by a nanometer a millisecond
-        now = HEIGHT + 5e-9 * periods
-        if stroke.parts:
-            stroke, path = follow_images(stroke, DEVICE, now, poses, 1, PERIOD, np.zeros(2))
-        else:
-            stroke, path = follow(stroke, DEVICE, now, poses[0], 1, PERIOD)
-            path = np.repeat(path[:, None], 2, axis=1)
-        poses, periods = path[-1], periods + 1
-    assert stroke.done
+    stroke = begin(stroke, HEIGHT, AT[3:], None)
+    assert lead(stroke, np.repeat(AT[None], 2, axis=0), 1, creep=5e-9)[0].done
 
 
 def test_the_finger_crosses_the_bed_above_all_pins() -> None:
