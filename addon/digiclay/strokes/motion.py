@@ -7,8 +7,8 @@ Depth counts from the surface as it was when the finger began, or when its pass 
 draw the fingertip after them. No Blender in here.
 
 Each image of a path has a fingertip, as far as there are any, and all go at once, side by side as well. None
-comes down where a method would take it for another one; of two that meet the one of the later image lifts,
-and waits above until the other one is away; where images coincide, one of them is gone along.
+comes down where a method would take it for another one: the one of the later image lifts, and waits above
+until the other one is away; where images coincide, one of them is gone along.
 
 A brush that raises presses until the blister starts, and rises to its height there. Every brush then goes
 along at its height, up and down over what is formed.
@@ -68,9 +68,9 @@ FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3
-#: An image comes down no nearer to another one, and yields to one that comes so near, in largest semi-axes of
-#: the fingertip; one that is so near, in pitches, is the same.
-APART, MEETING, SAME = 1.0, 0.15, 0.5
+#: An image comes down no nearer to another one, in largest semi-axes of the fingertip; one that is so near, in
+#: pitches, is the same. Where two meet none lifts: beside another's blister pins then run away upwards.
+APART, SAME = 1.0, 0.5
 #: Phases in which it touches, or is about to.
 DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
 
@@ -225,10 +225,9 @@ def _yield(
 
     Above, it comes as far along its path as it coincides with what an earlier one has gone along.
     """
-    least = MEETING if part.phase in (RISING, DRAGGING) else APART
-    least *= max(device.finger.length, device.finger.width)
+    least = APART * max(device.finger.length, device.finger.width)
     near = any(math.dist(pose[:2], other[:2]) < least for other in down)
-    if near and part.phase in (PRESSING, RISING, DRAGGING):
+    if near and part.phase == PRESSING:
         return replace(part, phase=YIELDING, standing=None, climb=0.0, pace=0.0)
     if part.phase != YIELDING or pose[2] < find_safe(part, device, now) - NEAR:
         return part
