@@ -68,8 +68,8 @@ FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3
-#: An image comes down no nearer to another one, in largest semi-axes of the fingertip; so near, in pitches, it
-#: is the same. Where two meet none lifts: beside the blister of another one pins then run away upwards.
+#: An image comes down no nearer to another one, in largest semi-axes of the fingertip; so near, in pitches,
+#: it is the same. Where two meet none lifts: beside the blister of another one pins then run away upwards.
 APART, SAME = 1.0, 0.5
 #: Phases in which it touches, or is about to.
 DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
