@@ -16,7 +16,7 @@ from digiclay.core.session.take import Take, from_bytes, make_take, play, to_byt
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.settings.devices import make_scene
-from digiclay.strokes.stroke import ALONE, FINISHING, Brush, Image, lay_path, make_images
+from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, Image, lay_path, make_images
 
 from tests.hand import finish, heights
 
@@ -168,6 +168,18 @@ def test_images_that_meet_give_way_and_all_of_them_form(name: str) -> None:
         places = np.array([image.place(*place) for place in 1e-3 * path])
         assert formed[session.system.grid.at(*places.T)].min() > 3e-3
     assert is_replayed(keep(session))
+
+
+def test_no_fingertip_lifts_again_for_another_one_that_is_down() -> None:
+    images = make_images("RADIAL", 12, (1.1e-3, -0.7e-3), 0.4)
+    session, pressing, lifted = queue(begin(), line((3.7, 0.9), (11.6, 5.4)), images, RAISE), set[int](), 0
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.poses, 1)
+        parts, forces = session.strokes[0].parts if session.strokes else (), session.state.finger_forces()
+        lifted += sum(part.image in pressing for part in parts if part.phase == YIELDING)
+        pressing = {part.image for part in parts if part.phase == PRESSING and forces[part.image] > 0.0}
+    # It would run into what the others raise, at forces of up to 70 N.
+    assert lifted == 0
 
 
 def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick() -> None:

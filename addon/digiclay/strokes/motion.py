@@ -206,7 +206,9 @@ def _follow_once(
     at = {part.image: poses[part.image % count] for part in busy if part}
     for image, pose in sorted(at.items()):
         part = replace(parts[image], samples=stroke.samples, held=stroke.held)
-        down = [at[other.image] for other in parts[:image] if other.image in at and other.phase in DOWN]
+        # One that waits lets pass whoever is down: none has to lift again from the clay.
+        others = parts if part.phase == YIELDING else parts[:image]
+        down = [at[one.image] for one in others if one.image in at and one.phase in DOWN]
         part = _yield(part, parts[:image], down, device, now, pose)
         part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]), hard)
         if len(path) == 1 and not part.left:
