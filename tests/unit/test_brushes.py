@@ -263,8 +263,8 @@ def test_an_image_that_begins_on_another_one_is_pressed_into_what_stands_there(b
     (stroke,) = session.strokes
     images = make_images("RADIAL", 3)
     session = replace(session, strokes=(replace(stroke, images=images, accumulate=accumulate),))
-    # Three at their set point have 1.2 N together; into the bed as it was before the first image: 10^5 N.
-    assert finish(session).trace.force.max() < 1.5
+    # Into the bed as it was before the first image: 10^5 N.
+    assert finish(session).trace.force.max() < 1.0
 
 
 #: Pins in a row and column of a bed, half the length of a stroke, height of a ridge, depth of a groove, mm.

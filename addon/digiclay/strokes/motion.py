@@ -185,7 +185,9 @@ def follow_images(
         hard = stroke.tracking.hard if gap < 2.0 * stroke.tracking.radius else hard
     for part in stroke.parts:
         dragged, at = part.tracking and part.phase == DRAGGING, poses[part.image % len(poses)]
-        if part.phase in (ABOVE, YIELDING) or (dragged and _is_uneven(part, device, at, count * period)):
+        if part.phase in (ABOVE, YIELDING, PRESSING) or (
+            dragged and _is_uneven(part, device, at, count * period)
+        ):
             count = 1
     while len(path) <= count and stroke.parts:
         before, (stroke, places) = stroke, _follow_once(stroke, device, now, path[-1], period, forces, hard)
@@ -210,6 +212,10 @@ def _follow_once(
         others = parts if part.phase == YIELDING else parts[:image]
         down = [at[one.image] for one in others if one.image in at and one.phase in DOWN]
         part = _yield(part, parts[:image], down, device, now, pose)
+        if part.standing is not None and part.phase == PRESSING:
+            touch = Way(device, period, 0.0).find_touch(part, *pose[:2].tolist())
+            # What others form counts until it is near the pins: then it would wait for those that creep.
+            part = replace(part, standing=None) if pose[2] > touch + CLEARANCE + NEAR else part
         part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]), hard)
         if len(path) == 1 and not part.left:
             return stroke, poses
