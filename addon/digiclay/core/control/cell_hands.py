@@ -61,13 +61,11 @@ class CellHands(HandInGroups):
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
     ) -> Cells:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
-        fingers, which, (x, y) = columns.named, columns.which, columns.places
+        fingers, (x, y) = columns.named, columns.places
         at_x, at_y = self._place(memory).T.take(fingers, axis=1)
         order = (x - at_x) ** 2 + (y - at_y) ** 2
         # Who leaves a pin as it is, is not asked, unless the pin is under it; who presses it is asked first.
-        still = target.take(columns.pairs) == seen.target.take(columns.double).take(which)
+        still = target.take(columns.pairs) == seen.target.take(columns.several)
         order += still & (order > UNDER**2 * self._sizes[2][:, 0].take(fingers))
-        order[owner.take(which) == fingers] = -1.0
-        best = columns.copies[order.take(columns.copies).argmin(axis=0), np.arange(owner.size)]
-        chosen: Cells = columns.pairs[best]
-        return chosen
+        order[owner.take(columns.which) == fingers] = -1.0
+        return columns.pick(-order)

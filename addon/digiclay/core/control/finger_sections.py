@@ -132,13 +132,20 @@ class Columns:
         self.inside = inside
         self.finger, self.flat = inside.nonzero()
         # Cells (g,) in several columns; of their (p,) entries: fingers, which of these cells, and numbers in
-        # `flat`; which entries are each cell's, (c, g); places of the entries, (2, p), m.
-        self.double, self.named, self.which, self.pairs, self.copies = find_copies(inside)
-        self.places = basis[1:3, self.double[self.which]]
+        # `flat`; which entries are each cell's, (c, g); cells of the entries, and places, (2, p), m.
+        self.double, self.named, self.which, self.pairs, self._entries = find_copies(inside)
+        self.several = self.double[self.which]
+        self.places = basis[1:3, self.several]
         # Of each cell the one command, or one of those for it.
         self.obeyed = np.empty(basis.shape[1], np.intp)
         self.obeyed[self.flat] = np.arange(self.flat.size)
         self._basis = basis
+
+    def pick(self, rank: Floats) -> Cells:
+        """Return which of `flat` has the highest rank, (p,), of each cell in several columns, (g,)."""
+        best = self._entries[rank.take(self._entries).argmax(axis=0), np.arange(self.double.size)]
+        picked: Cells = self.pairs[best]
+        return picked
 
     @cached_property
     def padded(self) -> tuple[Cells, Flags, Floats, Cells]:

@@ -235,7 +235,7 @@ class HandControl:
             return heights
         under = np.full(square.shape, np.inf)
         for run, alike in self._alike:
-            own = [i for i in alike if memory.fingers[i].place]
+            own = [i for i in alike if x[i] < BEYOND]
             if own:
                 under[own] = run.predict_under([memory.fingers[i] for i in own], basis)
         under[far] = np.inf
@@ -268,7 +268,7 @@ class HandControl:
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
     ) -> Cells:
         """Return which of the commands for each pin with several is obeyed, (g,)."""
-        fingers, which, (x, y) = columns.named, columns.which, columns.places
+        fingers, (x, y) = columns.named, columns.places
         at_x, at_y, radius, ground, _ = self._find_blisters(memory)
         limits = radius * np.abs(radius), UNDER**2 * self._sizes[2][:, 0]
         at_x, at_y, ground, edge, under = np.array((at_x, at_y, ground, *limits)).take(fingers, axis=1)
@@ -277,15 +277,13 @@ class HandControl:
         inside = square <= edge
         # Outside of all blisters pins are led, or left as they are; of two the nearer one is obeyed.
         asked = target.take(columns.pairs)
-        aside = np.where(asked == seen.target.take(columns.double).take(which), -1.0, -0.5)
+        aside = np.where(asked == seen.target.take(columns.several), -1.0, -0.5)
         off = np.where(inside, np.abs(asked - ground), aside - square)
         # Under a fingertip its own blister is obeyed, and where it presses before all.
         inside &= square <= under
         off = np.where(inside, 1.0 - square, off)
-        off[owner.take(which) == fingers] = 2.0
-        best = columns.copies[off.take(columns.copies).argmax(axis=0), np.arange(owner.size)]
-        chosen: Cells = columns.pairs[best]
-        return chosen
+        off[owner.take(columns.which) == fingers] = 2.0
+        return columns.pick(off)
 
     def arrange(self, part: str, seen: Measurement) -> Columns:
         """Return the columns of a part of the active cells; those of one active set are the same."""
