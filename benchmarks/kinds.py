@@ -21,7 +21,7 @@ PAPER = "ridge_mound_valley"
 #: Recorded strokes of the made things.
 STROKES = Path(__file__).parent / "strokes"
 #: Packages that benchmarks need, and the extra that has them.
-EXTRAS = {"distributed": "cluster", "scipy": "suite", "websockets": "serve"}
+EXTRAS = {"scipy": "suite", "websockets": "serve"}
 EXAMPLES = """\
 examples:
   python -m benchmarks session
@@ -112,9 +112,6 @@ BENCHMARKS = {
         },
         needs="bpy",
     ),
-    "cluster": Benchmark(
-        "processes.measure_cluster", "overhead of a Dask cluster, one worker and two", needs="distributed"
-    ),
     "serve": Benchmark(
         "processes.measure_serve", "deadlines of digiclay serve, and poses to pins, with a client",
         ("", "--fingers 10 --rate 200"),
@@ -124,19 +121,11 @@ BENCHMARKS = {
         },
         needs="websockets",
     ),
-    "methods": Benchmark(
-        "method_figures.measure", "force deviation of Method III in fast drags and on other devices"
-    ),
     "pace": Benchmark(
         "pace.measure", "how fast a fingertip can lead each method, beside what the method states"
     ),
     "several_fingers": Benchmark(
         "several_fingers.measure", "what several fingertips cost, and two near each other feel"
-    ),
-    "ablation": Benchmark(
-        "method_figures.measure_ablation", "Method III with one part left out at a time",
-        ("", "--part skirt"),
-        {"--part P": "a row of the table, such as skirt"},
     ),
     "commits": Benchmark(
         "processes.measure_commits", "time of a control period at two commits",

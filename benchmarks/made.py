@@ -4,27 +4,140 @@ import argparse
 import tempfile
 import time
 from dataclasses import dataclass, replace
-from math import radians
+from math import cos, radians, sin
 from pathlib import Path
 
 import numpy as np
 from digiclay.commands.stop import refuse_unwritable
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError, explain_os_error
+from digiclay.core.control.blister import Blister
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Grid, Layout
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.render_settings import Still
 from digiclay.device import view
-from digiclay.device.instant import Instant
+from digiclay.device.instant import CLEARANCE, Instant, find_ellipsoid
 from digiclay.pictures import stage
 from digiclay.pictures.still import render_picture, stage_bed
-from digiclay.recorded.pointer_strokes import read_strokes
+from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
 from digiclay.roles import fingertip_of
-from digiclay.settings.devices import BEDS
+from digiclay.sessions.running import Running
+from digiclay.sessions.sculpting import begin_session
+from digiclay.settings.devices import BEDS, FIRST, change_finger, make_scene
+from digiclay.strokes.stroke import lay_ring
 
-from .alike import Played, compare, find_spikes, make_bed, move, play
-from .intended import THINGS, find_relief
+from .intended import THINGS, find_distance, find_relief
 from .kinds import STROKES
 from .report import Report, Steps, tabulate
+
+#: Parts of the flat top, and of the slope, between which a section is straight.
+PARTS = (3, 6)
+
+
+def measure_distances(stroke: PointerStroke, grid: Grid) -> Floats:
+    """Return how far pins are from the path of a stroke, or its nearest mirror image, (n,), m."""
+    path = np.array([move[1:] for move in stroke.moves])
+    if stroke.path != "free":
+        path = lay_ring(path[0], path[-1]) if stroke.path == "ring" else path[[0, -1]]
+    paths = [[image.place(x, y) for x, y in path.tolist()] for image in stroke.images]
+    return np.asarray(np.min([find_distance(one, grid.x, grid.y) for one in paths], axis=0))
+
+
+def measure_unevenness(height: Floats, near: Floats, blister: Blister) -> Floats:
+    """Return how far pins (k,) differ, (k,), m, from the common section of those so far from a path, m."""
+    flat, radius = blister.flat_radius, blister.radius
+    knots = np.concatenate([
+        np.linspace(0.0, flat, PARTS[0], endpoint=False), np.linspace(flat, radius, PARTS[1]),
+        [max(2.0 * radius - flat, near.max() * (1.0 + 1e-9))],
+    ])  # fmt: skip
+    hats = np.array([np.interp(near, knots, row) for row in np.eye(len(knots))]).T
+    return np.asarray(height - hats @ np.linalg.lstsq(hats, height, rcond=None)[0])
+
+
+def find_unevenness(
+    height: Floats, strokes: tuple[PointerStroke, ...], grid: Grid, blisters: tuple[Blister, ...]
+) -> Floats:
+    """Return `measure_unevenness` of the pins at just one stroke that raises or lowers, (k,), m."""
+    near = np.array([measure_distances(stroke, grid) for stroke in strokes])
+    reach = np.array([[blister.radius + grid.layout.pitch] for blister in blisters])
+    alone, found = (near < reach).sum(axis=0) == 1, [np.zeros(1)]
+    for stroke, row, (most,), blister in zip(strokes, near, reach, blisters, strict=True):
+        cells = np.flatnonzero(alone & (row < most))
+        if stroke.kind.has_amount and cells.size:
+            found.append(measure_unevenness(height[cells], row[cells], blister))
+    return np.concatenate(found)
+
+
+def find_spikes(height: Floats, grid: Grid) -> Floats:
+    """Return how far pins are above, or below, all their neighbors, (n,), m."""
+    beside = np.append(height, np.nan)[grid.layout.find_neighbors(corners=True)]
+    above = height - np.fmax.reduce(beside, axis=1)
+    return np.asarray(np.maximum(above, np.fmin.reduce(beside, axis=1) - height).clip(0.0))
+
+
+def move(
+    strokes: tuple[PointerStroke, ...], angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0),
+    share: float = 1.0,
+) -> tuple[PointerStroke, ...]:  # fmt: skip
+    """Return strokes turned by an angle, rad, scaled, and shifted, m; depths and heights stay."""
+    c, s, (x0, y0) = share * cos(angle), share * sin(angle), shift
+    return tuple(
+        replace(one, moves=tuple((t, c * x - s * y + x0, s * x + c * y + y0) for t, x, y in one.moves))
+        for one in strokes
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What strokes have left on an even bed."""
+
+    session: Running
+    formed: Floats
+    """(n,): Heights above rest, m."""
+    force: float
+    """Greatest total force on a fingertip, N."""
+    time: float
+    """Simulated until all is formed, s."""
+    strokes: tuple[PointerStroke, ...]
+
+    @property
+    def grid(self) -> Grid:
+        """Of the pins."""
+        return self.session.system.grid
+
+    def find_unevenness(self, height: Floats) -> Floats:
+        """Return `find_unevenness` of heights (n,), m, of the bed."""
+        usual, scene = find_ellipsoid(self.session.scene), self.session.scene
+        scenes = [change_finger(scene, usual, one.size_finger(usual)) for one in self.strokes]
+        return find_unevenness(
+            height, self.strokes, self.grid, tuple(one.blister or Blister() for one in scenes)
+        )
+
+
+def make_bed(name: str = FIRST, side: int | None = None) -> Scene:
+    """Return a bed as Add makes it, or one with so many rows and columns."""
+    bed = BEDS[name]
+    layout = Layout(rows=side or bed.rows, columns=side or bed.columns, pitch=bed.pitch)
+    return make_scene(bed.preset, layout, bed.method, bed.share)
+
+
+def begin(scene: Scene) -> Running:
+    """Return a session of a bed at rest, the fingertip above it."""
+    above = np.array([0.0, 0.0, scene.actuator.rest_height + CLEARANCE, *LEVEL])
+    return begin_session(1, "Bed", scene, above)[0]
+
+
+def play(scene: Scene, strokes: tuple[PointerStroke, ...]) -> Played:
+    """Play strokes on a bed at rest."""
+    session, force, rest = begin(scene), 0.0, scene.actuator.rest_height
+    for after in play_strokes(session, strokes):
+        # A trace has the total of the fingertips; what each of several feels is seen at the end of a tick.
+        one, since = len(session.poses) == len(after.poses) == 1, after.state.period - session.state.period
+        felt = after.trace.force[-since:] if one and since else after.state.finger_forces()
+        session, force = after, max(force, float(felt.max(initial=0.0)))
+    time = session.state.period * session.system.period
+    return Played(session, session.state.row(0) - rest, force, time, strokes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +258,8 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def measure(arguments: argparse.Namespace, steps: Steps) -> Report | list[Report]:
-    """Make the things, and draw them with ``--pictures``; without names also `compare`."""
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Make the things, and draw them with ``--pictures``."""
     beds = [arguments.bed] if arguments.bed else []
     for option, given, choices in (("THING", arguments.things, THINGS), ("--bed", beds, tuple(BEDS))):
         for name in set(given) - set(choices):
@@ -167,5 +280,4 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report | list[Report
         if arguments.pictures is not None:
             other = "" if made.bed == made.own_bed else f"_{made.bed}"
             draw_made(made, arguments.pictures / f"made_{name}{other}.jpg")
-    things = Report(["", *tabulate(rows, COLUMNS)], rows)
-    return things if arguments.things or arguments.quick else [things, *compare()]
+    return Report(["", *tabulate(rows, COLUMNS)], rows)

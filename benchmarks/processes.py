@@ -1,10 +1,9 @@
-"""Benchmarks ``commits``, ``cluster`` and ``serve``: work of other processes than this one."""
+"""Benchmarks ``commits`` and ``serve``: work of other processes than this one."""
 
 import argparse
 import io
 import json
 import os
-import pickle
 import re
 import secrets
 import struct
@@ -13,22 +12,15 @@ import sys
 import tarfile
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.commands.cluster import evaluate_on_worker, open_cluster
-from digiclay.commands.evaluator import submit
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.model.trajectory import sample_poses
-from digiclay.core.scene.scene_source import Setting, find, load
-from digiclay.core.studies.axes import Point, make_points, read_axis
-from digiclay.core.studies.evaluation import evaluate_bundle, make_bundles
-from digiclay.core.studies.series import finish
-from digiclay.core.studies.sweep_plan import hash_points
+from digiclay.core.scene.scene_source import find, load
 
 from .report import Report, Row, Steps, tabulate
 
@@ -127,104 +119,6 @@ def run_commit(tree: Path, commit: str, count: int) -> list[float]:
 
     times: list[float] = json.loads(run("-c", PROGRAM, json.dumps(list(CASES.values())), str(count))[0])
     return [*times, min(run("-m", "digiclay", *START.split()[1:])[1] for _ in range(5))]
-
-
-# Workers of a Dask cluster
-
-#: Empty tasks, and bundles of 32 points; each of these in full, and with --quick.
-TASKS, BUNDLES = (2000, 200), (12, 2)
-#: Points of a sweep that is only set up: those of two axes.
-SETUP = (100, 100), (20, 20)
-COSTS = {
-    "work": "work", "workers": "workers d", "pieces": "pieces d", "wall time": "wall .2f 1e3",
-    "scheduler and session": "central .2f 1e3", "workers' processor time": "spent .2f 1e3",
-}  # fmt: skip
-
-
-def measure_cluster(arguments: argparse.Namespace, steps: Steps) -> Report:
-    """Measure the set-up of a sweep, and points in this process, on one worker and on two."""
-    tasks, count = (pair[arguments.quick] for pair in (TASKS, BUNDLES))
-    points = _make_points(["simulation.duration=1"], f"control.force_gain=1:4:{32 * count}")
-    bundles = make_bundles(points).batches
-    gains, bands = SETUP[arguments.quick]
-    axes = f"control.force_gain=1:8:{gains}", f"control.dead_band=1e-5:1e-4:{bands}"
-
-    def set_up() -> None:
-        points = _make_points([], *axes)
-        make_bundles(points)
-        hash_points(points)
-
-    steps.total = 4
-    costs = [_measure("set-up", 0, gains * bands, set_up)]
-    steps("set-up")
-    evaluate_bundle(bundles[0])  # imports
-    costs.append(_measure("points here", 0, len(points), lambda: [*map(evaluate_bundle, bundles)]))
-    steps("here")
-    for workers in (1, 2):
-        costs += _measure_workers(workers, tasks, bundles)
-        steps(f"{workers} workers")
-    return Report(list(_list_costs(costs, bundles[0])), costs)
-
-
-def _make_points(settings: Sequence[str], *axes: str) -> list[Point]:
-    changes = [Setting(*setting.split("=")) for setting in settings]
-    return make_points(find("slow_press"), changes, [read_axis(axis) for axis in axes])
-
-
-def _measure(
-    work: str, workers: int, pieces: int, task: Callable[[], object], client: Any = None
-) -> dict[str, Any]:
-    """Return a row of some work, a piece, s: elapsed time, processor time here, and that of the workers."""
-
-    def read_clocks() -> list[float]:
-        spent = sum(client.run(time.process_time).values()) if client else 0.0
-        return [time.perf_counter(), time.process_time(), spent]
-
-    before = read_clocks()
-    task()
-    times = [(after - start) / pieces for after, start in zip(read_clocks(), before, strict=True)]
-    row = dict(zip(("wall", "central", "spent"), times, strict=True))
-    return {"work": work, "workers": workers, "pieces": pieces, **row}
-
-
-def _measure_workers(workers: int, tasks: int, bundles: Sequence[Sequence[Point]]) -> list[dict[str, Any]]:
-    """Have empty tasks and bundles done by workers of one thread, each a process."""
-    from distributed import Client, LocalCluster
-
-    def fail(piece: Any, why: str) -> None:
-        raise RuntimeError(why)
-
-    with (
-        LocalCluster(
-            n_workers=workers, threads_per_worker=1, protocol="tcp://", host="127.0.0.1",
-            dashboard_address=":0",
-        ) as local,
-        open_cluster(local.scheduler_address, lambda: False, lambda note: None) as cluster,
-        Client(local.scheduler_address, set_as_default=False) as client,
-    ):  # fmt: skip
-
-        def run(task: Any, pieces: Sequence[Any]) -> None:
-            finish(submit(cluster, task, pieces, stopped=lambda: False), lambda *_: None, fail)
-
-        evaluate = partial(evaluate_on_worker, errors=False)
-        run(abs, range(8 * workers))
-        run(evaluate, [bundles[0][:4]] * workers)  # imports
-        count = sum(map(len, bundles))
-        return [
-            _measure("empty tasks", workers, tasks, partial(run, abs, range(tasks)), client),
-            _measure("points", workers, count, partial(run, evaluate, bundles), client),
-        ]
-
-
-def _list_costs(costs: Sequence[Row], bundle: Sequence[Point]) -> Iterator[str]:
-    """Give the lines of the report."""
-    yield "\nA point: 1 s of slow_press, in bundles of 32; ms a task or point."
-    yield from tabulate(costs, COSTS)
-    one, two = (cost for cost in costs if cost["work"] == "points")
-    yield f"\nefficiency of two workers: {one['wall'] / (2 * two['wall']):.0%} of twice the points a second"
-    yield f"by processor time of the workers: {one['spent'] / two['spent']:.0%}"
-    size, back = len(pickle.dumps(tuple(bundle))), len(pickle.dumps(evaluate_bundle(bundle)))
-    yield f"to a worker {size / len(bundle):.0f} bytes a point, back {back / len(bundle):.0f}"
 
 
 # A server, with a client that moves the fingertips

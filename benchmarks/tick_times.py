@@ -31,10 +31,10 @@ from digiclay.operators.add_bed import add, select_only
 from digiclay.panels import display
 from digiclay.plots.figure import INK
 from digiclay.sessions import running, sculpting
-from digiclay.sessions.sculpting import INTERVAL, change_stroke, queue_stroke
-from digiclay.settings import devices, properties
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
+from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
-from digiclay.strokes.stroke import Brush, draw, lay_path, lay_ring
+from digiclay.strokes.stroke import draw
 
 from .report import BLUE, RED, Report, Row, Steps, tabulate
 
@@ -227,55 +227,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
         lines += [f"\n{name}; {kept_to:.2f} % under {1e3 * bed.goal:g} ms\n", *tabulate(of_bed, columns)]
         histograms[name] = spent, bed.goal
         rows += of_bed
-    queues = [
-        {"bed": name, **measure_queue(name, brush, amount)}
-        for name in steps.through(QUEUED, lambda name: f"queue on {name}")
-        for brush, amount in STROKES
-    ]
-    lines += [
-        f"\nA ring of {2e3 * QUEUE_RADIUS:g} mm, queued, in ticks {INTERVAL:.2g} s apart. Processor time, s,",
-        "of the session and of whole ticks; simulated time over it.\n",
-        *tabulate(queues, QUEUE_COLUMNS, left=2),
-    ]
     return Report(lines, rows, partial(_draw, beds=histograms), (7.2, 2.1 * len(BEDS)))
-
-
-#: Beds of `settings.devices.BEDS`, and what is queued on them: brush and depth or height, m, and radius, m.
-QUEUED, STROKES = ("design", "fine"), ((Brush.LOWER, 6e-3), (Brush.RAISE, 8e-3))
-QUEUE_RADIUS = 45e-3
-QUEUE_COLUMNS = {
-    "bed": "bed", "brush": "brush", "simulated": "simulated .2f", "session": "session_s .2f",
-    "factor": "session_factor .1f", "ticks": "ticks_s .2f", "factor, ticks": "ticks_factor .1f",
-}  # fmt: skip
-
-
-def measure_queue(name: str, brush: Brush, amount: float) -> Row:
-    """Queue a ring on a bed of `BEDS`, and tick until it is formed."""
-    plan, spent = devices.BEDS[name], 0.0
-    scene = make_scene(plan.preset, Layout(plan.rows, plan.columns, plan.pitch), plan.method, plan.share)
-    advance = sculpting.advance
-
-    def timed(*arguments: Any) -> running.Running:
-        nonlocal spent
-        began = time.process_time()
-        session = advance(*arguments)
-        spent += time.process_time() - began
-        return session
-
-    with open_session(scene) as bed, patch.object(sculpting, "advance", timed):
-        ring = lay_ring((0.0, 0.0), (QUEUE_RADIUS, 0.0))
-        session, number = queue_stroke(_find_session(bed), ring[0, 0], ring[0, 1], amount, brush=brush)
-        running.put(change_stroke(session, number, partial(lay_path, points=ring)))
-        first, began = session.state.period, time.process_time()
-        while _find_session(bed).strokes:
-            tick.tick(bpy.context, time.perf_counter())
-            bpy.context.evaluated_depsgraph_get()
-        whole = time.process_time() - began
-        simulated = (_find_session(bed).state.period - first) * scene.simulation.control_period
-    return {
-        "brush": brush.value.lower(), "simulated": simulated, "session_s": spent, "ticks_s": whole,
-        "session_factor": simulated / spent, "ticks_factor": simulated / whole,
-    }  # fmt: skip
 
 
 def keep_to_one_core() -> None:

@@ -11,17 +11,12 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.batch.packing import describe_structure
-from digiclay.core.control.hybrid import HybridControl
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.model.trajectory import Path as FingerPath
-from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
-from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import LEAST, make_bundles
 
-from benchmarks import method_figures, processes, runs_together
+from benchmarks import processes, runs_together
 from benchmarks.__main__ import main
 from benchmarks.kinds import BENCHMARKS
 from benchmarks.report import Report
@@ -100,7 +95,6 @@ def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted_and_of_m
         ("session --repeats 0", "must be a whole number from 1 to 1000"),
         ("scale --out my.toml/new", "scale: argument --out: my.toml/new cannot be a folder: my.toml is a fi"),
         ("sesion", "Did you mean session?"),
-        ("ablation --part skrit", "--part must be one of nothing, skirt"),
         ("commits nonsense --quiet", "commits: nonsense must be a commit, branch or tag"),
     ],
 )
@@ -193,30 +187,3 @@ def test_a_benchmark_prints_and_writes_a_table_and_a_picture(tmp_path, monkeypat
     assert [line.split(",")[:3] for line in lines[1:]] == [
         [name, "2", kind] for name in STUDIES for kind in kinds
     ]
-
-
-def press(**control: float) -> Scene:
-    """Return a press, half a lift and a drag of 9 mm in 0.2 s on a small bed with Method III."""
-    scene = resolve({
-        "layout": {"rows": 11, "columns": 11}, "control": {"method": "hybrid", **control},
-        "sensors": {"force_noise": 2e-3},
-    })  # fmt: skip
-    drag = (0.0, -4.5, 40.5), (0.15, -4.5, 38.0), (0.5, -4.5, 42.3), (0.7, 4.5, 42.3)
-    points = tuple(Waypoint(time=t, position=(1e-3 * x, 0.0, 1e-3 * z)) for t, x, z in drag)
-    simulation = replace(scene.simulation, duration=drag[-1][0])
-    return scene.with_sections(trajectory=FingerPath("linear", points), simulation=simulation)
-
-
-def test_a_controller_without_a_part_differs_from_the_whole_and_parameters_leave_parts_out():
-    scene = press()
-    controller = assemble(scene).controller
-    assert isinstance(controller, HybridControl)
-    whole = method_figures.run_controller(scene, controller)["rfd"]
-    for part, leave in method_figures.PUT_TOGETHER.items():
-        rfd = method_figures.run_controller(scene, leave(controller))["rfd"]
-        assert rfd is not None, part
-        assert np.isfinite(rfd), part
-        # More than rounding: a part that is still there gives the same to some ten digits.
-        assert rfd != pytest.approx(whole, rel=1e-6), part
-    for values in method_figures.PARAMETERS.values():
-        assert press(**{name: float(value) for name, value in values.items()}).method == "hybrid"

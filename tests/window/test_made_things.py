@@ -1,10 +1,22 @@
 """Things made by recorded strokes of the Press tool are what was intended, even, alike, and soon formed."""
 
-import pytest
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from itertools import product
+from typing import Any
 
-from benchmarks.alike import list_differences, list_reliefs
+import numpy as np
+import pytest
+from digiclay.core.base.arrays import Floats
+from digiclay.core.scene.schema import Scene
+from digiclay.recorded.pointer_strokes import PointerStroke
+from digiclay.sessions.sculpting import change_stroke, find_stroke, follow_finger, queue_stroke
+from digiclay.strokes.stroke import draw
+
 from benchmarks.intended import THINGS
-from benchmarks.made import make
+from benchmarks.made import begin, find_spikes, make, make_bed, measure_distances, move, play
 
 TIMES = {"r_lowered": 6.0, "r_raised": 7.0, "spiral": 7.0, "ring": 5.0, "leaf": 12.0, "lines": 15.0}
 
@@ -18,6 +30,94 @@ def test_a_thing_made_by_recorded_strokes_is_what_was_intended(name: str) -> Non
     assert 0.95 <= made.slope <= 1.05
     assert made.played.time <= TIMES.get(name, 20.0)
     assert made.played.force <= 1.0
+
+
+#: Rows and columns of the bed of the cases.
+SIDE = 60
+#: Angles, degrees, and shifts, m, of the cases: beside the grid of the pins.
+TURNS = ((0.0, (0.0, 0.0)), (17.0, (0.4e-3, 0.7e-3)))
+#: Depths and heights asked for, m; ticks a second, and moves a tick, of hands on slow and quick machines.
+AMOUNTS, HANDS = (2e-3, 4e-3, 8e-3, 15e-3), ((60.0, 1), (24.0, 5), (7.0, 1))
+#: How far from the path pins are whose heights count as those of the stroke, m.
+CORE = 1.5e-3
+#: What Raise and Lower do in the cases.
+KINDS: dict[str, dict[str, Any]] = {
+    "lowered 6 mm": {"brush": "lower", "depth": 6e-3}, "raised 8 mm": {"brush": "raise", "height": 8e-3},
+}  # fmt: skip
+
+
+def _bend(*places: Any) -> dict[str, Any]:
+    """Return the moves of a hand through places, mm, within half a second."""
+    times = np.linspace(0.0, 0.5, len(places))
+    return {"moves": tuple((t, 1e-3 * x, 1e-3 * y) for t, (x, y) in zip(times.tolist(), places, strict=True))}
+
+
+PATHS: dict[str, dict[str, Any]] = {
+    "line": {**_bend((-28.0, 0.0), (28.0, 0.0)), "path": "line"},
+    "ring": {**_bend((0.0, 0.0), (26.0, 0.0)), "path": "ring"},
+    "free": _bend(*((26.0 * u, 14.0 * math.sin(3.0 * u)) for u in np.linspace(-1.0, 1.0, 24).tolist())),
+    "loop": _bend(
+        (-28.0, -14.0), (10.0, -14.0),
+        *((10.0 + 14.0 * math.sin(a), -14.0 * math.cos(a)) for a in np.linspace(0.3, 4.7, 24).tolist()),
+        (-4.0, -28.0),
+    ),
+}  # fmt: skip
+
+
+def draw_by_hand(scene: Scene, stroke: PointerStroke, rate: float, moves: int) -> Floats:
+    """Draw a stroke on a bed at rest, some moves a tick, ticks at a rate, 1/s; return heights, (n,), m."""
+    session = begin(scene)
+    session, number = queue_stroke(session, *stroke.moves[0][1:], stroke.amount, brush=stroke.kind)
+    left, count = list(stroke.moves[1:]), round(1.0 / (rate * session.system.period))
+    while find_stroke(session, number) is not None:
+        for _, x, y in left[:moves]:
+            session = change_stroke(session, number, partial(draw, x=x, y=y, depth=stroke.amount))
+        left = left[moves:]
+        session = change_stroke(session, number, partial(replace, held=bool(left)))
+        session = follow_finger(session, session.pose, count)
+    return np.asarray(session.state.row(0) - scene.actuator.rest_height)
+
+
+def list_reliefs() -> Iterator[dict[str, Any]]:
+    """Yield how even each kind of stroke is along each path, m, and its spikes, m."""
+    for (kind, amount), (name, path) in product(KINDS.items(), PATHS.items()):
+        for angle, shift in TURNS:
+            made = play(
+                make_bed(side=SIDE), move((PointerStroke(**amount, **path),), math.radians(angle), shift)
+            )
+            formed = made.find_unevenness(made.formed)
+            yield {
+                "case": f"{name}, {kind}, at {angle:g} degrees", "rms": math.sqrt(np.mean(formed**2)),
+                "most": np.abs(formed).max(), "spike": find_spikes(made.formed, made.grid).max(),
+            }  # fmt: skip
+
+
+def list_differences() -> Iterator[dict[str, Any]]:
+    """Yield how far apart strokes are that are to be alike, and from the depth or height asked for, m."""
+    for kind, amount in KINDS.items():
+        free = PointerStroke(**amount, **PATHS["free"])
+        shifted = move((free,), 0.5 * math.pi, (14e-3, 0.0))[0]
+        mirrored = replace(shifted, moves=tuple((t, -x, y) for t, x, y in shifted.moves))
+        first, other, both = (
+            play(make_bed(side=SIDE), (one,)).formed.reshape(SIDE, SIDE)
+            for one in (shifted, mirrored, replace(shifted, symmetry="x"))
+        )
+        yield _differ(f"{kind}: its mirror image in one stroke", both - both[:, ::-1])
+        yield _differ(f"{kind}: drawn mirrored", first - other[:, ::-1])
+        usual = play(make_bed(side=SIDE), (free,)).formed
+        for rate, moves in HANDS:
+            drawn = draw_by_hand(make_bed(side=SIDE), free, rate, moves)
+            yield _differ(f"{kind}: drawn by {moves} moves a tick, {rate:g} ticks a second", drawn - usual)
+    for brush, asked in product(("lower", "raise"), AMOUNTS):
+        line = PointerStroke(brush=brush, depth=asked, height=asked, **PATHS["line"])
+        made = play(make_bed(side=SIDE), (line,))
+        core = np.abs(made.formed[measure_distances(line, made.grid) < CORE])
+        yield _differ(f"{brush} {1e3 * asked:g} mm", core - asked)
+
+
+def _differ(case: str, difference: Floats) -> dict[str, Any]:
+    """Return the row of a case: the greatest difference, m."""
+    return {"case": case, "difference": float(np.abs(difference).max())}
 
 
 def test_strokes_are_even_along_their_paths_and_leave_no_spikes() -> None:
