@@ -109,8 +109,7 @@ def test_a_mistake_is_one_line_exit_code_2_and_no_folder(arguments, said, here, 
     assert left(here) == ["d.png"]
 
 
-def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(here, monkeypatch):
-    monkeypatch.setattr("digiclay.plots.bed.fit_relief", lambda *given: None)  # takes seconds
+def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(here):
     main(["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots"])
     added = {path.name for path in (here / "my").iterdir()}
     assert {"surface.stl", "surface.obj", "session.png", "surface.png"} <= added

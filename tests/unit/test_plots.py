@@ -12,9 +12,10 @@ from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.studies.axes import Column
 from digiclay.plots import run as plots
-from digiclay.plots.bed import hidden
+from digiclay.plots.bed import ROOM
 from digiclay.plots.figure import save
 from digiclay.plots.sweep import sweep_figure
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from tests.other_process import finish, start
 
@@ -62,14 +63,13 @@ def surface():
 
 def test_every_axis_has_its_unit_and_every_curve_its_name(session, surface):
     drawn = [axes(session, label) for label in ("heights", "force")]
-    drawn += [axes(surface, label) for label in ("relief", "map", "scale")]
+    drawn += [axes(surface, label) for label in ("map", "scale")]
     found = {part.get_label(): (part.get_xlabel(), part.get_ylabel()) for part in drawn}
     plan = ("x (mm)", "y (mm)")
     assert found == {
-        "heights": ("", "height (mm)"), "force": ("time (s)", "force (N)"), "relief": plan, "map": plan,
+        "heights": ("", "height (mm)"), "force": ("time (s)", "force (N)"), "map": plan,
         "scale": ("", "height (mm)"),
     }  # fmt: skip
-    assert axes(surface, "relief").get_zlabel() == "height (mm)"
     legends = [axes(session, label).get_legend().get_texts() for label in ("heights", "force")]
     names = [text.get_text() for texts in legends for text in texts]
     assert names == [*"ABCDEF", "total force", "set point 0.37 N", "in contact"]
@@ -131,18 +131,17 @@ def test_the_surface_is_to_scale_and_shows_the_final_heights_and_the_path(surfac
     np.testing.assert_array_equal(~np.isnan(pressed.get_xdata()), case["total_force"] > 0.0)
 
 
-@pytest.mark.parametrize(("rows", "columns", "share"), [(3, 25, 1.0), (12, 14, -1.5)])
-def test_no_text_on_the_relief_hides_another(rows, columns, share):
+@pytest.mark.parametrize(("rows", "columns", "share"), [(3, 25, 1.0), (12, 14, -1.5), (25, 3, 1.0)])
+def test_the_relief_is_in_the_middle_of_its_room_and_as_large(rows, columns, share):
     case = drag(rows, columns)
     case["height"] = 0.04 + (case["height"] - 0.04) * share
     relief = axes(plots.surface_figure(case), "relief")
-    assert hidden(relief) == []
-    # Nor does it leave its own half of the picture.
-    width = relief.figure.bbox.width
-    texts = [relief.xaxis.label, relief.yaxis.label, relief.zaxis.label]
-    assert all(
-        0.0 <= text.get_window_extent().x0 < text.get_window_extent().x1 < 0.6 * width for text in texts
-    )
+    corners = np.meshgrid(relief.get_xlim(), relief.get_ylim(), relief.get_zlim())
+    flat = np.column_stack(proj_transform(*np.reshape(corners, (3, 8)), relief.get_proj())[:2])
+    seen = relief.figure.transFigure.inverted().transform(relief.transData.transform(flat))
+    below, above = np.reshape(ROOM, (2, 2)) - [seen.min(axis=0), seen.max(axis=0)]
+    np.testing.assert_allclose(below, -above, rtol=0, atol=1e-9)
+    assert above.min() == pytest.approx(0.0, abs=1e-3)  # a size is that of another zoom, but for rounding
 
 
 def test_both_pictures_are_written_at_their_size(tmp_path, session):

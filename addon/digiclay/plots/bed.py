@@ -1,9 +1,8 @@
-"""Plots of the bed: final heights from above with the fingertip path, and in relief with labels apart."""
+"""Plots of the bed: final heights from above with the fingertip path, and in relief."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import combinations
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,97 +20,28 @@ if TYPE_CHECKING:  # only named in annotations
 
 Room = tuple[float, float, float, float]
 
-#: Where the relief and all that is written on it has room, as parts of the figure: left, bottom, right, top.
-ROOM: Room = (0.01, 0.02, 0.525, 0.9)
-#: Times the relief is fitted; a little less than the room, because letters do not grow with it.
-ROUNDS, LARGER = 3, 1.6
-#: Most numbers along an axis, and how far its name may stand off, points.
-NUMBERS, OFF = 5, (4, 12, 20, 28, 36, 46, 56, 70)
+#: Where the relief has room, as parts of the figure: left, bottom, right, top.
+ROOM: Room = (0.03, 0.05, 0.525, 0.88)
 
 
-def fit_relief(axes: Any, size: Any, limits: Sequence[tuple[float, float]], room: Room = ROOM) -> None:
-    """Choose numbers on empty axes and places of their names so that they are apart, and fill the room.
-
-    `size` (3,), of what is shown, in the same unit on all axes.
-    """
-    from matplotlib.ticker import FixedLocator
-
-    zoom = 0.84
-    for turn in range(ROUNDS):
-        axes.set_box_aspect(size, zoom=zoom)
-        for axis, (low, high) in zip(_sides(axes), limits, strict=True):
-            _number(axes, axis, low, high)
-            axis.labelpad = OFF[0]
-        for axis in _sides(axes):
-            counts = {}
-            for axis.labelpad in OFF:
-                counts[axis.labelpad] = sum(axis.label in pair for pair in hidden(axes))
-                if not counts[axis.labelpad]:
-                    break
-            else:  # beside a narrow bed no distance takes the name off the numbers: those under it go
-                axis.labelpad = min(counts, key=lambda pad: counts[pad])
-                under = {text for pair in hidden(axes) if axis.label in pair for text in pair}
-                kept = [tick.get_loc() for tick in _shown(axis) if tick.label1 not in under]
-                axis.set_major_locator(FixedLocator(kept))
-        if turn < ROUNDS - 1:
-            zoom *= min(LARGER, _placed(axes, room))
-    _placed(axes, room)
-
-
-def _sides(axes: Any) -> tuple[Any, Any, Any]:
-    return axes.xaxis, axes.yaxis, axes.zaxis
-
-
-def _measure_texts(axes: Any) -> list[tuple[Any, Any]]:
-    """Return all names and numbers on the axes of a relief, each with the box it is drawn in."""
-    renderer = axes.figure.canvas.get_renderer()
-    axes.draw(renderer)  # the figure's other axes would take their time again and again
-    texts = [axis.label for axis in _sides(axes)]
-    texts += [tick.label1 for axis in _sides(axes) for tick in _shown(axis)]
-    return [(text, text.get_window_extent(renderer)) for text in texts if text.get_text()]
-
-
-def hidden(axes: Any) -> list[tuple[Any, Any]]:
-    """Return the pairs of texts on the axes of a relief that are drawn over each other."""
-    pairs = combinations(_measure_texts(axes), 2)
-    return [(one, two) for (one, a), (two, b) in pairs if a.overlaps(b)]
-
-
-def _shown(axis: Any) -> list[Any]:
-    """Return the ticks of an axis that are drawn."""
-    low, high = sorted(axis.get_view_interval())
-    slack = 1e-6 * (high - low)
-    return [tick for tick in axis.get_major_ticks() if low - slack <= tick.get_loc() <= high + slack]
-
-
-def _number(axes: Any, axis: Any, low: float, high: float) -> None:
-    """Give an axis as many numbers as have room; one at its end if there is none for two."""
-    from matplotlib.ticker import FixedLocator, MaxNLocator
-
-    for count in range(NUMBERS, 0, -1):
-        axis.set_major_locator(MaxNLocator(count, steps=[1, 2, 2.5, 5, 10]))
-        own = {tick.label1 for tick in _shown(axis)}
-        if len(own) > 1 and not any(own.issuperset(pair) for pair in hidden(axes)):
-            return
-    axis.set_major_locator(FixedLocator([float(np.round(high, 1 if high - low < 10.0 else 0))]))
-
-
-def _placed(axes: Any, room: Room) -> float:
-    """Move a relief into the middle of its room, and return how much larger it could be there."""
+def fill_room(axes: Any, size: Floats, room: Room = ROOM) -> None:
+    """Put what axes in three dimensions show, `size` (3,) in one unit, into the middle of a room."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
-    boxes = [box.get_points() for _, box in _measure_texts(axes)]
-    corners = np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())).reshape(3, 8)
-    flat = np.column_stack(proj_transform(*corners, axes.get_proj())[:2])
-    places = np.concatenate([axes.transData.transform(flat), *boxes])
-    inside = axes.figure.transFigure.inverted().transform(places)
-    inside = inside[np.all(np.abs(inside) < 2.0, axis=1)]  # a number that is not drawn has no place
-    low, high = inside.min(axis=0), inside.max(axis=0)
-    ends = np.array(room).reshape(2, 2)
+    low, high = np.reshape(room, (2, 2))
+    corners, zoom = (
+        np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())).reshape(3, 8),
+        1.0,
+    )
+    for _ in range(2):  # it is as large as the room once its size is known
+        axes.set_box_aspect(size, zoom=zoom)
+        axes.apply_aspect()
+        flat = np.column_stack(proj_transform(*corners, axes.get_proj())[:2])
+        seen = axes.figure.transFigure.inverted().transform(axes.transData.transform(flat))
+        zoom *= float(np.min((high - low) / np.ptp(seen, axis=0)))
+    across, up = 0.5 * (low + high - seen.min(axis=0) - seen.max(axis=0))
     now = axes.get_position()
-    across, up = 0.5 * (ends.sum(axis=0) - low - high)
     axes.set_position((now.x0 + across, now.y0 + up, now.width, now.height))
-    return float(np.min((ends[1] - ends[0]) / (high - low)))
 
 
 History = Mapping[str, ArrayLike]
@@ -167,7 +97,7 @@ def draw_path(axes: Axes, history: History) -> None:
 
 
 def draw_relief(axes: Any, history: History, room: Room = ROOM) -> None:
-    """Draw the final surface in three dimensions, lit from the left, equal scale on all axes."""
+    """Draw the final surface in three dimensions, lit from the left, equal scale on all axes, none shown."""
     from matplotlib import colormaps
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -182,10 +112,10 @@ def draw_relief(axes: Any, history: History, room: Room = ROOM) -> None:
     level, light = bright[:, :, 2].mean(axis=1), bright[:, :, 3].mean(axis=1)
     color = colormaps["cividis"]((level - low) / (high - low))[:, :3] * light[:, None]
     limits = [(side.min(), side.max()) for side in vertices.T]
-    axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)), zlabel="height (mm)")
-    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)))
+    axes.set_axis_off()
     axes.view_init(elev=34, azim=-62)
-    fit_relief(axes, np.ptp(vertices, axis=0), limits, room)
+    fill_room(axes, np.ptp(vertices, axis=0), room)
     for corners, paint in ((vertices[walls], CUT), (bright[:, :, :3], color)):
         axes.add_collection3d(Poly3DCollection(corners, facecolors=paint, edgecolors=paint, linewidths=0.3))
 
