@@ -1,6 +1,6 @@
 """Formed surface as mesh objects, as a mesh file, and as a list of features."""
 
-from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from .poll_messages import from_rest, no_surface
 MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
 #: Space between the bed and what is put beside it, in widths of the bed.
 GAP = 0.35
-#: Marks what was made here, so that what is made next is put elsewhere.
+#: Which place beside its bed a mesh has that was made here: what is made next has another one.
 MADE = "digiclay_made"
 
 
@@ -126,13 +126,17 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         bed = chosen_bed(context)
         formed = formed_bed.read_formed(bed)
         bodies = make_bodies(formed, self.model(bed), self.finding())
-        width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
-        where = _beside(context, bed, width) if self.beside else bed.matrix_world.copy()
+        others = [thing for thing in context.scene.objects if thing.name.startswith(f"{bed.name} ")]
+        taken = {int(thing.get(MADE, 0)) for thing in others}
+        place = next(number for number in count(1) if number not in taken) if self.beside else 0
+        step = (1.0 + GAP) * float(np.ptp(formed.position[:, 0])) * bridge.SCALE
+        where = bed.matrix_world.copy()
+        where.translation = where @ type(where.translation)((place * step, 0.0, 0.0))
         things = []
         for body in bodies:
             name = f"{bed.name} {body.name if self.kind == 'features' else self.kind}"
             new = formed_bed.make_object(body, name, smooth=self.kind != "pins")
-            new[MADE] = True
+            new[MADE] = place
             context.collection.objects.link(new)
             new.matrix_world = where
             things.append(new)
@@ -142,30 +146,6 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         groups = bodies[0].groups
         words = localize(" with vertex groups {}", ", ".join(groups)) if groups else ""
         self.report({"INFO"}, localize("Made {}{}", ", ".join(new.name for new in things), words))
-
-
-def _beside(context: Any, bed: Any, width: float) -> Any:
-    """Return a matrix: the first place beside a bed, as wide as its pins, without a mesh made before."""
-    step, half = (1.0 + GAP) * width, width / 2
-    to_bed = np.array(bed.matrix_world.inverted_safe(), np.float64)
-    place = 1
-    for low, high in sorted(_spans(context, to_bed, half)):
-        if low < place * step + half and place * step - half < high:
-            place = int((high + half) // step) + 1
-    where = bed.matrix_world.copy()
-    where.translation += where.to_3x3() @ where.translation.__class__((place * step, 0.0, 0.0))
-    return where
-
-
-def _spans(context: Any, to_bed: Any, half: float) -> Iterator[tuple[float, float]]:
-    """Give from where to where along a bed's x axis the meshes made before stand that lie beside it."""
-    for thing in context.scene.objects:
-        if not thing.get(MADE):
-            continue
-        corners = np.column_stack([np.array(thing.bound_box, np.float64), np.ones(8)])
-        x, y = (corners @ (to_bed @ np.array(thing.matrix_world, np.float64)).T)[:, :2].T
-        if np.isfinite(x).all() and y.min() < half and y.max() > -half:
-            yield float(x.min()), float(x.max())
 
 
 @action("digiclay.find_features", "List Features", no_surface, bases=(FindingOptions,))
