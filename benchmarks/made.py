@@ -11,69 +11,23 @@ import numpy as np
 from digiclay.commands.stop import refuse_unwritable
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError, explain_os_error
-from digiclay.core.control.blister import Blister
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Grid, Layout
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.render_settings import Still
 from digiclay.device import view
-from digiclay.device.instant import CLEARANCE, Instant, find_ellipsoid
+from digiclay.device.instant import CLEARANCE, Instant
 from digiclay.pictures import stage
 from digiclay.pictures.still import render_picture, stage_bed
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
 from digiclay.roles import fingertip_of
 from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import begin_session
-from digiclay.settings.devices import BEDS, FIRST, change_finger, make_scene
-from digiclay.strokes.stroke import lay_ring
+from digiclay.settings.devices import BEDS, FIRST, make_scene
 
-from .intended import THINGS, find_distance, find_relief
+from .intended import THINGS, find_relief
 from .kinds import STROKES
 from .report import Report, Steps, tabulate
-
-#: Parts of the flat top, and of the slope, between which a section is straight.
-PARTS = (3, 6)
-
-
-def measure_distances(stroke: PointerStroke, grid: Grid) -> Floats:
-    """Return how far pins are from the path of a stroke, or its nearest mirror image, (n,), m."""
-    path = np.array([move[1:] for move in stroke.moves])
-    if stroke.path != "free":
-        path = lay_ring(path[0], path[-1]) if stroke.path == "ring" else path[[0, -1]]
-    paths = [[image.place(x, y) for x, y in path.tolist()] for image in stroke.images]
-    return np.asarray(np.min([find_distance(one, grid.x, grid.y) for one in paths], axis=0))
-
-
-def measure_unevenness(height: Floats, near: Floats, blister: Blister) -> Floats:
-    """Return how far pins (k,) differ, (k,), m, from the common section of those so far from a path, m."""
-    flat, radius = blister.flat_radius, blister.radius
-    knots = np.concatenate([
-        np.linspace(0.0, flat, PARTS[0], endpoint=False), np.linspace(flat, radius, PARTS[1]),
-        [max(2.0 * radius - flat, near.max() * (1.0 + 1e-9))],
-    ])  # fmt: skip
-    hats = np.array([np.interp(near, knots, row) for row in np.eye(len(knots))]).T
-    return np.asarray(height - hats @ np.linalg.lstsq(hats, height, rcond=None)[0])
-
-
-def find_unevenness(
-    height: Floats, strokes: tuple[PointerStroke, ...], grid: Grid, blisters: tuple[Blister, ...]
-) -> Floats:
-    """Return `measure_unevenness` of the pins at just one stroke that raises or lowers, (k,), m."""
-    near = np.array([measure_distances(stroke, grid) for stroke in strokes])
-    reach = np.array([[blister.radius + grid.layout.pitch] for blister in blisters])
-    alone, found = (near < reach).sum(axis=0) == 1, [np.zeros(1)]
-    for stroke, row, (most,), blister in zip(strokes, near, reach, blisters, strict=True):
-        cells = np.flatnonzero(alone & (row < most))
-        if stroke.kind.has_amount and cells.size:
-            found.append(measure_unevenness(height[cells], row[cells], blister))
-    return np.concatenate(found)
-
-
-def find_spikes(height: Floats, grid: Grid) -> Floats:
-    """Return how far pins are above, or below, all their neighbors, (n,), m."""
-    beside = np.append(height, np.nan)[grid.layout.find_neighbors(corners=True)]
-    above = height - np.fmax.reduce(beside, axis=1)
-    return np.asarray(np.maximum(above, np.fmin.reduce(beside, axis=1) - height).clip(0.0))
 
 
 def move(
@@ -105,14 +59,6 @@ class Played:
     def grid(self) -> Grid:
         """Of the pins."""
         return self.session.system.grid
-
-    def find_unevenness(self, height: Floats) -> Floats:
-        """Return `find_unevenness` of heights (n,), m, of the bed."""
-        usual, scene = find_ellipsoid(self.session.scene), self.session.scene
-        scenes = [change_finger(scene, usual, one.size_finger(usual)) for one in self.strokes]
-        return find_unevenness(
-            height, self.strokes, self.grid, tuple(one.blister or Blister() for one in scenes)
-        )
 
 
 def make_bed(name: str = FIRST, side: int | None = None) -> Scene:
@@ -243,18 +189,11 @@ def draw_relief(scene: Scene, relief: Floats, lowest: float, out: Path) -> None:
         render_picture(drawn, out, out)
 
 
-def find_new_spike(made: Made) -> float:
-    """Return how far a pin is beyond all its neighbors at most, as none is meant to be, m."""
-    grid = made.played.grid
-    return float((find_spikes(made.formed, grid) - find_spikes(made.intended, grid)).max())
-
-
 #: Columns of the table.
 COLUMNS = {
     "thing": "title", "bed": "bed", "strokes": "strokes d", "hand, s": "hand .1f", "formed, s": "formed .1f",
     "force, N": "force .2f", "correlation": "correlation .3f", "slope": "slope .2f", "rms, mm": "rms .2f 1e3",
-    "rms of relief, mm": "relief .2f 1e3", "uneven, rms, mm": "uneven .3f 1e3", "most, mm": "most .2f 1e3",
-    "spike, mm": "spike .2f 1e3", "CPU, s": "CPU .1f",
+    "rms of relief, mm": "relief .2f 1e3", "CPU, s": "CPU .1f",
 }  # fmt: skip
 
 
@@ -269,13 +208,11 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     rows = []
     for name in steps.through(arguments.things or THINGS[: 1 if arguments.quick else None]):
         made = make(name, arguments.bed)
-        uneven = made.played.find_unevenness(made.formed)
         rows.append({
             "thing": made.name, "bed": made.bed, "strokes": len(made.played.strokes), "hand": made.hand,
             "formed": made.played.time, "force": made.played.force, "correlation": made.correlation,
             "slope": made.slope, "rms": made.error, "relief": float(made.intended.std()),
-            "uneven": float(np.sqrt(np.mean(uneven**2))), "most": float(np.abs(uneven).max()),
-            "spike": find_new_spike(made), "CPU": made.spent, "title": made.title,
+            "CPU": made.spent, "title": made.title,
         })  # fmt: skip
         if arguments.pictures is not None:
             other = "" if made.bed == made.own_bed else f"_{made.bed}"

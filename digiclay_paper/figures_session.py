@@ -121,7 +121,7 @@ def surfaces(results: Results) -> Any:
             relief = place(
                 f"{method} relief", left - 0.9, 3.9, 8.0, 5.9, projection="3d", computed_zorder=False
             )
-            room = (left + 0.3) / across, 4.6 / 9.6, (left + 6.3) / across, 8.7 / 9.6
+            room = (left + 0.3) / across, 4.75 / 9.6, (left + 6.3) / across, 8.7 / 9.6
             draw_relief(relief, history, room)
             # Its own title would lie far above the picture.
             figure.text((left + 0.3) / across, 8.85 / 9.6, f"({'ace'[column]}) {NAMES[method]}")

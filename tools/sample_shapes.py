@@ -282,25 +282,17 @@ def picture(path: Path) -> None:
     from digiclay.core.model.layout import Layout, make_grid
     from digiclay.core.shapes.fitting import fit_shape, list_shapes
     from digiclay.core.shapes.request import Shape
-    from matplotlib.colors import LightSource
+    from digiclay.plots.bed import draw_relief
 
-    bed = make_grid(Layout(rows=49, columns=49, pitch=2e-3))
-    x, y = (values.reshape(49, 49) * 1e3 for values in (bed.x, bed.y))
-    names = list_shapes()
-    figure, axes = plt.subplots(
-        3, 5, figsize=(15, 9.4), subplot_kw={"projection": "3d", "computed_zorder": False}
-    )
-    light = LightSource(azdeg=305, altdeg=38)
-    for axis in axes.ravel():
-        axis.set_axis_off()
-    for axis, name in zip(axes.ravel(), names, strict=False):
-        z = fit_shape(Shape(file=name, rise=16e-3), bed, Actuator()).heights.reshape(49, 49) * 1e3
-        shade = light.shade(z, plt.get_cmap("cividis"), vert_exag=1.0, dx=2.0, dy=-2.0, blend_mode="soft")
-        axis.plot_surface(x, y, z, facecolors=shade, rstride=1, cstride=1, linewidth=0, antialiased=False)
-        axis.set_box_aspect((98, 98, 16), zoom=1.22)
-        axis.view_init(elev=44, azim=-62)
-        axis.set_title(name, y=0.86, fontsize=15)
-    figure.subplots_adjust(left=0, right=1, bottom=0, top=0.98, wspace=0, hspace=0)
+    bed, names = make_grid(Layout(rows=49, columns=49, pitch=2e-3)), list_shapes()
+    figure = plt.figure(figsize=(15, 9.4))
+    for number, name in enumerate(names):
+        left, below = number % 5 / 5, (2 - number // 5) / 3
+        axes = figure.add_axes((left, below, 0.2, 0.33), projection="3d", computed_zorder=False)
+        heights = fit_shape(Shape(file=name, rise=16e-3), bed, Actuator()).heights
+        draw_relief(axes, {"position": bed.positions, "height": heights[None]},
+                    (left + 0.004, below + 0.01, left + 0.196, below + 0.29))  # fmt: skip
+        figure.text(left + 0.1, below + 0.28, name, ha="center", fontsize=15)
     figure.savefig(path, dpi=80, pil_kwargs={"quality": 85})
 
 

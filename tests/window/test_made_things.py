@@ -13,10 +13,10 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.scene.schema import Scene
 from digiclay.recorded.pointer_strokes import PointerStroke
 from digiclay.sessions.sculpting import change_stroke, find_stroke, follow_finger, queue_stroke
-from digiclay.strokes.stroke import draw
+from digiclay.strokes.stroke import draw, lay_ring
 
-from benchmarks.intended import THINGS
-from benchmarks.made import begin, find_spikes, make, make_bed, measure_distances, move, play
+from benchmarks.intended import THINGS, find_distance
+from benchmarks.made import Played, begin, make, make_bed, move, play
 
 TIMES = {"r_lowered": 6.0, "r_raised": 7.0, "spiral": 7.0, "ring": 5.0, "leaf": 12.0, "lines": 15.0}
 
@@ -64,6 +64,40 @@ PATHS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
+#: Parts of the flat top, and of the slope, between which a section is straight.
+PARTS = (3, 6)
+
+
+def measure_distances(made: Played) -> Floats:
+    """Return how far pins are from the path of the only stroke, (n,), m."""
+    (stroke,), grid = made.strokes, made.session.system.grid
+    path = np.array([move[1:] for move in stroke.moves])
+    if stroke.path != "free":
+        path = lay_ring(path[0], path[-1]) if stroke.path == "ring" else path[[0, -1]]
+    return find_distance(path.tolist(), grid.x, grid.y)
+
+
+def measure_unevenness(made: Played) -> Floats:
+    """Return how far pins near the path, (k,), m, differ from the common section of those as far from it."""
+    near, blister = measure_distances(made), made.session.scene.blister
+    cells = near < blister.radius + made.session.scene.layout.pitch
+    near, flat, radius = near[cells], blister.flat_radius, blister.radius
+    knots = np.concatenate([
+        np.linspace(0.0, flat, PARTS[0], endpoint=False), np.linspace(flat, radius, PARTS[1]),
+        [max(2.0 * radius - flat, near.max() * (1.0 + 1e-9))],
+    ])  # fmt: skip
+    hats = np.array([np.interp(near, knots, row) for row in np.eye(len(knots))]).T
+    height = made.formed[cells]
+    return height - hats @ np.linalg.lstsq(hats, height, rcond=None)[0]
+
+
+def find_spikes(made: Played) -> Floats:
+    """Return how far pins are above, or below, all their neighbors, (n,), m."""
+    beside = np.append(made.formed, np.nan)[made.session.scene.layout.find_neighbors(corners=True)]
+    above = made.formed - np.fmax.reduce(beside, axis=1)
+    return np.maximum(above, np.fmin.reduce(beside, axis=1) - made.formed).clip(0.0)
+
+
 def draw_by_hand(scene: Scene, stroke: PointerStroke, rate: float, moves: int) -> Floats:
     """Draw a stroke on a bed at rest, some moves a tick, ticks at a rate, 1/s; return heights, (n,), m."""
     session = begin(scene)
@@ -85,10 +119,10 @@ def list_reliefs() -> Iterator[dict[str, Any]]:
             made = play(
                 make_bed(side=SIDE), move((PointerStroke(**amount, **path),), math.radians(angle), shift)
             )
-            formed = made.find_unevenness(made.formed)
+            formed = measure_unevenness(made)
             yield {
                 "case": f"{name}, {kind}, at {angle:g} degrees", "rms": math.sqrt(np.mean(formed**2)),
-                "most": np.abs(formed).max(), "spike": find_spikes(made.formed, made.grid).max(),
+                "most": np.abs(formed).max(), "spike": find_spikes(made).max(),
             }  # fmt: skip
 
 
@@ -111,7 +145,7 @@ def list_differences() -> Iterator[dict[str, Any]]:
     for brush, asked in product(("lower", "raise"), AMOUNTS):
         line = PointerStroke(brush=brush, depth=asked, height=asked, **PATHS["line"])
         made = play(make_bed(side=SIDE), (line,))
-        core = np.abs(made.formed[measure_distances(line, made.grid) < CORE])
+        core = np.abs(made.formed[measure_distances(made) < CORE])
         yield _differ(f"{brush} {1e3 * asked:g} mm", core - asked)
 
 
