@@ -49,31 +49,14 @@ class Instant:
     finger: Fingertip | tuple[Fingertip, ...] = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
-        count = len(self.position)
-        poses = (len(self.finger), 7) if isinstance(self.finger, tuple) and len(self.finger) > 1 else (7,)
-        shapes = {"position": (count, 2), "fingertip": poses}
         for name in ARRAYS:
-            shape = shapes.get(name, (count,))
-            kind = np.int8 if name == "mode" else np.float64
-            array = np.array(getattr(self, name), kind)
-            if name == "fingertip" and array.shape == (1, 7):
-                array = array[0]
-            if array.shape != shape or not count:
-                raise OutputError(f"{name} must be an array of the shape {shape} (got {array.shape}).")
-            if not np.isfinite(array).all():
-                raise OutputError(f"{name} must be finite numbers only.")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-        unknown = self.mode[(self.mode < 0) | (self.mode >= len(Mode))]
-        if unknown.size:
-            raise OutputError(f"mode must be a code from 0 to {len(Mode) - 1} (got {unknown[0]}).")
+            array = np.array(getattr(self, name), np.int8 if name == "mode" else np.float64)
+            one = name == "fingertip" and array.shape == (1, 7)
+            object.__setattr__(self, name, array[0] if one else array)
 
     @classmethod
     def of(cls, history: Mapping[str, Any], index: int = -1, **sizes: Any) -> Instant:
         """Take one row of a history."""
-        missing = [name for name in ARRAYS if name not in history]
-        if missing:
-            raise OutputError(f"The history has no {missing[0]}: it must be a history.npz of `digiclay run`.")
         rows = len(history["height"])
         if not -rows <= index < rows:
             raise OutputError(f"The history has {rows} rows, 0 to {rows - 1} (got {index}).")
