@@ -140,21 +140,21 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
     [
         pytest.param(
             ("control.force_gain=1,2,3,4", "layout.rows=11,13"), "", False, [[0, 2, 4, 6], [1, 3, 5, 7]], [],
-            "8 points run in 2 stacks", id="points of one structure run together",
+            "8 points run in 2 batches", id="points of one structure run together",
         ),
         pytest.param(
             ("layout.rows=11,13,15",), "", False, [], [[0], [1], [2]],
             "3 points one at a time: fewer than 4 have the same bed, parts and steps", id="too few of a kind",
         ),
-        pytest.param(HALVED, "", False, [[*range(8)]], [], "8 points run in 1 stack", id="not judged"),
+        pytest.param(HALVED, "", False, [[*range(8)]], [], "8 points run in 1 batch", id="not judged"),
         # A dead time of half a control period falls on the end of a half step.
-        pytest.param(HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 stacks", id="ha"),
+        pytest.param(HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 batches", id="ha"),
         pytest.param(
             HALVED[1:], "simulation.physics_step=5e-6", True, [], [[0], [1], [2], [3]], None, id="too fine"
         ),
         pytest.param(
             (METHODS, *NOISE), "", False, [[*range(first, first + 6)] for first in (0, 6, 12, 18)], [],
-            "24 points run in 4 stacks", id="every method with noise",
+            "24 points run in 4 batches", id="every method with noise",
         ),
         pytest.param(
             ("sensors.force_noise=0,1e-3", NOISE[1]), "", False, [], [[0], [1], [2], [3]], None,
@@ -240,7 +240,7 @@ def test_a_fault_in_a_stack_is_not_passed_over(here, monkeypatch, capsys):
     break_stacks(monkeypatch, MemoryError())
     varied = ["--vary", "control.force_gain=1:5:4", "--set", "simulation.duration=0.1", "--workers", "1"]
     assert main(["sweep", "tap", *varied, "--out", "out"]) == 0
-    assert "\n4 points one at a time: there is not enough memory for a stack\n" in capsys.readouterr().out
+    assert "\n4 points one at a time: there is not enough memory for a batch\n" in capsys.readouterr().out
     table = (here / "out" / "sweep.csv").read_text(encoding="utf-8").splitlines()
     assert [line.endswith(",") for line in table[1:]] == [True] * 4  # no point has an error
 
@@ -248,7 +248,7 @@ def test_a_fault_in_a_stack_is_not_passed_over(here, monkeypatch, capsys):
 def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(here, capsys):
     sweep = ["sweep", "tap", "--vary", "control.force_gain=1:6:4", "--set", "simulation.duration=0.1"]
     main([*sweep, "--out", "out"])
-    assert "4 points\n4 points run in 1 stack\n" in capsys.readouterr().out
+    assert "4 points\n4 points run in 1 batch\n" in capsys.readouterr().out
     file, figures = here / "out" / "points" / "000003.json", []
     for _ in range(2):
         kept = json.loads(file.read_text(encoding="utf-8"))["figures"]

@@ -102,7 +102,7 @@ def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(fingers,
     assert main(["study", "my.toml", *ranges, *options]) == 0
     said = capsys.readouterr().out
     assert "16 runs: about" in said
-    assert (("less in batches" in said), ("16 points run in 1 stack" in said)) == (batches, batches)
+    assert (("less in batches" in said), ("16 points run in 1 batch" in said)) == (batches, batches)
     # Each of the fingers has the stiffness of its point.
     assert len({row["contact.stiffness (N/m)"] for row in rows(here / "out" / "points.csv")}) > 8
 

@@ -26,8 +26,8 @@ examples:
 
 The folder holds points/, a small file for each finished point; sweep.csv; and for one or two
 axes a picture of each metric. After Ctrl-C the same command continues. It repeats a failed point
-if its file is removed. Points of one bed, parts and steps run together in one call, a batch or
-stack, in a fraction of the time; the others are listed. For the metrics height_error,
+if its file is removed. Points of one bed, parts and steps run together in one call, a batch,
+in a fraction of the time; the others are listed. For the metrics height_error,
 force_error and total_force_error every point is integrated once more.
 """
 

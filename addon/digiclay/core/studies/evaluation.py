@@ -73,8 +73,8 @@ class Bundles:
 
     def describe(self) -> list[str]:
         """Return how the points run, as lines for a person."""
-        count = sum(len(batch) for batch in self.batches)
-        lines = [f"{count} points run in {_count(len(self.batches), 'stack')}"] if self.batches else []
+        count, noun = sum(map(len, self.batches)), "batch" if len(self.batches) == 1 else "batches"
+        lines = [f"{count} points run in {len(self.batches)} {noun}"] if self.batches else []
         return [*lines, *self.why]
 
 
@@ -192,7 +192,7 @@ def evaluate_bundle(
                 else:
                     records[number] = _make_record(result, errors=errors)
         except MemoryError:
-            why = "there is not enough memory for a stack"
+            why = "there is not enough memory for a batch"
         except Exception as error:  # each point raises it again by itself, and is recorded with it
             why = describe_error(error)
             if not isinstance(error, DigiclayError):
