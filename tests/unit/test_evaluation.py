@@ -148,7 +148,7 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
         ),
         pytest.param(HALVED, "", False, [[*range(8)]], [], "8 points run in 1 batch", id="not judged"),
         # A dead time of half a control period falls on the end of a half step.
-        pytest.param(HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 batches", id="ha"),
+        pytest.param(HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 batches", id="h"),
         pytest.param(
             HALVED[1:], "simulation.physics_step=5e-6", True, [], [[0], [1], [2], [3]], None, id="too fine"
         ),
