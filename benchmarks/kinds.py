@@ -121,9 +121,6 @@ BENCHMARKS = {
         },
         needs="websockets",
     ),
-    "pace": Benchmark(
-        "pace.measure", "how fast a fingertip can lead each method, beside what the method states"
-    ),
     "several_fingers": Benchmark(
         "several_fingers.measure", "what several fingertips cost, and two near each other feel"
     ),

@@ -17,7 +17,7 @@ from ..model.control_interface import SetPoint
 
 
 class Pace(NamedTuple):
-    """How fast a method can be led by a fingertip; the default suits any (``python -m benchmarks pace``)."""
+    """How fast a method can be led by a fingertip; the default suits any."""
 
     drag: float = 2.0
     """Fastest drag of a blister raised or leveled, in its radii a second."""
