@@ -272,6 +272,21 @@ def test_a_finger_comes_and_goes_on_a_bed_that_displays_a_shape(method: str) -> 
     assert np.isfinite(follow(one, poses[-5:, :, :1], kept)[0].row(0)).all()
 
 
+def test_pins_that_a_display_raises_against_resting_fingers_press_each_as_alone() -> None:
+    shown = resolve(parse_tables("[shape]\nfile = 'face'\n[control]\nmethod = 'virtual_master'\n"))
+    one, two = (assemble(replace(shown, fingers=(FINGER,) * count)) for count in (1, 2))
+    poses = press(two, [(-17e-3, 3e-3), (15e-3, -2e-3)], (0.0, 0.0), 120)
+    poses[..., 2] = REST + np.array([5e-3, 6e-3])
+    state, forces = begin(two), []
+    for finger in trace_fingers(two, poses):
+        state = advance(two, state, finger)
+        forces.append(state.finger_forces())
+        assert state.active.block[0].max() <= state.active.peak  # or pins that are touched may be left out
+    alone = [follow(one, poses[:, :, [finger]])[1] for finger in range(2)]
+    assert np.max(forces, axis=0).min() > 0.05
+    np.testing.assert_allclose(forces, np.hstack(alone), rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("method", [None, "virtual_master", "hybrid"])
 def test_fingers_that_jump_and_meet_leave_finite_numbers(method: str | None) -> None:
     system = assemble(scene(method, FINGER, SOFT, LONG))

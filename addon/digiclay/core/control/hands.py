@@ -331,15 +331,21 @@ class HandTogether(HandControl):
         (at, absent, basis, back), count = columns.padded, int(self.runs[0].rows)
         fingers, who = np.arange(len(self.runs)), np.full(seen.force.size, NOBODY)
         who[columns.double] = owner
-        of = who[at]
+        of = who.take(at)
         hidden = of != fingers
         hidden &= of != NOBODY
         hidden |= absent
-        force = seen.force[at]
+        force = seen.force.take(at)
         np.putmask(force, hidden, 0.0)
         own = seen.own[np.arange(count)[:, None, None] + count * fingers, at]
         shown = Measurement(
-            basis, seen.height[at], force, seen.target[at], seen.mode[at], own, seen.cells[at]
+            basis,
+            seen.height.take(at),
+            force,
+            seen.target.take(at),
+            seen.mode.take(at),
+            own,
+            seen.cells.take(at),
         )
         after, orders = self.together.command(list(memory), shown)
         for row in range(count):

@@ -52,6 +52,11 @@ class Selection:
         """Control periods for which a set is kept."""
         return max(KEPT, int(LASTS / np.max(self.period)))
 
+    @property
+    def rise(self) -> Any:
+        """How far pins may rise while a set serves, m: as far as they can; a number or (b,)."""
+        return self.kept * self.period * self.fastest
+
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
         """Return a state, in the same arrays, whose active cells are all that can change in a period."""
         active, window, disc = state.active, finger and finger.window, self.join(control)
@@ -84,7 +89,7 @@ class Selection:
         top: Any,
     ) -> ActiveSet:
         """Return the set that follows another one, without its rows; no pin top is higher than `top`, m."""
-        peak = self.smaller(top + self.kept * self.period * self.fastest, self.cell.actuator.stroke)
+        peak = self.smaller(top + self.rise, self.cell.actuator.stroke)
         margin = self.margin * self.grid.layout.pitch
         reach, control = widen_disc(_reach(window, peak), margin), widen_disc(control, margin)
         cells, near = self.pick(active, moving, reach, control)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Cells, Flags, Floats, any_true, find_copies
+from ..base.arrays import TINY, Cells, Flags, Floats, any_true, find_copies
 from ..model.fingers import HandPeriod, HandTouch, gather_places
 from ..model.fingertip import compute_reach
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
@@ -24,7 +24,10 @@ from .state import ActiveSet, State
 from .system import System
 
 #: How many times as long as that of one finger a set is kept.
-LONGER = 3
+LONGER = 8
+#: How far pins may rise until a set is made anew, m, at least as far as they can in two periods: the less,
+#: the fewer cells a fingertip may touch.
+RISE = 3e-3
 #: Moves cells that several fingers press: heights (g,), openings and commands (l, g), filters (r, c, g),
 #: undersides at the period's instants (p, c, g), fingers (c, g); returns heights, filters, forces (c, g), N.
 PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, Floats, Floats]]
@@ -38,6 +41,11 @@ class HandSelection(Selection):
     def kept(self) -> int:
         """Control periods for which a set is kept: to make one takes as long as a period of ten fingers."""
         return LONGER * super().kept
+
+    @cached_property
+    def rise(self) -> float:
+        """How far pins may rise while a set serves, m."""
+        return max(RISE, 2.0 * float(self.period * self.fastest))
 
     def update(self, state: State, finger: Any, control: Any) -> State:
         """Return a state whose active cells are all that can change in a period; see `Selection`."""
@@ -55,11 +63,19 @@ class HandSelection(Selection):
 
     def serves(self, active: ActiveSet, period: int, window: Any, control: Discs | None) -> bool:
         """Return whether a set has all cells that can change; orders may ask for a disc more."""
-        if control is None:
-            return super().serves(active, period, window, control)
         kept = active.control
-        same = kept is not None and len(kept[0]) == len(control[0])
-        return same and super().serves(active, period, window, control)
+        if control is not None and (kept is None or len(kept[0]) != len(control[0])):
+            return False
+        return self.stays_low(active, period) and super().serves(active, period, window, control)
+
+    def stays_low(self, active: ActiveSet, period: int) -> bool:
+        """Return whether no pin of a set can rise above its peak in a period; it is noted for how many."""
+        known, stroke = active.known, self.cell.actuator.stroke
+        if active.peak < stroke and period >= known.get("low", 0):
+            top = float(np.maximum.reduce(active.block[0], initial=0.0))
+            known["low"] = period + int((active.peak - top) / max(float(self.period * self.fastest), TINY))
+            return bool(period < known["low"])
+        return True
 
     def join(self, control: Any) -> Discs | None:
         """Return the controlled discs as arrays."""
