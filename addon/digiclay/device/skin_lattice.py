@@ -4,9 +4,7 @@ The skin is interpolated along the rows of pins, then across them. For each of t
 and their weights are prepared once. What remains for a new state is, at every point, a weighted sum of
 heights and slopes of two neighbors.
 
-*smooth* is the monotone cubic of Fritsch and Butland, as in `core.surface.skins`: through every pin, and
-nowhere above or below the two pins it stands between. *membrane* is level over the flat ends of the pins,
-and straight between them.
+*smooth* and *membrane* are those of `core.surface.skins`.
 """
 
 from typing import NamedTuple
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 from ..core.base.arrays import Floats
 from ..core.model.layout import find_grid_shape
 from ..core.surface.formed import take_corners, take_outline
+from ..core.surface.skins import flatten_share
 from .instant import Instant
 
 Indices = NDArray[np.int32]
@@ -27,8 +26,6 @@ KINDS = ("smooth", "membrane")
 MOST_POINTS = 41_000
 #: Points a pitch; more are not seen at the size of a pin.
 PARTS = (4, 2, 1)
-#: Flat part of a pin's end, of a pitch, at most: a skin needs room to come down between two pins.
-WIDEST = 0.45
 #: Rounding of a position, in pitches.
 SLACK = 1e-6
 
@@ -142,8 +139,7 @@ def _weigh(share: Floats, cap: float) -> dict[str, Weights]:
     smooth = Weights(
         np.column_stack([1.0 - rise, cube - 2.0 * square + share]), np.column_stack([rise, cube - square])
     )
-    cap = min(cap, WIDEST)
-    line, none = np.clip((share - cap) / (1.0 - 2.0 * cap), 0.0, 1.0), np.zeros_like(share)
+    line, none = flatten_share(share, cap), np.zeros_like(share)
     return {
         "smooth": smooth,
         "membrane": Weights(np.column_stack([1.0 - line, none]), np.column_stack([line, none])),

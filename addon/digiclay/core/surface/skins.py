@@ -7,107 +7,29 @@ that are shifted against each other the points shift along. Every pin top is one
 over three of a staggered or hexagonal one;
 *smooth* is a monotone cubic spline along each row, and then across the rows: through every pin, and nowhere
 above or below the pins it stands between;
-*membrane* is what a thin stretched skin does that lies on the flat end of every pin: level over the ends,
-and harmonic, as a soap film is at small slopes, between them.
+*membrane* is stretched over the flat ends of the pins: level over the ends and straight between them, along
+each row and then across the rows.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Faces, Flags, Floats
+from ..base.arrays import Faces, Floats
 from ..base.spline import interpolate_monotone
 from .formed import NO_PIN, Formed, make_skin
 
-#: The skin is as wanted when no point would move further than this under its own pull, m.
-STILL = 1e-9
-#: A point is at most a pitch or so from a fixed one: some 40 rounds settle a bed of any size.
-ROUNDS = 1000
-
-
-def relax_membrane(formed: Formed, position: Floats, start: Floats, parts: int, cap: float) -> Floats:
-    """Return the heights of a membrane, m, shape of its points: finite elements from the heights `start`."""
-    flat = position.reshape(-1, 2)
-    height, free = _laid(formed, position, start, parts, cap)
-    faces = make_skin(flat, np.zeros(len(flat)), *start.shape)
-    stiffness = _Stiffness(flat, faces)
-    # Conjugate gradients on the free points, with the diagonal taken out.
-    weight = np.where(free, 1.0 / stiffness.diagonal, 0.0)
-    rest = -stiffness(height) * free
-    step = weight * rest
-    direction, power = step, float(rest @ step)
-    for _ in range(ROUNDS):
-        if np.abs(step).max() <= STILL:
-            break
-        pull = stiffness(direction) * free
-        length = power / float(direction @ pull)
-        height = height + length * direction
-        rest = rest - length * pull
-        step = weight * rest
-        power, former = float(rest @ step), power
-        direction = step + power / former * direction
-    return height.reshape(start.shape)
-
-
-def _laid(formed: Formed, position: Floats, start: Floats, parts: int, cap: float) -> tuple[Floats, Flags]:
-    """Return heights with every end of a pin level, and which points no pin carries."""
-    height, free = start.copy(), np.ones(start.shape, bool)
-    pins = position[::parts, ::parts]
-    reach = int(np.ceil(cap / min(formed.pitch, formed.row_spacing) * parts * 1.5)) + 1
-    lines, points = start.shape
-    for down in range(-reach, reach + 1):
-        for across in range(-reach, reach + 1):
-            row = np.arange(formed.rows) * parts + down
-            column = np.arange(formed.columns) * parts + across
-            inside = ((row >= 0) & (row < lines))[:, None] & ((column >= 0) & (column < points))
-            spot = np.ix_(np.clip(row, 0, lines - 1), np.clip(column, 0, points - 1))
-            near = inside & (np.sum((position[spot] - pins) ** 2, axis=-1) <= (cap * (1.0 + 1e-9)) ** 2)
-            at = spot[0].repeat(formed.columns, 1)[near], spot[1].repeat(formed.rows, 0)[near]
-            height[at] = start[::parts, ::parts][near]
-            free[at] = False
-    height[::parts, ::parts], free[::parts, ::parts] = start[::parts, ::parts], False
-    return height.ravel(), free.ravel()
-
-
-class _Stiffness:
-    """The cotangent Laplacian of a flat triangle mesh, applied to heights."""
-
-    def __init__(self, position: Floats, faces: Faces) -> None:
-        starts, ends, weights = [], [], []
-        for corner in range(3):
-            tip, start, end = (faces[:, (corner + k) % 3] for k in range(3))
-            one, other = position[start] - position[tip], position[end] - position[tip]
-            area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
-            weight = 0.5 * np.sum(one * other, axis=1) / area
-            kept = np.abs(weight) > 1e-12  # across a right angle nothing pulls
-            starts.append(start[kept])
-            ends.append(end[kept])
-            weights.append(weight[kept])
-        self._start, self._end = np.concatenate(starts), np.concatenate(ends)
-        self._weight, self._count = np.concatenate(weights), len(position)
-        self.diagonal = self._gathered(self._weight, self._weight)
-
-    def __call__(self, height: Floats) -> Floats:
-        """Return the pull on each point, m."""
-        pull = self._weight * (height[self._start] - height[self._end])
-        return self._gathered(pull, -pull)
-
-    def _gathered(self, at_start: Floats, at_end: Floats) -> Floats:
-        """Add up what the edges give to their ends."""
-        total: Floats = np.zeros(self._count)
-        total += np.bincount(self._start, at_start, self._count)
-        total += np.bincount(self._end, at_end, self._count)
-        return total
-
-
+#: Flat part of a pin's end, of a pitch, at most: a skin needs room to come down between two pins.
+WIDEST = 0.45
 #: Skins by name, with their lines in the help.
 SKINS: dict[str, str] = {
     "bilinear": "straight between the pins",
     "smooth": "monotone cubic splines through the pin tops",
-    "membrane": "a thin skin stretched over the flat ends of the pins",
+    "membrane": "level over the flat ends of the pins, straight between them",
 }
 
 
@@ -122,12 +44,29 @@ def interpolate_skin(formed: Formed, height: Floats, skin: str, parts: int, cap:
     if parts == 1:
         return height
     pins = height.reshape(formed.rows, formed.columns)
-    if skin == "smooth":
-        return _smooth(formed, pins, parts).ravel()
-    straight = _straight(formed, pins, parts)
     if skin == "bilinear":
-        return straight.ravel()
-    return relax_membrane(formed, place_points(formed, parts), straight, parts, cap).ravel()
+        return _straight(formed, pins, parts).ravel()
+    if skin == "smooth":
+        return _join_rows(formed, pins, parts, interpolate_monotone).ravel()
+    return _join_rows(formed, pins, parts, partial(interpolate_level, cap=cap)).ravel()
+
+
+def interpolate_level(knot: Floats, value: Floats, at: Floats, cap: float) -> Floats:
+    """Return values (m, s) at places (m,): level within `cap` of knots (k,) of values (k, s)."""
+    if knot[0] > knot[-1]:
+        knot, value = knot[::-1], value[::-1]
+    low = np.clip(knot.searchsorted(at, side="right") - 1, 0, len(knot) - 2)
+    step = knot[low + 1] - knot[low]
+    share = flatten_share((at - knot[low]) / step, cap / step)[:, None]
+    made: Floats = value[low] + share * (value[low + 1] - value[low])
+    return made
+
+
+def flatten_share(share: Floats, cap: Any) -> Floats:
+    """Return shares of a rise between two pins, level over ends of a radius `cap`, at shares of the way."""
+    cap = np.minimum(cap, WIDEST)
+    risen: Floats = np.clip((share - cap) / (1.0 - 2.0 * cap), 0.0, 1.0)
+    return risen
 
 
 def _linear(values: Floats, parts: int) -> Floats:
@@ -163,8 +102,10 @@ def _straight(formed: Formed, pins: Floats, parts: int) -> Floats:
     return fine
 
 
-def _smooth(formed: Formed, pins: Floats, parts: int) -> Floats:
-    """Return the smooth skin, shape of its points."""
+def _join_rows(
+    formed: Formed, pins: Floats, parts: int, interpolate: Callable[[Floats, Floats, Floats], Floats]
+) -> Floats:
+    """Return a skin interpolated along the rows of pins, then across them, shape of its points."""
     point = place_points(formed, parts)
     first = formed.position.reshape(formed.rows, formed.columns, 2)
     fine = np.empty(point.shape[:2])
@@ -178,8 +119,8 @@ def _smooth(formed: Formed, pins: Floats, parts: int) -> Floats:
         at_rows = np.empty((formed.rows, point.shape[1]))
         for start in range(2 if formed.shift else 1):
             step = slice(start, None, 2 if formed.shift else 1)
-            at_rows[step] = interpolate_monotone(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
-        fine[some] = interpolate_monotone(first[:, 0, 1], at_rows, point[some, 0, 1])
+            at_rows[step] = interpolate(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
+        fine[some] = interpolate(first[:, 0, 1], at_rows, point[some, 0, 1])
     return _bound(formed, pins, point[..., 0], fine, parts) if formed.shift else fine
 
 
