@@ -18,9 +18,9 @@ from digiclay.device import heat, palettes, view
 from digiclay.device.node_tree import ARROW_LENGTH, ARROWS, TOP_FORCE
 from digiclay.live import beds
 from digiclay.operators.pin_view import pick_pins
-from digiclay.operators.ready_view import FACTORY, RELIEF, SPACE, find_eye, place_eye
 from digiclay.overlay import views
 from digiclay.overlay.picture import choose_colors
+from digiclay.overlay.ready_view import FACTORY, RELIEF, SPACE, find_eye, place_eye
 from digiclay.overlay.sections import find_covered, lay_out
 from digiclay.panels import display
 from digiclay.panels.session import error_line

@@ -125,6 +125,33 @@ def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
         snapshot.load(system, header_replaced(data, old, new))
 
 
+@cache
+def kept_of_twelve() -> tuple[System, State, bytes]:
+    """Return a bed that one of twelve fingertips has pressed."""
+    system = assemble(resolve({"layout": SIZES, "control": {"method": "hybrid"}}).with_fingers(12))
+    paths = [PRESS, *[path((0.0, 0, 0, 90), (0.8, 0, 0, 90))] * 11]
+    *_, state = periods(system, paths, begin(system), 70)
+    state.rows[-1, 3] = -0.0
+    return system, state, snapshot.dump(system, state)
+
+
+def test_fingertips_that_touch_nothing_take_next_to_no_room_and_nothing_is_lost() -> None:
+    system, state, data = kept_of_twelve()
+    assert len(data) < 0.25 * 2 * 99 * 8 * system.rows.count  # of what all their zeros would take
+    taken_up = snapshot.load(system, data)
+    assert same(taken_up, state)
+    assert snapshot.dump(system, taken_up) == data
+
+
+@pytest.mark.parametrize(
+    "wrong", [b'"thin": [1', b'"thin": [-', b'"thin": 5, "t": [', b'"rows": [9999999999']
+)
+def test_another_number_of_what_is_not_zero_is_refused(wrong: bytes) -> None:
+    system, _, data = kept_of_twelve()
+    with pytest.raises(StateError):
+        snapshot.load(system, header_replaced(data, wrong[:8] + b"[", wrong))
+
+
 IMPOSSIBLE = [("rows", (0, 3), np.nan), ("rows", (0, 3), np.inf), ("rows", (0, 3), -np.inf)]
 IMPOSSIBLE += [("modes", 5, len(Mode)), ("cells", slice(2), 40)]  # gathered twice
 #: Rows: height, opening, command, force.

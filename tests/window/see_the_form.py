@@ -59,7 +59,7 @@ def see_at_once(blender: Any) -> Iterator[float | None]:
     shading.light, shading.show_cavity, display.form = "STUDIO", False, "pins"
     blender.shot("ten lines as pins")
     blender.SEEN["as pins"] = measure_lines(blender, 10, "ten lines as pins")
-    blender.part("operators.ready_view").light(bpy.context)
+    blender.part("overlay.ready_view").light(bpy.context)
     blender.SEEN["the user's"] = shading.light
     area.spaces.active.show_region_ui = False
     looking.view_rotation = turned
@@ -100,6 +100,14 @@ def rectangle_of_the_bed(blender: Any) -> list[float]:
     _, region = blender.view()
     corners -= (region.x, region.y)
     return [float(value) for value in (*corners.min(axis=0), *corners.max(axis=0))]
+
+
+def count_covered(blender: Any) -> int:
+    """Return how many pins of the bed the overlay covers."""
+    (bed, *_), (_, region) = blender.beds(), blender.view()
+    places = np.array([blender.pixel(bed.matrix_world @ pin.co) for pin in bed.data.vertices])
+    low, high = np.reshape(blender.SEEN["overlay"], (2, 2)) + (region.x, region.y)
+    return int(((low < places) & (places < high)).all(axis=1).sum())
 
 
 def note(blender: Any, name: str) -> None:
@@ -154,10 +162,13 @@ def script(blender: Any) -> Iterator[float | None]:
         texts.append(blender.SEEN["text"])
     preferences.show_cursor_text, blender.SEEN["texts"] = True, texts
     bed = blender.beds()[0]
+    yield from blender.open_sidebar()
     bed.digiclay_display.overlay_full = True
     yield from act(blender, to(on_the_screen(blender, 24.0, -8.0), 0.3))
     note(blender, "overlay details")
+    blender.SEEN["covered"] = count_covered(blender)
     bed.digiclay_display.overlay_full = False
+    blender.view()[0].spaces.active.show_region_ui = False
     for shown, kind in (("pins", "smooth"), ("skin", "membrane"), ("both", "smooth")):
         bed.digiclay_display.form, bed.digiclay_display.skin = shown, kind
         yield from act(blender, to(on_the_screen(blender, 23.0, -9.0), 0.3))

@@ -54,6 +54,10 @@ def test_the_overlay_does_not_cover_the_bed(seen: Seen) -> None:
     assert right <= from_left or left >= to_right or top <= from_bottom or bottom >= to_top
 
 
+def test_the_bed_gives_way_to_the_details_of_the_overlay_beside_an_open_sidebar(seen: Seen) -> None:
+    assert seen["covered"] == 0
+
+
 def test_the_text_at_the_cursor_can_be_off_while_its_ring_is_drawn(seen: Seen) -> None:
     shown, off = seen["texts"]
     assert any("Lower" in text for text in shown)

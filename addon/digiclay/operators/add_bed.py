@@ -20,6 +20,7 @@ from ..device import palettes, unit, view
 from ..device.instant import Instant, find_ellipsoids, read
 from ..exchange import shape_show
 from ..live import beds
+from ..overlay.ready_view import find_view, frame, light
 from ..panels.base import menu
 from ..press.aim import find_free_place
 from ..recorded import takes
@@ -33,7 +34,6 @@ from ..settings.shown_units import to_si
 from ..ui_text import localize
 from .action import Action, FileAction, action, file_of, millimeters
 from .poll_messages import baked, edited, inside_edit, no_bed, session_runs
-from .ready_view import find_view, frame, light
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.

@@ -10,14 +10,14 @@ from ..core.base.errors import DigiclayError
 from ..device import parts, view
 from ..device.instant import CLEARANCE
 from ..device.node_tree import ARROWS
-from ..roles import FINGERS, PALM, bed_of, fingertips_of, owner_of
+from ..overlay.ready_view import reveal
+from ..roles import BALL, FINGERS, PALM, bed_of, fingertips_of, owner_of
 from ..settings import devices
 from ..settings.declared import choice
 from ..ui_text import localize
 from .action import action
 from .add_bed import select_only
 from .poll_messages import linked, no_bed
-from .ready_view import reveal
 
 #: Distance that new fingertips keep from others, m: the masters of nearer ones would disturb each other.
 APART = 18e-3
@@ -36,7 +36,7 @@ def add_fingertip(operator: Any, context: Any) -> None:
     x, y = _find_place(bed, np.zeros((1, 2)))
     (tip,) = made = _add(bed, np.array([[x, y, 0.0]]))
     select_only(context, tip)
-    reveal(context, bed, made)
+    reveal(context, bed, [tip[BALL] for tip in made])
 
 
 @action(
@@ -59,7 +59,7 @@ def add_hand(operator: Any, context: Any) -> None:
     context.view_layer.update()
     made = _add(bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm)
     select_only(context, palm)
-    reveal(context, bed, made)
+    reveal(context, bed, [tip[BALL] for tip in made])
 
 
 def _find_place(bed: Any, places: Floats) -> Floats:

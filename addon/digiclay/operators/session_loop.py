@@ -20,6 +20,7 @@ from ..device.instant import CLEARANCE, find_ellipsoids
 from ..live import beds, follow, handlers, loop, tick
 from ..live.beds import active_session
 from ..overlay import views
+from ..overlay.ready_view import light
 from ..press import tool
 from ..recorded import takes
 from ..roles import bed_of
@@ -30,7 +31,6 @@ from ..settings.declared import flag, text
 from ..ui_text import localize
 from . import poll_messages as poll
 from .action import Action, Polled, action
-from .ready_view import light
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1

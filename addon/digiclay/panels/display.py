@@ -17,7 +17,8 @@ from ..device import heat, view
 from ..device.node_tree import ARROW_LENGTH, ARROWS, COLOR_BY_FORCE, FORM, LENGTH, MEMBRANE, TINT, TOP_FORCE
 from ..live import beds
 from ..overlay import views
-from ..roles import bed_of, is_edited
+from ..overlay.ready_view import reveal
+from ..roles import bed_of, ellipsoid, fingertips_of, is_edited
 from ..sessions import running
 from ..settings import properties
 from ..settings.declared import choice, flag, number
@@ -80,6 +81,14 @@ def _follow_overlay(display: Any, context: Any) -> None:
     views.follow()
 
 
+def _show_details(display: Any, context: Any) -> None:
+    """Show the bed beside the overlay, which is larger now."""
+    views.follow()
+    bed = display.id_data
+    if display.overlay and display.overlay_full and running.find(bed) is not None:
+        reveal(context, bed, [bed, *filter(None, map(ellipsoid, fingertips_of(bed).values()))])
+
+
 class Display(bpy.types.PropertyGroup):
     """Display properties of a bed."""
 
@@ -122,7 +131,7 @@ class Display(bpy.types.PropertyGroup):
     overlay_full: flag(
         "Overlay Details",
         "Show curves, heights of picked pins and modes in the overlay, not force and state alone",
-        update=_follow_overlay,
+        update=_show_details,
     )  # fmt: skip
     seconds: number(
         "Past (s)", "Time span of the overlay's curves, in s", default=5.0, min=0.5, max=SPAN, precision=1,

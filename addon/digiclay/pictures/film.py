@@ -84,8 +84,9 @@ def is_whole_film(data: bytes) -> bool:
     return at == len(data) and b"moov" in kinds
 
 
-#: How far from the pins a fingertip may be that is to be in the frame, m: for more the bed would be small.
-NEAR = 0.01
+#: How far beside and above the pins a fingertip may be that is to be in the frame, m: it stays there when it
+#: lifts from a session; for more the bed would be small.
+NEAR, LIFTED = 0.01, 0.03
 Progress = Callable[[int, int], None]
 
 #: Angles at which a turning bed's outline is looked at for the frame it needs.
@@ -166,7 +167,7 @@ def _visible_points(
     poses = history["fingertip"][rows]
     places = poses.reshape(-1, 7)[:, :3]  # of all fingertips, a row a pose
     middle = np.array([*position.mean(axis=0), height.max()])
-    reach = np.array([*np.abs(position - middle[:2]).max(axis=0), 0.0]) + NEAR
+    reach = np.array([*np.abs(position - middle[:2]).max(axis=0) + NEAR, LIFTED])
     places[(np.abs(places - middle) > reach).any(axis=1)] = middle
     ways = np.indices((3, 3, 3)).reshape(3, -1) - 1.0
     extremes = np.unique((places @ ways).argmax(axis=0) // (len(places) // len(poses)))

@@ -149,12 +149,13 @@ def follow(
         stroke = replace(stroke, standing=now.copy())
     if stroke.tracking and stroke.phase in (PRESSING, DRAGGING):
         drags = stroke.phase == DRAGGING
-        firm = force > (FIRM if drags and _is_uneven(stroke, device, pose) else hard)
+        firm = force > min(FIRM, hard)  # only then it counts whether the ground is uneven
+        firm = firm and force > (FIRM if drags and _is_uneven(stroke, device, pose) else hard)
         if firm and stroke.waited * period < PATIENCE:
             return replace(stroke, waited=stroke.waited + 1, pace=0.0), np.array([pose, pose])
         stroke = stroke if firm else replace(stroke, waited=0)
         # No farther than to where the force may count.
-        count = 1 if drags and _is_uneven(stroke, device, pose, count * period) else count
+        count = 1 if count > 1 and drags and _is_uneven(stroke, device, pose, count * period) else count
     way, path = Way(device, period, find_safe(stroke, device, now)), [pose]
     while len(path) <= count and stroke.phase not in (FINISHING, DONE):
         step = _step(stroke, way, path[-1][:3].tolist())
@@ -183,7 +184,7 @@ def follow_images(
         gap = min((math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf)
         count = 1 if gap < 2.0 * stroke.tracking.reach(count * period) else count
         hard = stroke.tracking.hard if gap < 2.0 * stroke.tracking.radius else hard
-    for part in stroke.parts:
+    for part in stroke.parts if count > 1 else ():
         dragged, at = part.tracking and part.phase == DRAGGING, poses[part.image % len(poses)]
         if part.phase in (ABOVE, YIELDING, PRESSING) or (
             dragged and _is_uneven(part, device, at, count * period)

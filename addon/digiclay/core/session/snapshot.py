@@ -92,6 +92,8 @@ def _check_number(template: Any, kept: Any) -> None:
 START, FIRST = b"digiclay state 2\n", b"digiclay state 1\n"
 #: Types of the arrays, by their names in `State` and `ActiveSet`.
 ARRAYS = {"rows": "<f8", "modes": "i1", "aged": "<f8", "cells": "<i8", "block": "<f8", "mode": "i1"}
+#: Those of which, with several fingers, only what is not 0 is written: most cells are pressed by one at most.
+THIN = ("rows", "block")
 #: How far rounding may take a height, m, or an opening beyond its ends.
 SLACK = 1e-6
 #: No number of a state is as large: a session ends when the square of one is no longer finite.
@@ -116,6 +118,15 @@ def dump(system: System, state: State) -> bytes:
     active, rows = state.active, system.rows
     arrays: list[NDArray[Any]] = []
     memory = flatten(state.memory, arrays)
+    values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
+    body = [np.ascontiguousarray(array, kind) for array, kind in zip(values, ARRAYS.values(), strict=True)]
+    thin = []
+    for place, name in enumerate(ARRAYS):
+        if name in THIN and system.fingers > 1:
+            filled = body[place].view("<i8").reshape(-1) != 0  # a negative 0 is none
+            body[place] = body[place].reshape(-1)[filled]
+            thin.append(body[place].size)
+            arrays.append(np.packbits(filled))
     header = {
         "cells": system.grid.count,
         "rows": _list_rows(rows),
@@ -131,11 +142,10 @@ def dump(system: System, state: State) -> bytes:
             "until": active.until,
         },
         "memory": memory,
+        "thin": thin,
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
     }
     text = json.dumps(header).encode()
-    values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
-    body = [np.ascontiguousarray(array, kind) for array, kind in zip(values, ARRAYS.values(), strict=True)]
     # One copy: the arrays are joined as they stand.
     parts = (array.data for array in (*body, *arrays))
     return b"".join([START, len(text).to_bytes(4, "little"), text, *parts])
@@ -214,7 +224,11 @@ def _read(data: bytes) -> Snapshot:
             gathered = header["gathered"] = {**gathered, "fingers": [{"reach": gathered["reach"]}]}
         count, taken = Rows(*map(read_count, header["rows"])).count, read_count(gathered["cells"])
         sizes = (count, cells), (cells,), (cells,), (taken,), (count, taken), (taken,)
-        shapes: list[tuple[str, tuple[int, ...]]] = list(zip(ARRAYS.values(), sizes, strict=True))
+        thin = dict(zip(THIN, map(read_count, header.get("thin", ())), strict=False))
+        whole = dict(zip(ARRAYS, sizes, strict=True))
+        shapes: list[tuple[str, tuple[int, ...]]] = [
+            (kind, (thin[name],) if name in thin else whole[name]) for name, kind in ARRAYS.items()
+        ]
         shapes += [(str(kind), tuple(map(read_count, shape))) for kind, shape in header["arrays"]]
         arrays, end = _read_arrays(data, first + length, shapes)
         if end != len(data):
@@ -223,6 +237,8 @@ def _read(data: bytes) -> Snapshot:
         numbers += [read_count(value) for value in (header["period"], gathered["until"], gathered["near"])]
         numbers += [number for discs in _read_discs(gathered) for disc in discs for number in disc or ()]
         kept = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
+        for name, bits in zip(thin, kept.memory[len(kept.memory) - len(thin) :], strict=True):
+            kept.arrays[name] = _fill(kept.arrays[name], bits, whole[name])
         # A memory of nothing is None; one that is not there at all is damage.
         sound = "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
@@ -230,6 +246,16 @@ def _read(data: bytes) -> Snapshot:
     if not sound or not _is_sound(kept, cells):
         raise _make_error("holds numbers that no state has")
     return kept
+
+
+def _fill(values: NDArray[Any], bits: NDArray[Any], shape: tuple[int, ...]) -> Floats:
+    """Return an array of values (k,) where the packed bits are 1, and else of zeros."""
+    count = math.prod(shape)
+    if bits.shape != (-(-count // 8),):
+        raise ValueError("another number of bits")
+    filled, whole = np.unpackbits(bits, count=count).astype(bool), np.zeros(count)
+    whole[filled] = values
+    return whole.reshape(shape)
 
 
 def _read_arrays(

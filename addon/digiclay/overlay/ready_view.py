@@ -9,8 +9,8 @@ from .. import preferences
 from ..compat import bpy
 from ..core.base.arrays import Floats
 from ..device import detail, view
-from ..overlay.views import find_free_room, find_taken
 from ..roles import BALL, fingertips_of
+from .views import find_free_room, find_taken
 
 #: Width of a sidebar that is yet to be opened, at a UI scale of 1, pixels.
 SIDEBAR = 280.0
@@ -85,15 +85,15 @@ def frame(context: Any, bed: Any) -> None:
     detail.follow()
 
 
-def reveal(context: Any, bed: Any, tips: Iterable[Any]) -> None:
-    """Show a bed whole, as `frame` does, if some of its fingertips would be out of the view in use."""
+def reveal(context: Any, bed: Any, things: Iterable[Any]) -> None:
+    """Show a bed whole, as `frame` does, if some of what has meshes there is not in the view in use."""
     shown = find_view(context)
     if shown is None or not shown[1].data or shown[1].data.view_perspective == "CAMERA":
         return
     context.view_layer.update()
     (free, taken), region = _find_room(context, bed, *shown), shown[1]
-    corners = _list_corners(_list_balls(tips))
-    clip = np.column_stack([corners, np.ones(len(corners))]) @ np.array(region.data.perspective_matrix).T
+    points = np.concatenate([_list_points(thing) for thing in things])
+    clip = np.column_stack([points, np.ones(len(points))]) @ np.array(region.data.perspective_matrix).T
     places = 0.5 * (clip[:, :2] / clip[:, 3:] + 1.0) * [region.width, region.height]
     seen = (clip[:, 3] > 0.0) & ((places >= free[0]) & (places <= free[1])).all(axis=1)
     if not (seen & ~((places > taken[0]) & (places < taken[1])).all(axis=1)).all():
@@ -152,8 +152,18 @@ def _list_corners(things: list[tuple[Any, Any]]) -> Floats:
     """Return the corners (k, 3) of the boxes about shapes of placed objects, world."""
     boxes = []
     for shape, placed in things:
-        matrix = np.array(placed.matrix_world)
         points = np.array([vertex.co for vertex in shape.data.vertices])
         corners = np.stack(np.meshgrid(*zip(points.min(axis=0), points.max(axis=0), strict=True)), axis=-1)
-        boxes.append(corners.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
+        boxes.append(_place(corners.reshape(-1, 3), placed))
     return np.concatenate(boxes)
+
+
+def _list_points(thing: Any) -> Floats:
+    """Return the points (k, 3) of an object's mesh, world."""
+    return _place(np.array([vertex.co for vertex in thing.data.vertices]), thing)
+
+
+def _place(points: Floats, placed: Any) -> Floats:
+    """Return points (k, 3) of an object, world."""
+    matrix = np.array(placed.matrix_world)
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
