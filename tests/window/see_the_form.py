@@ -106,7 +106,7 @@ def count_covered(blender: Any) -> int:
     """Return how many pins of the bed the overlay covers."""
     (bed, *_), (_, region) = blender.beds(), blender.view()
     places = np.array([blender.pixel(bed.matrix_world @ pin.co) for pin in bed.data.vertices])
-    low, high = np.reshape(blender.SEEN["overlay"], (2, 2)) + (region.x, region.y)
+    low, high = np.add(np.reshape(blender.SEEN["overlay"], (2, 2)), (region.x, region.y))
     return int(((low < places) & (places < high)).all(axis=1).sum())
 
 
