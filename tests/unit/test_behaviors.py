@@ -1,6 +1,5 @@
 """The behaviors: what each commands, remembers and refuses on measurements handed to it; and their parts."""
 
-import itertools
 import re
 from typing import Any
 
@@ -251,25 +250,6 @@ def test_a_drive_is_limited_to_its_valve_and_approaches_a_height_in_its_settling
     # Reservoirs that cannot raise a pin give finite commands.
     drive = driven(supply={"high": -0.1e5, "low": -0.5e5})
     assert np.all(np.abs(drive.open_for(np.array([-0.02, 0.0, 0.02]))) <= 1.0)
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_the_nearest_cells_are_neighbors_each_pair_once(arrangement):
-    plan = bed(arrangement)
-    cells = np.random.default_rng(3).permutation(plan.count)
-    pairs = [
-        frozenset((int(cells[one]), int(cells[other])))
-        for ones, others, _ in make_exchange(plan, 1e-5, 5e-3).find_pairs(cells)
-        for one, other in zip(ones, others, strict=True)
-    ]
-    place = plan.positions
-    # Aligned: 1 pitch; staggered: 1.118 to the next row; the next farther ones are at 1.41 and more.
-    near = {
-        frozenset(pair)
-        for pair in itertools.combinations(range(plan.count), 2)
-        if np.hypot(*(place[pair[0]] - place[pair[1]])) < 1.2 * 3e-3
-    }
-    assert (set(pairs), len(pairs)) == (near, len(near))
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

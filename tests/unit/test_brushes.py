@@ -199,17 +199,6 @@ def test_strokes_that_press_and_smooth_are_queued_behind_each_other():
     assert risen(done, -12.0, 0.0) < 0.5 * SPIKE
 
 
-def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before():
-    session = spiked((0.0, 0.0))
-    before = heights(session)
-    session = go_on(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)), 8)
-    assert risen(session, 0.0, 0.0) < SPIKE - 1e-3
-    back = sculpting.withdraw_stroke(session)
-    np.testing.assert_array_equal(heights(back), before)
-    # No order is left behind.
-    np.testing.assert_array_equal(heights(go_on(back, 10)), before)
-
-
 def smoothed() -> Running:
     session = sculpting.set_recording(spiked((0.0, 0.0)), True)
     return finish(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)))
@@ -231,22 +220,6 @@ def test_undo_shortens_the_orders_of_a_recording_with_its_path():
     start = snapshot.load(back.system, keep.start)
     *_, again = simulate_path(back.system, start, keep.path, keep.orders)
     assert snapshot.dump(back.system, again) == back.snapshot
-
-
-def test_a_symmetric_stroke_smooths_all_its_images_as_one_gesture():
-    corners = [(-12.0, -12.0), (-12.0, 12.0), (12.0, -12.0), (12.0, 12.0)]
-    done = finish(queue_smooth(spiked(*corners), (12.0, 11.0), (12.0, 13.0), symmetry="XY"))
-    assert max(risen(done, *corner) for corner in corners) < 0.6 * SPIKE
-    assert (done.finished_strokes, len(done.gestures)) == (1, 1)
-
-
-def test_other_parameters_in_mid_stroke_leave_a_session_that_goes_on():
-    session = go_on(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0)), 8)
-    control = replace(session.scene.control, position_gain=300.0)  # type: ignore[type-var]
-    session, said = sculpting.change_scene(session, replace(session.scene, control=control))
-    assert said == ""
-    done = finish(session)
-    assert (done.finished_strokes, done.strokes) == (1, ())
 
 
 @pytest.mark.parametrize(("width", "radius"), [(8e-3, 8e-3), (1e-3, 6e-3)])

@@ -10,11 +10,9 @@ import pytest
 from digiclay.core.engine.system import make_segments
 from digiclay.core.model.actuator import Actuator, Supply
 from digiclay.core.model.contact import LARGEST_EXPONENT, Contact
-from digiclay.core.model.delay import Delay, Queue, split_delay
+from digiclay.core.model.delay import Delay, split_delay
 from digiclay.core.model.fingertip import LEVEL, Fingertip
-from digiclay.core.model.lag import SHUT, ValveLag
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.model.null_parts import InstantValve
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.model.valve import Fluid, Valve
@@ -124,8 +122,6 @@ PERIOD = 5e-3
 DEAD_TIMES = [0.0, 1e-3, 0.37e-3, 2.5e-3, 4.9999e-3, 5e-3, 7.3e-3, 10e-3, 12e-3]
 #: Commands of successive periods, none of them 0: a valve is not to be cut short as shut.
 COMMANDS = [0.5, -1.0, 0.25, 1.0, 0.125, -0.5, -0.75, 1.0, 0.3, 0.6, -0.2, 0.4]
-#: A command of four valves, and the one after it.
-COMMAND, NEXT = np.array([1.0, -1.0, 0.2, 0.3]), np.array([-1.0, 0.5, 0.5, -0.3])
 
 SCRIPT = scripted(lambda t, x, y: COMMANDS[min(int(t / PERIOD + 1e-6), len(COMMANDS) - 1)])
 
@@ -195,39 +191,6 @@ def test_commands_kept_and_the_cut_make_up_the_dead_time_and_steps_fill_the_peri
     for part in parts:
         wanted = [part.start + node * part.length for node in stepper.nodes]
         assert instants[list(part.nodes)] == pytest.approx(wanted, abs=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("stepper", "lag", "count"),
-    [
-        ("bernoulli", ValveLag(), 1),  # the closed form goes on over the kink of a lagging valve
-        ("bernoulli", None, 2),  # one without lag jumps, and ends a step
-        ("runge_kutta_4", ValveLag(), 2),
-    ],
-)
-def test_a_dead_time_within_a_step_cuts_it_where_it_must(stepper, lag, count):
-    system = one_cell(stepper=stepper, period=PERIOD, step=PERIOD, dead_time=PERIOD / 5, valve_lag=lag)
-    assert len(system.plan.segments) == count
-
-
-def test_the_rate_is_the_derivative_of_the_exact_opening():
-    start = np.array([0.0, 1.0, -0.7, 0.3])
-    moved = ValveLag().response(Queue(), [1e-9]) @ np.array([start, COMMAND])
-    # A difference over 1 ns: truncation 1e-9/τ_v, 5e-7; rounding 1e-16/1e-9 against rates of 500 1/s.
-    rate = ValveLag().rate(start[None], COMMAND)
-    assert (moved - start) / 1e-9 == pytest.approx(rate, rel=1e-5, abs=1e-5)
-
-
-def test_a_valve_that_is_almost_shut_is_shut():
-    own = np.array([[0.9 * SHUT, -0.9 * SHUT, 1.1 * SHUT, -1.1 * SHUT]])
-    ValveLag().settle(own)
-    assert own[0].astype(bool).tolist() == [False, False, True, True]
-
-
-def test_without_lag_the_opening_is_the_command_and_jumps_at_the_cut():
-    assert InstantValve().opening(np.empty((0, 4)), COMMAND) is COMMAND
-    response = InstantValve().response(split_delay(Delay(1.3e-3), PERIOD), [1.29e-3, 1.31e-3])
-    assert np.array_equal(response @ np.array([COMMAND, NEXT]), [COMMAND, NEXT])
 
 
 TIMES, WEIGHTS = (4e-3, 70e-3, 1.4), (0.08, 0.62, 0.20, 0.10)
@@ -332,28 +295,6 @@ def test_a_pulp_one_of_whose_filters_is_cut_in_two_is_the_same():
     whole, cut = (record(one_cell(relaxation=pulp), motion, 20).force for pulp in (Relaxation(), halves))
     assert whole.max() > 0.05
     assert cut == pytest.approx(whole, rel=1e-12)  # rounding
-
-
-def test_without_contact_the_pulp_decays_like_a_step_without_tension():
-    aged, stepped = np.array([[0.3], [0.2], [0.1]]), np.array([0.3, 0.2, 0.1])
-    Relaxation().age(aged, np.full(1, 7e-3))
-    for _ in range(7):
-        stepped = filtered(stepped, 0.0, 0.0, 1e-3)
-    assert aged[:, 0] == pytest.approx(stepped, rel=1e-13)  # rounding
-
-
-@pytest.mark.parametrize("step", [1e-6, 1e-3, 5e-3, 50e-3])
-def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step):
-    own, first, last = np.array([0.3, 0.2, 0.1]), 2.0, 1.2
-
-    def lost_at(time: float) -> float:
-        now = first + (last - first) * time / step
-        return float(Relaxation().relaxed(filtered(own, first, now, time)))
-
-    weights, share = Relaxation().mean_loss_map(step)
-    foreseen = weights @ [*own, first] + share * 0.5 * (first + last)
-    # Rounding: what a filter gains in a step of 1 µs is a difference of numbers a million times larger.
-    assert foreseen == pytest.approx(quad(lost_at, 0.0, step, epsrel=1e-12)[0] / step, rel=1e-9)
 
 
 def test_what_relaxes_quicker_than_the_step_is_a_share_of_the_tension():

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
-from itertools import cycle, islice, pairwise
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,6 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.model.trajectory import interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
@@ -23,7 +22,6 @@ from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
     Clock,
     Recording,
-    clamp_pose,
     count_queue,
     find_spare,
     interpolate_path,
@@ -138,18 +136,6 @@ def test_the_way_begins_where_the_finger_was_and_ends_where_it_is():
     assert np.array_equal(path[0], start)
     np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
     np.testing.assert_allclose(np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16)
-    # Several ways together are those one by one.
-    poses = np.random.default_rng(2).normal(size=(40, 2, 7))
-    poses[..., 3:] /= np.linalg.norm(poses[..., 3:], axis=-1)[..., None]
-    parts = np.array([0.0, 0.2, 0.21, 0.7, 1.0])
-    alone = [interpolate_poses(np.array(pair), parts)[0] for pair in pairwise(poses)]
-    assert np.array_equal(interpolate_poses(poses, parts), alone)
-
-
-def test_a_finger_stays_where_a_finger_can_be():
-    places = ([0.0, 0.0, -50.0], [1e9, -1e9, 1e9], [0.01] * 3)
-    found = [clamp_pose(np.array([*place, *LEVEL]), 0.1)[:3].tolist() for place in places]
-    assert found == [[0.0, 0.0, 0.0], [100.0, -100.0, 100.0], [0.01] * 3]
 
 
 def test_a_recording_keeps_each_surface_once_under_its_own_number_and_drops_what_undo_took_back():
@@ -343,7 +329,7 @@ def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step():
         finished.append(session.finished_strokes)
         assert session.snapshot == snapshot.dump(session.system, session.state)
     assert finished == [1, 2]
-    assert len(session.gestures) == 2
+    assert (len(session.gestures), sculpting.last_place(session)) == (2, (9e-3, 0.0))
 
 
 @pytest.mark.usefixtures("quick_machine")

@@ -87,41 +87,6 @@ def test_a_fingertip_known_too_long_too_narrow_or_round_is_found(known):
     assert curvatures == pytest.approx([80.0, 125.0], rel=0.1)
 
 
-def test_the_errors_left_are_those_of_the_corrected_fingertip():
-    known = filter_of(Fingertip())
-    found, basis = known.begin(0.2e-3, 0.0, 40e-3), make_basis(X, Y)
-    found.mean[7] = LONG
-    under = underside(Fingertip(), 0.0, 0.0, 40e-3, 0.0)
-    here = under < 42e-3
-    (found,), left = known.correct(
-        [found], known.measure([found.mean], basis[:, here]), under[here], np.full(here.sum(), 1e-10)
-    )
-    again = under[here] - known.measure([found.mean], basis[:, here]).under
-    # They are the slopes' prediction: right but for the curvature over 0.2 mm, 2.5 µm at a radius of 8 mm.
-    assert left == pytest.approx(again, abs=5e-6)
-
-
-def test_the_underside_at_another_place_is_that_of_the_physics():
-    known = filter_of(Fingertip())
-    shape = Estimate(np.array([*(0.0,) * 7, LONG * math.cos(0.8), LONG * math.sin(0.8)]), np.eye(9))
-    found = known.find_underside([(1e-3, 2e-3, 40e-3)], [shape], make_basis(X, Y))
-    true = underside(Fingertip(), 1e-3, 2e-3, 40e-3, 0.4)
-    assert found == pytest.approx(true, abs=1e-15)
-
-
-def test_slopes_are_differences_of_the_underside():
-    known, basis = filter_of(Fingertip()), make_basis(X, Y)
-    mean = np.array([0.5e-3, -0.3e-3, 40e-3, 0.0, 0.0, 0.0, 0.02, 0.2, 0.1])
-    at = known.measure([mean], basis)
-    near = at.under < 45e-3
-    for row, place in enumerate((6, 0, 1, 7, 8, 2)):
-        step = np.zeros(9)
-        step[place] = 1e-5
-        before, after = (known.measure([mean + own], basis).under for own in (-step, step))
-        slope = (after - before) / 2e-5
-        assert at.slopes[row][near] == pytest.approx(slope[near], rel=1e-4, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     "order", [(0, 1, 2, 3, 4, 5), (5, 4, 3, 2, 1, 0), (1, 2, 3, 4, 5, 0), (0, 5, 1, 4, 2, 3)]
 )

@@ -81,13 +81,6 @@ def test_an_underside_is_as_uncertain_as_its_force_over_the_stiffness() -> None:
     assert deviation == pytest.approx(1e-3 / slope, rel=1e-6)
 
 
-def test_pulp_without_contact_relaxes_for_the_periods_it_was_not_looked_at() -> None:
-    pulp = np.ones((4, 2))
-    PULP.age(pulp, np.array([4.0, 0.0]))
-    assert pulp[:3, 0] == pytest.approx(np.exp(-4.0 * PERIOD / np.array(RELAXATION.times)))
-    assert (pulp[:, 1].tolist(), pulp[3, 0]) == ([1.0, 1.0, 1.0, 1.0], 0.0)
-
-
 # From force to height: the top whose predicted forces add up, and the heights ahead of the fingertip
 
 #: Nine cells under a fingertip of 8 mm radius at 40 mm.

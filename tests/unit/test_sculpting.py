@@ -14,7 +14,7 @@ from digiclay.core.session.live_session import simulate_path
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 
-from tests.hand import SCENE, SIZES, Hand, heights, pose, started
+from tests.hand import SIZES, Hand, heights, pose, started
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
@@ -27,31 +27,6 @@ def test_a_paused_session_stands_still_and_goes_on_without_catching_up() -> None
     assert (session.state.period, session.clock.factor) == (before, 0.0)
     session = hand.move(replace(session, paused=False), [(0.0, 39.0)] * 2)
     assert session.state.period <= before + 7
-
-
-def test_a_single_step_is_one_control_period() -> None:
-    hand, session = Hand(), started()
-    session = hand.move(session, [(0.0, 39.0)] * 5)
-    before = session.state.period
-    session = hand.move(sculpting.request_step(session), [(0.0, 39.0)] * 10)
-    assert (session.state.period, session.paused) == (before + 1, True)
-
-
-def test_rewinding_takes_back_one_gesture_after_the_other() -> None:
-    hand, session = Hand(), started()
-    rest = heights(session)
-    once = hand.press(session, -9.0)
-    first = heights(once)
-    twice = hand.press(once, 9.0)
-    assert len(twice.gestures) == 2
-    assert np.abs(heights(twice) - first).max() > 1e-3
-    back = sculpting.rewind(twice)
-    assert back.pose[2] > 40e-3  # where the gesture began
-    np.testing.assert_allclose(heights(back), first, rtol=0, atol=1e-5)  # pins were still coming to rest
-    back = sculpting.rewind(back)
-    assert np.array_equal(heights(back), rest)
-    assert sculpting.rewind(back) is back
-    assert len(hand.press(back).gestures) == 1  # it goes on
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-6])
@@ -78,29 +53,6 @@ def test_gestures_kept_do_not_grow_in_number() -> None:
     for _ in range(sculpting.GESTURES + 3):
         session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
     assert len(session.gestures) == sculpting.GESTURES
-
-
-def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
-    hand = Hand()
-    session = hand.press(started())
-    formed = heights(session)
-    back = sculpting.reset(session)
-    assert (heights(back) == 40e-3).all()
-    assert back.state.period == 0
-    assert np.array_equal(heights(sculpting.rewind(back)), formed)
-
-
-def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
-    hand = Hand()
-    session = hand.press(started())
-    kept = session.snapshot
-    back = sculpting.restore(hand.press(session, 6.0), kept, pose())
-    assert snapshot.dump(back.system, back.state) == kept
-    assert len(back.gestures) == 1
-    other, said = sculpting.begin_session(8, "Copy", SCENE, pose(), kept)
-    assert (said, snapshot.dump(other.system, other.state)) == ("", kept)
-    # Before the first start it finds a bed at rest.
-    assert (heights(sculpting.restore(session, None, pose())) == 40e-3).all()
 
 
 def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:

@@ -263,6 +263,8 @@ def test_a_pads_corners_are_the_beds_and_pressure_is_depth() -> None:
     assert light.fingers(1.0)[6][2] == pytest.approx(0.035)  # a pad without pressure: half
     light = light.take(point((6, 0.0, 0.0, 0.5)), 1.1).take(point((6, 0.0, 0.0, 0.0)), 1.2)
     assert light.fingers(1.2)[6][2] == pytest.approx(0.04)
+    beyond = PAD.take(touch((-1, 7.0, -7.0)), 1.0).fingers(1.0)
+    assert beyond[2**32 - 1].tolist() == [0.04, 0.04, 0.035]  # it stays on the bed
 
 
 def test_a_contact_that_rests_stays_and_ends_with_the_list_of_those_alive() -> None:
@@ -285,10 +287,6 @@ def test_a_contact_that_rests_stays_and_ends_with_the_list_of_those_alive() -> N
 def test_a_datagram_that_is_none_is_refused_and_changes_nothing(data: bytes) -> None:
     with pytest.raises(ParameterError, match=r"must be TUIO"):
         PAD.take(data, 1.0)
-
-
-def test_a_pad_beyond_its_corners_stays_on_the_bed() -> None:
-    assert PAD.take(touch((-1, 7.0, -7.0)), 1.0).fingers(1.0)[2**32 - 1].tolist() == [0.04, 0.04, 0.035]
 
 
 @pytest.mark.parametrize(

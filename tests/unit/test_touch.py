@@ -39,17 +39,6 @@ def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is() -> 
     assert not outside[:, :6].any()
 
 
-@pytest.mark.parametrize("away", [(30, 30, 38), (0, 0, 300)], ids=["aside", "up"])
-def test_a_finger_that_leaps_away_leaves_no_force_behind(away: tuple[float, float, float]) -> None:
-    down = (-30, -30, 38)
-    waypoints = [(0, -30, -30, 45), (0.05, *down), (0.1, *down), (0.101, *away), (0.3, *away)]
-    system = make_system()
-    run = record(system, path(*waypoints, interpolation="linear"), 60)
-    left = system.grid.disc(-30e-3, -30e-3, 6e-3)
-    assert run.force[20, left].any()
-    assert not run.force[21:, left].any()
-
-
 def test_the_pulp_over_a_pin_goes_on_relaxing_after_contact() -> None:
     # Press, leave, come near again without touching: the filters have decayed all the while.
     system = make_system(Layout(1, 1))
