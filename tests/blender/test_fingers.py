@@ -140,6 +140,7 @@ def test_a_copy_of_a_fingertip_is_a_further_one_with_the_size_of_the_one_copied(
     assert sound(bed, *range(1, last + 2))
     tips = fingertips_of(bed)
     assert tips[last].parent == tips[last + 1].parent
+    assert tips[last + 1].name == f"Digital Clay Fingertip {last + 1}"
     fingers = properties.read_scene(bed).fingers
     assert fingers[-1] == fingers[-2]
     undone()

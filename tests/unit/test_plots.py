@@ -1,5 +1,6 @@
 """Pictures of runs and sweeps: what they show is read from the figures, not from pixels."""
 
+import io
 import struct
 from functools import cache
 
@@ -251,7 +252,7 @@ def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 3
     assert (force.get_xlabel(), force.get_ylabel()) == ("time (s)", "force (N)")
     legends = [[text.get_text() for text in part.get_legend().get_texts()] for part in (heights, force)]
-    assert legends == [["1", "2"], ["1", "2", "set point 0.2 N", "in contact"]]
+    assert legends == [["1", "2"], ["set point 0.2 N", "in contact"]]
     # The color of a cell is that of its fingertip, which is over it in the middle of its contact.
     assert [line.get_color() for line in heights.get_lines()] == [line.get_color() for line in lines[:2]]
     reached = case["position"][plots.session_cells(case)]
@@ -266,6 +267,12 @@ def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
     assert np.nanmax(plan.get_lines()[1].get_xdata()) < np.nanmax(plan.get_lines()[3].get_xdata())
 
 
-def test_no_two_of_32_fingertips_are_drawn_alike():
-    lines = axes(plots.session_figure(two_fingers(32), None), "force").get_lines()
+def test_no_two_of_32_fingertips_are_drawn_alike_and_what_tells_them_covers_no_title():
+    figure = plots.session_figure(two_fingers(32), SetPoint(0.4))
+    figure.savefig(io.BytesIO())  # which places all that is drawn
+    for part in (axes(figure, "heights"), axes(figure, "force")):
+        title, legend = (part.title, part._left_title), part.get_legend()
+        ends = [text.get_window_extent().x1 for text in title if text.get_text()]
+        assert legend.get_window_extent().x0 > max(ends)
+    *lines, _ = axes(figure, "force").get_lines()
     assert len({(line.get_color(), str(line._dash_pattern)) for line in lines}) == 32

@@ -43,6 +43,8 @@ GAP, WALL = 0.85, 1.7
 MANY = 4000
 #: Radius of an arrow's head, in pitches.
 HEAD = 0.36
+#: Name of the first fingertip; others also have their number.
+FINGERTIP_NAME = "Digital Clay Fingertip"
 #: Words about fingertips beyond the last one.
 TOO_MANY = "A bed has at most {} fingertips (got {})."
 #: Half the edge of the cube that a palm is drawn as, m.
@@ -205,8 +207,7 @@ def make_fingertip(collection: Any, bed: Any, number: int = 1, palm: Any = None)
     """Make a fingertip of a bed, or of a palm on it: an empty that is moved, in it an ellipsoid."""
     # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
     # of the device, kept in the ellipsoid's scale.
-    name = "Digital Clay Fingertip" + f" {number}" * (number > 1)
-    made = marked(None, name, FINGERTIP, collection, parent=palm or bed)
+    made = marked(None, name_fingertip(number), FINGERTIP, collection, parent=palm or bed)
     hold_fingertip(bed, number, made)
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"
@@ -220,6 +221,11 @@ def make_fingertip(collection: Any, bed: Any, number: int = 1, palm: Any = None)
     ball.material_slots[0].link = "OBJECT"
     color_fingertip(made, number, clear=False)
     return made
+
+
+def name_fingertip(number: int) -> str:
+    """Return the name of a fingertip, unless the user gives it another one."""
+    return FINGERTIP_NAME + f" {number}" * (number > 1)
 
 
 def find_free_number(bed: Any) -> int:

@@ -269,6 +269,8 @@ def _adopt(tip: Any, bed: Any) -> None:
     except DigiclayError:  # it stays as it is, and touches nothing
         return
     parts.hold_fingertip(bed, number, tip)
+    if tip.name.startswith(parts.FINGERTIP_NAME):
+        tip.name = parts.name_fingertip(number)
     devices.give_settings(bed, tip)
     parts.color_fingertip(tip, number, clear=bool(view.read_setting(bed, ARROWS, False)))
     view.hold_parts(bed)

@@ -68,15 +68,18 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
         return localize(
             "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
         )
-    if not all(_is_shown(context, tip) for tip in tips):
-        return localize("its fingertip stands in no scene shown: link it to a collection to go on")
     fault = bridge.find_scale_fault(bed)
-    matrices = np.array([tip.matrix_world for tip in tips])
-    if not fault and (
-        not np.isfinite(matrices).all() or np.abs(np.linalg.det(matrices[:, :3, :3])).min() < 1e-12
-    ):
-        return localize("its fingertip is scaled to nothing: clear its scale to go on")
-    return fault
+    if fault:
+        return fault
+    for tip in tips:
+        matrix = np.array(tip.matrix_world)
+        if not _is_shown(context, tip):
+            return localize("{} stands in no scene shown: link it to a collection to go on", tip.name)
+        if not np.isfinite(matrix).all():
+            return localize("{} is at no finite place: clear its location, or undo that, to go on", tip.name)
+        if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+            return localize("{} is scaled to nothing: clear its scale to go on", tip.name)
+    return ""
 
 
 def active_session(context: Any) -> tuple[Any, Running] | None:

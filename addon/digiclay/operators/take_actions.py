@@ -94,8 +94,8 @@ class ExportTake(FileAction, bpy.types.Operator):
         scene = to_scene(take, entry.name)
         numbers = takes.list_fingers(bed_of(context), entry.number, len(take.scene.fingers))
         if len(numbers) > 1 and numbers[-1] > len(numbers):  # a scene file counts its own from 1 on
-            were = "The fingers are these fingertips of the bed: " + ", ".join(map(str, numbers))
-            scene = replace(scene, description=were)
+            own = ", ".join(f"{place} = {number}" for place, number in enumerate(numbers, 1))
+            scene = replace(scene, description="Numbers of the fingers here = on the bed: " + own)
         write_whole(file, format_scene(scene).encode())
         self.report({"INFO"}, localize("{} written to {}", entry.name, file))
 

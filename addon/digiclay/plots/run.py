@@ -80,7 +80,8 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
             plan.plot(*spot, "o", color="white", **disc)
             plan.annotate(name, spot, fontsize=10, fontweight="bold", ha="center", va="center_baseline")
         heights.set_ylim(ends(np.array(heights.get_ylim()), 2.0))
-        heights.set(ylabel="height (mm)", title="Heights of cells", xlim=ends(time, 0.1))
+        heights.set(ylabel="height (mm)", xlim=ends(time, 0.1))
+        heights.set_title("Heights of cells under the fingers" if several else "Heights of cells")
         heights.tick_params(labelbottom=False)
         shade_contact(heights, history)
         wanted, label = None, ""
@@ -93,7 +94,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         force.set_title("Forces" if several else "Total force on the fingertip")
         legend_above(heights)
         for axes in (heights, force):
-            axes.yaxis.set_label_coords(-0.075, 0.5)
+            axes.yaxis.set_label_coords(-0.085, 0.5)
         _write_figures(figures, compute_metrics(history, set_point))
     return figure
 
@@ -101,7 +102,8 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
 def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: str) -> None:
     """Draw the total force over time, the one asked for (t,), N, dashed, and when the fingertip touches.
 
-    Of several fingertips the force of each.
+    Of several fingertips the force of each, the first six in the colors of their cells; the legend has the
+    first one of each further style.
     """
     time, asked = array(history, "time"), LINES[1]
     if "finger_force" in history:
@@ -109,12 +111,13 @@ def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: st
         for number, own in enumerate(array(history, "finger_force").T):
             again, color = divmod(number, len(LINES))
             look: dict[str, Any] = {"color": LINES[color], "linestyle": STYLES[again], "linewidth": 1.1}
-            axes.plot(time, own, label=str(number + 1), **look)
+            axes.plot(time, own, label=str(number + 1) if again and not color else None, **look)
     else:
         axes.plot(time, array(history, "total_force"), color=INK, linewidth=1.3, label="total force")
     if wanted is not None:
         axes.plot(time, wanted, color=asked, linewidth=1.3, linestyle=DASHES, label=label)
-    shade_contact(axes, history, "in contact")
+    full = len(axes.get_lines()) > 4 * len(LINES)  # of the legend's line
+    shade_contact(axes, history, None if full else "in contact")
     legend_above(axes, columns=40)
 
 

@@ -239,7 +239,7 @@ def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_aft
     tick.stop(pair.session_uid)
     select(pair)
     bpy.ops.digiclay.take_export(filepath=str(tmp_path / "take.toml"))  # a scene file counts from 1 on
-    assert load(tmp_path / "take.toml").description.endswith(": 1, 3")
+    assert load(tmp_path / "take.toml").description.endswith(": 1 = 1, 2 = 3")
     third = fingertips_of(pair)[3]
     assert third.name.endswith("Fingertip 3")
     for typed in ("0.1, 0.2", "soft"):
@@ -338,7 +338,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
 
 ODD: dict[str, Callable[[Any], object]] = {
     "scaled to nothing": lambda tip: tip.scale.zero(),
-    "no finger at a finite place": lambda tip: setattr(tip, "location", (np.nan, 0.0, 0.0)),
+    "at no finite place": lambda tip: setattr(tip, "location", (np.nan, 0.0, 0.0)),
 }
 
 
@@ -350,7 +350,7 @@ def test_an_odd_fingertip_has_the_session_wait_and_nothing_is_lost(
     press(pair, clock, 1, 2)
     before = exact(pair)
     ODD[what](fingertips_of(pair)[2])
-    waits(pair, clock, words="scaled to nothing")
+    waits(pair, clock, words=f"Digital Clay Fingertip 2 is {what}")
     np.testing.assert_array_equal(exact(pair), before)
     np.testing.assert_allclose(shown(pair), before, rtol=0, atol=1e-8)
 
