@@ -169,6 +169,8 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     heard = now if following.heard is None else following.heard
     if pose is not None:
         if following.silent:
+            # It may be another one, of a single fingertip.
+            fingers = {} if fingers is following.fingers else fingers
             words = localize("The server at {} is heard again", following.address)
         following = replace(following, pose=pose, fingers=fingers, heard=now, silent=False)
     elif not following.silent and (closed or now - heard >= SILENT):

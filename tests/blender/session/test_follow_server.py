@@ -136,6 +136,18 @@ def test_a_server_of_one_finger_leaves_the_others_to_the_hand(
     assert second.rotation_mode == "XYZ"  # nothing has moved it
 
 
+def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_others_lift(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    address = followed_by_two(bed, server, clock)
+    arrived(server, address, *named((1, 0.045), (2, 0.044)))
+    clock.tick(200)
+    arrived(server, address, state(*PRESS))
+    clock.tick(2)
+    assert pose_of(bed) == list(PRESS)
+    assert running.find(bed).poses[1, 2] == pytest.approx(1.0, abs=1e3 * FLOAT32)
+
+
 def test_garbage_and_poses_that_are_none_do_nothing(bed: Any, clock: Clock, server: socket.socket) -> None:
     address = followed(bed, server, clock)
     arrived(server, address, state(*PRESS))
