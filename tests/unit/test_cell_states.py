@@ -175,14 +175,6 @@ def test_what_a_cell_becomes_under_a_finger_that_travels_east(control, forces, b
     assert {cell: mode[cell] for cell in after} == after
 
 
-def test_the_controlled_disc_reaches_the_edge_of_the_outermost_pressed_cell():
-    # One that follows without a force is no part of the patch, with noise neither.
-    measured = seen({MIDDLE - 1: 0.1, MIDDLE + 1: 0.1}, {MIDDLE + 4: Mode.FORCE_FOLLOW})
-    for control in (CONTROL, NOISY):
-        _, disc = control.locate(CONTROL.begin(), measured)
-        assert disc == pytest.approx((0.0, 0.0, 3e-3 + BLISTER.edge_radius), abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [("blister_trigger", 0.07, "below spring_trigger, 0.06 N (got 0.07 N)."),

@@ -21,14 +21,8 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.scene import forming
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.forming import (
-    compute_display_time,
-    find_display,
-    find_summit,
-    find_touch_height,
-    make_forming_scene,
-)
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.finished_run import find_row
@@ -372,10 +366,10 @@ def test_a_shape_stands_by_the_time_it_is_said_to(refresh, preset):
     }
     bare = resolve(table)
     system = assemble(bare)
-    display = find_display(system)
+    display = forming.find_display(system)
     assert display
-    ready = compute_display_time(display)
-    scene = make_forming_scene(bare, system, "away")
+    ready = forming.compute_display_time(display)
+    scene = forming.make_forming_scene(bare, system, "away")
     height = run_scene(scene).history["height"]
     stands = np.abs(height - display.heights).max(axis=1) <= 10e-6 + 1e-12
     # Within the time, and not after a small part of it: nobody waits for nothing.
@@ -387,9 +381,9 @@ def test_a_shape_stands_by_the_time_it_is_said_to(refresh, preset):
 def test_the_finger_touches_the_highest_part_nearest_to_the_middle_at_the_height_it_is_said_to(x, y):
     top = np.full(169, 40e-3)
     top[[0, 60, 84]] = 50e-3, 49.9e-3, 41e-3
-    assert find_summit(BED, top) == (float(BED.x[60]), float(BED.y[60]))
+    assert forming.find_summit(BED, top) == (float(BED.x[60]), float(BED.y[60]))
     heights = fit_shape(Shape(file="crater"), BED, Actuator()).heights
-    touch = find_touch_height(BED, heights, Fingertip(), x, y)
+    touch = forming.find_touch_height(BED, heights, Fingertip(), x, y)
     finger = Fingertip()
     # The ellipsoid by its own equation, as far out as it reaches.
     square = ((BED.x - x) / finger.length) ** 2 + ((BED.y - y) / finger.width) ** 2

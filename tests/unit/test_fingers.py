@@ -23,7 +23,6 @@ from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.run_scene import Result, run
 from digiclay.core.session.snapshot import START
-from digiclay.core.session.take import Take, from_bytes, to_bytes
 from digiclay.core.studies.axes import find_value
 from digiclay.overlay.sections import force_message
 
@@ -140,15 +139,6 @@ def test_a_kept_state_of_two_fingers_is_refused():
     two = START + len(head).to_bytes(4, "little") + head + data[len(START) + 4 + length :]
     with pytest.raises(StateError, match=r"must have the same number of fingers as the bed now, 1 \(got 2\)"):
         snapshot.load(system, two)
-
-
-def test_a_take_keeps_the_path_of_every_finger():
-    poses = np.tile([0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0], (4, 2, 1))
-    poses[:, 1, 0] = 1e-3
-    take = Take(scene(TWO), b"start", poses, b"end")
-    back = from_bytes(to_bytes(take))
-    assert np.array_equal(back.poses, poses)
-    assert (back.scene, back.start, back.end) == (take.scene, take.start, take.end)
 
 
 def pressed(depth: float, tilt: float = 0.0, x: float = 0.0, **parts: object) -> Result:

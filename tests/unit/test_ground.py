@@ -161,21 +161,6 @@ def test_what_a_blister_has_raised_stays_when_it_begins_to_sink():
     assert found.target[[at(x, 0) for x in (-3, 0, 3)]] == pytest.approx(39.3e-3, abs=1e-5)
 
 
-def test_the_stacked_runs_of_a_batch_have_profiles_of_their_own():
-    force = np.zeros(BED.count)
-    force[[at(-3.0, 0.0), at(0.0, 0.0)]] = 0.2
-    inside, tops = np.ones(BED.count, np.bool_), np.array([36e-3, 44e-3])
-    own, distance = GROUNDS["cell"], np.hypot(BED.x, BED.y)
-    alone = seen(SLOPE, Mode.BLISTER)._replace(force=force)
-    both = alone._replace(force=np.stack([force, force], 1), target=np.stack([SLOPE, SLOPE], 1))
-    of_both = (np.stack([one, one], 1) for one in (distance, inside, SLOPE))
-    found, uneven = own.find_profile(Blister(), *of_both, tops, both)
-    assert uneven.any(axis=0).tolist() == [True, False]
-    for run in (0, 1):
-        single, _ = own.find_profile(Blister(), distance, inside, SLOPE, float(tops[run]), alone)
-        np.testing.assert_allclose(single, found[:, run], rtol=0, atol=1e-15)
-
-
 def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse_the_direction():
     east = Heading(0.0, 0.0, 1.0, 0.0)
     back = [update_heading(east, -way, 0.0, 1.5e-3, 6e-3).toward_x for way in (2e-3, 5.9e-3, 6.1e-3)]

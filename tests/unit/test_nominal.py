@@ -144,16 +144,6 @@ def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_
     assert found.min() == pytest.approx(REST - 5e-3, abs=1e-12)
 
 
-def test_queued_strokes_count_from_what_those_before_them_leave():
-    level = stroke(np.array([[25e-3, 0.0], [-25e-3, 0.0]]), Brush.LEVEL)
-    swept = replace(stroke(LINE), brush=Brush.SMOOTH)
-    ridge = stroke(np.array([[0.0, -25e-3], [0.0, 25e-3]]))
-    first, second = (ghost.nominal for ghost in find_ghosts((ridge, swept, level), DEVICE, FLAT))
-    middle = BED.at(np.array([0.0]), np.array([0.0]))
-    assert first.height[middle] == pytest.approx(REST + 4e-3, abs=1e-9)
-    assert second.height[middle] == pytest.approx(REST, abs=1e-9)
-
-
 def test_a_ghost_that_is_drawn_on_is_that_of_the_whole_path_and_others_stay():
     first, last = stroke(LINE), replace(stroke(WAVE, Brush.LOWER), number=2)
     kept: tuple[Ghost, ...] = ()

@@ -66,14 +66,6 @@ def test_a_predicted_force_is_the_one_that_comes() -> None:
     assert found == pytest.approx(forces[42], rel=0.01)
 
 
-@pytest.mark.parametrize("offset", [0.0, 0.2e-3])
-def test_the_underside_is_the_contact_law_solved(offset: float) -> None:
-    law, depth = Contact(offset=offset), np.array([0.3e-3, 1e-3, 2e-3])
-    pulp = PulpEstimate(Touch(Fingertip(), law, RELAXATION), PERIOD, 2.0 * PERIOD, 0.0)
-    under, _ = pulp.find_underside(np.full(3, 40e-3), law.tension(depth), 1e-3)
-    assert under == pytest.approx(40e-3 - depth, rel=1e-12)
-
-
 def test_an_underside_is_as_uncertain_as_its_force_over_the_stiffness() -> None:
     depth, step = np.array([0.5e-3, 2e-3]), 1e-8
     slope = CONTACT.share * (CONTACT.tension(depth + step) - CONTACT.tension(depth - step)) / (2.0 * step)

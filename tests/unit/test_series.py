@@ -12,15 +12,8 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.batch_folder import open_batch
 from digiclay.core.base.errors import OutputError
+from digiclay.core.files import run_folder
 from digiclay.core.files.file_lock import find_host
-from digiclay.core.files.run_folder import (
-    LONGEST,
-    find_name,
-    fold_name,
-    make_safe_name,
-    make_unique_names,
-    read_json,
-)
 from digiclay.core.session.finished_run import is_whole
 from digiclay.core.studies.job_table import read_jobs
 from digiclay.core.studies.series import Kind, open_series
@@ -51,13 +44,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @example("ü" * 200)
 @example("\ud800")
 def test_any_text_makes_a_name_that_every_file_system_takes(text: str) -> None:
-    name = make_safe_name(text)
-    assert 0 < len(name.encode()) <= LONGEST + 1  # a device's name gets one letter more
+    name = run_folder.make_safe_name(text)
+    assert 0 < len(name.encode()) <= run_folder.LONGEST + 1  # a device's name gets one letter more
     assert not set(name) & set('/\\:*?"<>|\0 ')
     assert name[0] not in ".-"
     assert name[-1] != "."
     assert name.partition(".")[0].lower() not in ("con", "nul", "lpt²")
-    assert make_safe_name(name) == name
+    assert run_folder.make_safe_name(name) == name
 
 
 @given(
@@ -65,12 +58,12 @@ def test_any_text_makes_a_name_that_every_file_system_takes(text: str) -> None:
 )
 @example(["x" * 300 + end for end in ("a", "b", "b")])
 def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts: list[str]) -> None:
-    names = make_unique_names(texts)
-    assert len({fold_name(name) for name in names}) == len(texts)
-    assert max([0, *map(len, names)]) <= LONGEST
-    safe = [make_safe_name(text) for text in texts]
+    names = run_folder.make_unique_names(texts)
+    assert len({run_folder.fold_name(name) for name in names}) == len(texts)
+    assert max([0, *map(len, names)]) <= run_folder.LONGEST
+    safe = [run_folder.make_safe_name(text) for text in texts]
     for place, name in enumerate(names):
-        first = [fold_name(one) for one in safe].index(fold_name(safe[place]))
+        first = [run_folder.fold_name(one) for one in safe].index(run_folder.fold_name(safe[place]))
         assert (name == safe[place]) == (first == place)
 
 
@@ -86,7 +79,7 @@ def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsy
     assert main(["batch", str(jobs), "--out", "o", "--jobs", "2"]) == 0
     assert "4 of 4 jobs done" in capsys.readouterr().out
     names = sorted(path.name for path in Path("o/runs").iterdir())
-    assert names == sorted([make_safe_name(here.parent.name), "work", "MY", "my-2"])
+    assert names == sorted([run_folder.make_safe_name(here.parent.name), "work", "MY", "my-2"])
     for name in names:
         assert (Path("o/runs", name, "surface.stl")).stat().st_size > 84
     new = {path.relative_to(here) for path in here.parent.rglob("*") if path not in before}
@@ -150,7 +143,7 @@ def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word: str) -> Non
     shutil.copy("my.toml", "scene.toml")
     assert main(["run", word, "--quiet", "--no-errors"]) == 0
     assert Path("work/metrics.json").is_file()
-    assert find_name(Path("/scene.toml")) == find_name(Path("...toml")) == "scene"
+    assert run_folder.find_name(Path("/scene.toml")) == run_folder.find_name(Path("...toml")) == "scene"
     assert not os.path.lexists("metrics.json")
 
 
@@ -179,7 +172,7 @@ def test_a_series_that_found_the_disk_full_goes_on_when_there_is_room(name, size
         refused(COMMANDS[name], f"Cannot write {Path('o', f'{name}.json')}: ")
     assert left(here) == ["jobs.toml"]
     assert main(COMMANDS[name]) == 0
-    assert read_json(here / "o" / f"{name}.json")
+    assert run_folder.read_json(here / "o" / f"{name}.json")
     points = here / "o" / "points"
     for path in points.glob("*"):
         path.unlink()
@@ -202,7 +195,7 @@ def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(
     if content is not None:
         (here / "o" / f"{name}.json").write_text(content, encoding="utf-8")
     assert main(COMMANDS[name]) == 0
-    assert read_json(here / "o" / f"{name}.json")
+    assert run_folder.read_json(here / "o" / f"{name}.json")
     assert [path.name for path in (here / "o").iterdir() if path.name.startswith(".")] == []
 
 
