@@ -88,12 +88,6 @@ def test_every_panel_has_a_bar_for_every_method():
 OUT = "first run"
 
 
-@pytest.fixture(autouse=True)
-def plain_relief(monkeypatch):
-    """Leave the texts of a relief where they are: to move them apart takes seconds."""
-    monkeypatch.setattr("digiclay.plots.bed.fit_relief", lambda *given: None)
-
-
 def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, number: int = signal.SIGINT) -> None:
     """Send Ctrl-C, or another signal, when a command comes to a step."""
     step: Callable[..., Any] = getattr(module, name)
