@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ..model.control_interface import Commands, Measurement, SetPoint
 from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
+from .finger_sections import WHOLE, Whole
 from .servo import Tracking, lock_overloaded, mark_formed
 from .travel import ABEAM, Heading, Rim, measure_lead, measure_square, update_heading
 
@@ -36,35 +38,59 @@ class Arrow(NamedTuple):
     condition: str
 
 
+class Arrows(tuple[Arrow, ...]):
+    """Arrows that are followed at once; of two from one mode the later wins."""
+
+    @cached_property
+    def conditions(self) -> list[str]:
+        """Their conditions, each once."""
+        return list(dict.fromkeys(arrow.condition for arrow in self))
+
+    @cached_property
+    def goals(self) -> Modes:
+        """Modes that follow, by the conditions, the first one counting most, and the mode before."""
+        goals = np.tile(np.arange(len(Mode), dtype=np.int8), (2,) * len(self.conditions) + (1,))
+        for source, goal, condition in self:
+            holds = np.moveaxis(goals, self.conditions.index(condition), 0)[1]
+            holds[..., list(source)] = goal
+        return goals.ravel()
+
+
 #: What a cell's own force decides.
-BY_FORCE = (
-    Arrow(VIRTUAL_SPRING, Mode.FORCE_FOLLOW, "above_spring_trigger"),
-    Arrow((Mode.BLISTER, Mode.FROZEN), Mode.FORCE_FOLLOW, "above_blister_trigger"),
-    Arrow((Mode.FORCE_FOLLOW,), Mode.CRITICAL, "below_critical_trigger"),
-    Arrow((Mode.CRITICAL,), Mode.FORCE_FOLLOW, "above_critical_trigger"),
-    Arrow((Mode.CRITICAL,), Mode.BLISTER, "timed_out"),
+BY_FORCE = Arrows(
+    (
+        Arrow(VIRTUAL_SPRING, Mode.FORCE_FOLLOW, "above_spring_trigger"),
+        Arrow((Mode.BLISTER, Mode.FROZEN), Mode.FORCE_FOLLOW, "above_blister_trigger"),
+        Arrow((Mode.FORCE_FOLLOW,), Mode.CRITICAL, "below_critical_trigger"),
+        Arrow((Mode.CRITICAL,), Mode.FORCE_FOLLOW, "above_critical_trigger"),
+        Arrow((Mode.CRITICAL,), Mode.BLISTER, "timed_out"),
+    )
 )
 
 #: What the distance to the nearest cell under the fingertip decides.
-BY_PLACE = (
-    Arrow(VIRTUAL_SPRING, Mode.BLISTER, "in_blister"),
-    Arrow((Mode.BLISTER,), Mode.FROZEN, "left_behind"),
-    Arrow((*VIRTUAL_SPRING, Mode.BLISTER, Mode.FROZEN), Mode.EDGE, "at_edge"),
-    Arrow((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), Mode.HOLD, "outside"),
+BY_PLACE = Arrows(
+    (
+        Arrow(VIRTUAL_SPRING, Mode.BLISTER, "in_blister"),
+        Arrow((Mode.BLISTER,), Mode.FROZEN, "left_behind"),
+        Arrow((*VIRTUAL_SPRING, Mode.BLISTER, Mode.FROZEN), Mode.EDGE, "at_edge"),
+        Arrow((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), Mode.HOLD, "outside"),
+    )
+)
+#: Plain numbers: an enumeration's member takes ten times as long.
+HOLD, EDGE, BLISTER, SPRING, FORCE_FOLLOW, CRITICAL = map(
+    int, (Mode.HOLD, Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.CRITICAL)
 )
 
 
-def follow_arrows(mode: Modes, arrows: tuple[Arrow, ...], conditions: dict[str, Flags]) -> Modes:
-    """Return the modes after all arrows were followed at once; of two from one mode the later wins."""
-    after = mode.copy()
-    for source, goal, condition in arrows:
-        starts = _MEMBERS[source].take(mode)
-        np.putmask(after, starts & conditions[condition], np.int8(goal))
-    return after
-
-
-#: For each set of source modes, whether a mode is among them, by its code.
-_MEMBERS = {arrow.source: np.isin(np.arange(len(Mode)), arrow.source) for arrow in (*BY_FORCE, *BY_PLACE)}
+def follow_arrows(mode: Modes, arrows: Arrows, conditions: dict[str, Flags]) -> Modes:
+    """Return the modes (m,) after all arrows were followed at once."""
+    at = np.zeros(mode.shape, np.int16)
+    for name in arrows.conditions:
+        at += at
+        at += conditions[name]
+    at *= len(Mode)
+    at += mode
+    return arrows.goals.take(at)
 
 
 class Patch(NamedTuple):
@@ -142,7 +168,7 @@ class CellStates(Tracking):
             raise ParameterError("CellStates", "critical_trigger", rule, f"{self.critical_trigger:g} N")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CellStatesControl:
     """Controller of Method II for a bed."""
 
@@ -166,19 +192,22 @@ class CellStatesControl:
         """Return the memory before a session."""
         return Patch()
 
-    def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, Disc | None]:
-        """Find where the fingertip presses, and how far its blister can reach; see `Controller`."""
+    def locate(
+        self, memory: Patch, touched: Measurement, part: slice = WHOLE.parts[0]
+    ) -> tuple[Patch, Disc | None]:
+        """Find where a fingertip presses, of a part of the cells, and how far its blister can reach."""
         # A cell that follows counts with what it reads: of a fingertip that rises the few readings above the
         # noise would draw the centroid to and fro.
-        pressed = touched.force > (~_under_finger(touched.mode) * self.floor if self.floor else 0.0)
+        force = touched.force[part]
+        pressed = force > (~_under_finger(touched.mode[part]) * self.floor if self.floor else 0.0)
         if not any_true(pressed):
             return memory, None
-        force, basis = touched.force[pressed], touched.quadratic_basis[:, pressed]
+        force, basis = force[pressed], touched.quadratic_basis[:, part][:, pressed]
         total, x, y = np.dot(basis[:3], force).tolist()
         x, y = x / total, y / total
         radius = math.sqrt(float(measure_square(x, y, basis).max()))
         if not memory.felt:
-            edge = float(np.dot(force, touched.height[pressed])) / total
+            edge = float(np.dot(force, touched.height[part][pressed])) / total
             memory = memory._replace(heading=Heading(x, y), edge=edge)
         elif math.hypot(x - memory.x, y - memory.y) > self.parameters.jump:
             memory = memory._replace(heading=Heading(x, y), losses=memory.losses + 1)
@@ -187,22 +216,47 @@ class CellStatesControl:
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Commands]:
         """Apply the transitions of every cell, then the control of its mode; see `Controller`."""
+        (memory,), commands = self.command_all([memory], seen)
+        return memory, commands
+
+    def sort(self, memory: Patch) -> bool:
+        """Return what is the same for all fingers that are served together: all are."""
+        return True
+
+    def locate_all(
+        self, memories: list[Patch], touched: Measurement, sections: Whole
+    ) -> tuple[list[Patch], list[Disc | None]]:
+        """Find where the fingertips press, each in its section; see `Controller.locate`."""
+        fingers = zip(memories, sections.parts, strict=True)
+        found = [self.locate(memory, touched, part) for memory, part in fingers]
+        return [memory for memory, _ in found], [disc for _, disc in found]
+
+    def command_all(
+        self, memories: list[Patch], seen: Measurement, sections: Whole = WHOLE
+    ) -> tuple[list[Patch], Commands]:
+        """Apply the transitions of every cell, then the control of its mode."""
         seen = seen._replace(force=suppress_noise(seen.force, self.floor)) if self.floor else seen
         mode = follow_arrows(seen.mode, BY_FORCE, self._by_force(seen))
         under = _under_finger(mode)
         target = seen.target.copy()
         np.putmask(target, under, seen.height)
-        if any_true(under):
-            memory, mode, target = self._around(memory, seen, mode, under, target)
-            memory = memory._replace(felt=True)
-        else:
-            gone = {"in_blister": under, "left_behind": under, "at_edge": under, "outside": ~under}
-            mode = follow_arrows(mode, BY_PLACE, gone)
-            memory = memory._replace(felt=False, losses=memory.losses + memory.felt)
+        # Where no cell is under a fingertip none is near one, and the shape does not count.
+        around, shape = np.zeros((3, *mode.shape), np.bool_), np.empty(mode.shape)
+        after = list(memories)
+        for i, (memory, part) in enumerate(zip(memories, sections.parts, strict=True)):
+            if any_true(under[part]):
+                memory, shape[part] = self._around(memory, seen, part, under[part], around[:, part])
+                after[i] = memory._replace(felt=True)
+            else:
+                after[i] = memory._replace(felt=False, losses=memory.losses + memory.felt)
+        in_blister, left_behind, at_edge = around
+        places = {"in_blister": in_blister, "left_behind": left_behind, "at_edge": at_edge}
+        mode = follow_arrows(mode, BY_PLACE, places | {"outside": ~(in_blister | at_edge)})
+        np.putmask(target, mode == BLISTER, shape)
         mode = self._resting(mode, target, seen.force)
-        seen.own[0] = np.where(mode == Mode.CRITICAL, seen.own[0] + 1.0, 0.0)
-        most = 0.0 if self._leaves(memory) else 1.0
-        return memory, Commands(target, mode, self._commands(seen, mode, target, under, most))
+        seen.own[0] = np.where(mode == CRITICAL, seen.own[0] + 1.0, 0.0)
+        most = sections.spread([0.0 if self._leaves(memory) else 1.0 for memory in after])
+        return after, Commands(target, mode, self._commands(seen, mode, target, under, most))
 
     def _leaves(self, memory: Patch) -> bool:
         """Tell whether the fingertip leaves the bed: then no cell is to rise for it."""
@@ -222,47 +276,44 @@ class CellStatesControl:
         }
 
     def _around(
-        self, memory: Patch, seen: Measurement, mode: Modes, under: Flags, target: Floats
-    ) -> tuple[Patch, Modes, Floats]:
-        """Form the blister around the cells under the fingertip: their neighborhoods superposed."""
-        blister, basis = self.blister, seen.quadratic_basis
+        self, memory: Patch, seen: Measurement, part: slice, under: Flags, around: Flags
+    ) -> tuple[Patch, Floats]:
+        """Return the shape of the blister around cells under a fingertip: their neighborhoods superposed.
+
+        `around` (3, m): which cells are in it, left behind and at its edge, is set in place.
+        """
+        blister, basis, height = self.blister, seen.quadratic_basis[:, part], seen.height[part]
+        in_blister, left_behind, at_edge = around
         distance = np.sqrt(measure_square(basis[1, under], basis[2, under], basis))
         nearest = distance.min(axis=0)
-        in_blister = nearest < blister.radius * (1.0 - RELATIVE_TOLERANCE)
-        at_edge = ~in_blister & (nearest < blister.edge_radius * (1.0 - RELATIVE_TOLERANCE))
+        np.less(nearest, blister.radius * (1.0 - RELATIVE_TOLERANCE), out=in_blister)
+        np.less(nearest, blister.edge_radius * (1.0 - RELATIVE_TOLERANCE), out=at_edge)
+        at_edge ^= in_blister
         ahead = measure_lead(memory.heading, memory.x, memory.y, basis)
-        facing = seen.height[at_edge & (ahead >= -ABEAM)]
+        facing = height[at_edge & (ahead >= -ABEAM)]
         if facing.size:
             memory = memory._replace(edge=float(facing.mean()))
         from_patch = np.sqrt(measure_square(memory.x, memory.y, basis))
-        left_behind = (ahead < self.parameters.behind * from_patch) & (nearest > blister.flat_radius)
+        np.less(ahead, self.parameters.behind * from_patch, out=left_behind)
+        left_behind &= nearest > blister.flat_radius
         left_behind &= in_blister
-        conditions = {
-            "in_blister": in_blister,
-            "left_behind": left_behind,
-            "at_edge": at_edge,
-            "outside": ~(in_blister | at_edge),
-        }
-        mode = follow_arrows(mode, BY_PLACE, conditions)
         weight = np.maximum(blister.evaluate_profile(distance), 0.0)
-        top = np.dot(seen.height[under], weight) / np.maximum(weight.sum(axis=0), 1e-12)
+        top = np.dot(height[under], weight) / np.maximum(weight.sum(axis=0), 1e-12)
         rise = 0.0 if self._leaves(memory) else self.parameters.rise
         shape = blister.interpolate(nearest, memory.edge, top + rise)
-        shape = np.minimum(np.maximum(shape, 0.0), self.actuator.stroke)
-        np.putmask(target, mode == Mode.BLISTER, shape)
-        return memory, mode, target
+        return memory, np.minimum(np.maximum(shape, 0.0), self.actuator.stroke)
 
     def _resting(self, mode: Modes, target: Floats, force: Floats) -> Modes:
         """Divide the cells on a virtual spring: pressed, holding a formed height, or at rest."""
-        spring = mode <= Mode.HOLD
-        spring |= mode == Mode.SPRING
+        spring = mode <= HOLD
+        spring |= mode == SPRING
         formed = mark_formed(target, self.actuator.rest_height, self.parameters.dead_band)
-        return np.where(spring, np.where(force > 0.0, np.int8(Mode.SPRING), formed), mode)
+        return np.where(spring, np.where(force > 0.0, np.int8(SPRING), formed), mode)
 
-    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags, most: float) -> Floats:
+    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags, most: Any) -> Floats:
         """Return valve commands: force control under the fingertip, springs and profile elsewhere."""
         gains = self.parameters
-        springs = (mode <= Mode.EDGE) | (mode == Mode.SPRING)
+        springs = (mode <= EDGE) | (mode == SPRING)
         command = gains.command(target - springs * seen.force / gains.spring_stiffness, seen.height)
         follow = gains.force_gain * (gains.force_setpoint - seen.force)
         np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), most))
@@ -271,7 +322,7 @@ class CellStatesControl:
 
 def _under_finger(mode: Modes) -> Flags:
     """Return the cells that follow the force, or did in the last period."""
-    following: Flags = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
+    following: Flags = (mode == FORCE_FOLLOW) | (mode == CRITICAL)
     return following
 
 

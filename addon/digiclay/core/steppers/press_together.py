@@ -92,13 +92,8 @@ class TogetherPlan:
             nearest = np.where(again, NONE, level[0] - np.log1p(lost)).argmax(axis=0)
             pushes |= idle & (np.arange(len(fingers))[:, None] == nearest)
             size_of = np.where(pushes, level + np.log(unit * exponent), NONE)
-            strongest = size_of[0].argmax(axis=0)[None]
-
-            def pick(values: Floats, strongest: Cells = strongest) -> Floats:
-                picked: Floats = np.take_along_axis(values, strongest, 0)[0]
-                return picked
-
-            m, own = pick(exponent), pick(unit)
+            strongest = size_of[0].argmax(axis=0) * height.size + np.arange(height.size)
+            m, own = exponent.take(strongest), unit.take(strongest)
             # Exponentials in units of the strongest one's, at start, middle and end of the fingers' way.
             sizes = size_of - np.log(own * m)
             whole = np.logaddexp.reduce(sizes, axis=1)
@@ -123,7 +118,7 @@ class TogetherPlan:
                 relaxed=relaxed,
                 idle=idle,
             )
-            rise, _, mean = find_loaded_path(m, pick(load), pick(shares), start)
+            rise, _, mean = find_loaded_path(m, load.take(strongest), shares.take(strongest), start)
             after = np.clip(height + rise, 0.0, cell.actuator.stroke)
             last = _tension(exponent * (after - below[part.nodes[-1]]) - shift)
             pressed = (mean + 1.0) * np.einsum("i,icg->cg", SIMPSON, share) / (ratio * exponent / m) - 1.0
