@@ -236,7 +236,9 @@ def _take_settings(bed: Any, session: Running) -> tuple[Running, str]:
         return session, ""
     changed, words = sculpting.change_scene(session, scene, numbers, bridge.poses(bed))
     # A take is of one scene: what was recorded under the former one is not lost.
-    words = ". ".join(filter(None, (words, takes.keep_recording(bed, session))))
+    ended = len(session.strokes) - len(changed.strokes)
+    dropped = localize("Press strokes ended unfinished ({}): their fingertip is gone", ended) if ended else ""
+    words = ". ".join(filter(None, (words or dropped, takes.keep_recording(bed, session))))
     for tip, finger in zip(fingertips_of(bed).values(), find_ellipsoids(scene), strict=True):
         bridge.resize_fingertip(tip, finger)
     return changed, words

@@ -336,6 +336,16 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     assert tops.size > 0
 
 
+def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair: Any, clock: Clock) -> None:
+    started(pair)
+    running.put(sculpting.queue_stroke(running.find(pair), 0.0, 0.0, 4e-3)[0])
+    clock.tick(2)
+    bpy.data.objects.remove(fingertips_of(pair)[1])
+    looked()
+    assert ["ended unfinished (1)" in note.message for note in clock.tick(3)] == [True]
+    assert running.find(pair).numbers == (2,)
+
+
 ODD: dict[str, Callable[[Any], object]] = {
     "scaled to nothing": lambda tip: tip.scale.zero(),
     "at no finite place": lambda tip: setattr(tip, "location", (np.nan, 0.0, 0.0)),
