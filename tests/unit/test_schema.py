@@ -105,7 +105,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"supply": {"high": -1e5}}, "supply.high must be above supply.low (got -100000 Pa, low -50000 Pa)."),
     ({"simulation": {"physics_step": 1e-9}}, "simulation.physics_step must be at least a 1000th of simulati"),
     ({"simulation": {"duration": -1}}, "simulation.duration must be at least 0 s (got -1 s)."),
-    ({"trajectory": {"waypoints": [POINT]}}, "simulation.duration must be above 0 s where the trajectory ha"),
+    ({"trajectory": {"waypoints": [POINT]}}, "simulation.duration must be above 0 s where no finger has a"),
     ({"delay": {"dead_time": 100}}, "delay.dead_time must be at most 1000 control periods, 5 s (got 100 s)."),
     ({"trajectory": {"waypoints": []}}, "trajectory.waypoints must have at least one waypoint (got none)."),
     ({"trajectory": {"interpolation": "cubic"}}, "trajectory.interpolation must be one of smooth, linear (g"),

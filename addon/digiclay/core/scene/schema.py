@@ -180,7 +180,7 @@ class Scene:
         lasts = max((path.duration for path in self.trajectories()), default=0.0)
         if self.simulation.duration == 0.0:
             if lasts == 0.0:
-                rule = "must be above 0 s where the trajectory has no duration of its own"
+                rule = "must be above 0 s where no finger has a path with a duration"
                 raise ParameterError("simulation", "duration", rule, "0 s")
             object.__setattr__(self, "simulation", _set_duration(self.simulation, lasts))
         longest = MOST_STEPS * self.simulation.control_period
