@@ -94,13 +94,6 @@ def test_a_pin_on_its_end_stop_feels_the_indentation_beyond_where_force_begins(s
     assert run.force[-1, 0] == pytest.approx(wanted * math.expm1(m * 1.0e-3), rel=1e-9)
 
 
-def test_a_pin_leaves_its_end_stop_at_once():
-    turn = scripted(lambda t, x, y: 1.0 if t < 0.05 else -1.0)
-    system = one_cell(actuator=Actuator(rest_height=100e-3), valve_lag=None, dead_time=0.0, control=turn)
-    height = record(system, AWAY, 12).height[10:12, 0]
-    assert height == pytest.approx([100e-3, 100e-3 - 24e-3 * 5e-3], rel=1e-5)  # free speed to two digits
-
-
 def test_reservoirs_above_the_air_let_no_pin_fall_and_reservoirs_below_it_none_rise():
     above, below = (one_cell(supply=Supply(*ends)) for ends in ((0.8e5, 0.2e5), (-0.2e5, -0.8e5)))
     assert find_speeds(above.cell).fall == find_speeds(below.cell).rise == below.fastest == 0.0

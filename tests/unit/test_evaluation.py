@@ -17,8 +17,6 @@ from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, count_tr
 from digiclay.core.base.errors import OutputError
 from digiclay.core.batch.packing import extend_path
 from digiclay.core.engine.simulation import simulate_period
-from digiclay.core.model.fingertip import Fingertip, compute_reach
-from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.columns import begin, make_batch
 from digiclay.core.scene.scene_source import Setting, find
@@ -199,17 +197,6 @@ def test_errors_of_points_whose_contact_a_step_may_hide_are_doubted(step, errors
     assert (doubt != "", "or more" in done.summary(), doubt in done.summary()) == (
         step == "20 ms", step == "20 ms", True
     )  # fmt: skip
-
-
-def test_the_reach_of_many_fingers_is_that_of_each():
-    poses = np.zeros((3, 2, 7))
-    poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
-    windows = trace_finger(Fingertip(), poses).windows
-    alone = [compute_reach(window, 0.04) for window in windows]
-    together = np.array(compute_reach(np.array(windows).T, np.full(3, 0.04))).T
-    np.testing.assert_allclose(together[:2], alone[:2], rtol=1e-12)
-    # The last one is far above the bed.
-    assert (alone[2], together[2, 2] < 0.0) == (None, True)
 
 
 @pytest.mark.parametrize("errors", [False, True])

@@ -1,9 +1,7 @@
 """A session from scene to results, their folder; the recorder's rows, and the memory they need."""
 
-import json
 import os
 import tempfile
-import tomllib
 import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,7 +23,7 @@ from digiclay.core.session.memory_limit import (
     measure_available_memory,
     refuse_what_cannot_fit,
 )
-from digiclay.core.session.run_scene import Result, run, save
+from digiclay.core.session.run_scene import Result, run
 
 WAY = [{"time": t, "position": [0, 0, z]} for t, z in ((0, 0.041), (0.1, 0.038), (0.2, 0.041))]
 SMALL = {"radius": 6e-3, "edge_radius": 9e-3, "flat_radius": 3e-3}
@@ -99,13 +97,6 @@ def test_a_session_that_cannot_fit_in_memory_is_refused() -> None:
     endless = scene(layout={"rows": 4000, "columns": 5000}, simulation={"duration": 1e6})
     with pytest.raises(ParameterError, match="free memory"):
         run(endless)
-
-
-def test_a_saved_run_has_scene_metrics_and_history(result: Result, tmp_path: Path) -> None:
-    save(result, tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["history.npz", "metrics.json", "scene.toml"]
-    assert resolve(tomllib.loads((tmp_path / "scene.toml").read_text(encoding="utf-8"))) == result.scene
-    assert json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8")) == result.metrics
 
 
 def fill(folder: Path, word: str) -> None:
