@@ -12,7 +12,7 @@ from digiclay.device import view
 from digiclay.exchange import formed_bed
 from digiclay.live import tick
 from digiclay.recorded import bake
-from digiclay.roles import BALL, fingertip_of
+from digiclay.roles import BALL, ROLE, fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import properties
 
@@ -89,6 +89,19 @@ def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand):
     done("Move")
     undone()
     assert [bed.location.x for bed in beds() if fingertip_of(bed) is None] == [0.0]
+
+
+@pytest.mark.parametrize("everything", [False, True], ids=["the bed", "all that can be selected"])
+def test_a_bed_is_deleted_with_its_fingertip_and_undo_brings_both_back(everything):
+    bed = added()
+    delete(*(bpy.context.selectable_objects if everything else ()), bed)
+    assert len(bpy.data.objects) == len([one for one in bpy.data.objects if one.get(ROLE) == "pin"])
+    undone()
+    assert (whole(*beds()), len(beds())) == (True, 1)
+    redone()
+    assert len(bpy.context.scene.objects) == 0
+    undone()
+    assert whole(*beds())
 
 
 def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone():
