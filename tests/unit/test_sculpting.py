@@ -14,7 +14,7 @@ from digiclay.core.session.live_session import simulate_path
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 
-from tests.hand import SIZES, Hand, heights, pose, started
+from tests.hand import SCENE, SIZES, Hand, heights, pose, started
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
@@ -53,6 +53,19 @@ def test_gestures_kept_do_not_grow_in_number() -> None:
     for _ in range(sculpting.GESTURES + 3):
         session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
     assert len(session.gestures) == sculpting.GESTURES
+
+
+def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
+    hand = Hand()
+    session = hand.press(started())
+    kept = session.snapshot
+    back = sculpting.restore(hand.press(session, 6.0), kept, pose())
+    assert snapshot.dump(back.system, back.state) == kept
+    assert len(back.gestures) == 1
+    other, said = sculpting.begin_session(8, "Copy", SCENE, pose(), kept)
+    assert (said, snapshot.dump(other.system, other.state)) == ("", kept)
+    # Before the first start it finds a bed at rest.
+    assert (heights(sculpting.restore(session, None, pose())) == 40e-3).all()
 
 
 def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:
