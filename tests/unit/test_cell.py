@@ -290,6 +290,20 @@ def test_a_pulp_one_of_whose_filters_is_cut_in_two_is_the_same():
     assert cut == pytest.approx(whole, rel=1e-12)  # rounding
 
 
+@pytest.mark.parametrize("step", [1e-6, 1e-3, 5e-3, 50e-3])
+def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step):
+    own, first, last = np.array([0.3, 0.2, 0.1]), 2.0, 1.2
+
+    def lost_at(time: float) -> float:
+        now = first + (last - first) * time / step
+        return float(Relaxation().relaxed(filtered(own, first, now, time)))
+
+    weights, share = Relaxation().mean_loss_map(step)
+    foreseen = weights @ [*own, first] + share * 0.5 * (first + last)
+    # Rounding: what a filter gains in a step of 1 µs is a difference of numbers a million times larger.
+    assert foreseen == pytest.approx(quad(lost_at, 0.0, step, epsrel=1e-12)[0] / step, rel=1e-9)
+
+
 def test_what_relaxes_quicker_than_the_step_is_a_share_of_the_tension():
     # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at once.
     quick = Relaxation(times=(1e-9, 1e-9, 1e-9))

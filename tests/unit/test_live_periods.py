@@ -22,6 +22,7 @@ from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
     Clock,
     Recording,
+    clamp_pose,
     count_queue,
     find_spare,
     interpolate_path,
@@ -136,6 +137,12 @@ def test_the_way_begins_where_the_finger_was_and_ends_where_it_is():
     assert np.array_equal(path[0], start)
     np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
     np.testing.assert_allclose(np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16)
+
+
+def test_a_finger_stays_where_a_finger_can_be():
+    places = ([0.0, 0.0, -50.0], [1e9, -1e9, 1e9], [0.01] * 3)
+    found = [clamp_pose(np.array([*place, *LEVEL]), 0.1)[:3].tolist() for place in places]
+    assert found == [[0.0, 0.0, 0.0], [100.0, -100.0, 100.0], [0.01] * 3]
 
 
 def test_a_recording_keeps_each_surface_once_under_its_own_number_and_drops_what_undo_took_back():

@@ -50,6 +50,7 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
 
 def test_gestures_kept_do_not_grow_in_number() -> None:
     hand, session = Hand(), started()
+    assert sculpting.rewind(session) is session  # there is none yet
     for _ in range(sculpting.GESTURES + 3):
         session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
     assert len(session.gestures) == sculpting.GESTURES
