@@ -24,7 +24,7 @@ from ..ui_text import localize
 SUBSCRIBE, STATE, FINGERS = "/digiclay/subscribe", "/digiclay/state", "/digiclay/fingers"
 #: Period, number, time, total force, pose; identity, force and pose of a finger.
 VALUES, FINGER = struct.Struct(">qq9d"), struct.Struct(">q8d")
-#: Height of a fingertip whose identity is gone, m.
+#: Height of a fingertip whose identity, or server, is gone, m.
 LIFTED = 1.0
 #: Name of this machine; others are not looked up, since that would wait for a network.
 LOCAL = "localhost"
@@ -169,12 +169,14 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     heard = now if following.heard is None else following.heard
     if pose is not None:
         if following.silent:
-            # It may be another one, of a single fingertip.
-            fingers = {} if fingers is following.fingers else fingers
             words = localize("The server at {} is heard again", following.address)
         following = replace(following, pose=pose, fingers=fingers, heard=now, silent=False)
     elif not following.silent and (closed or now - heard >= SILENT):
-        following = replace(following, silent=True)
+        # Nobody presses on when the server is gone.
+        gone = (
+            None if following.pose is None else np.array([*following.pose[:2], LIFTED, *following.pose[3:]])
+        )
+        following = replace(following, pose=gone, fingers={}, silent=True)
         words = localize(ENDED if closed else UNHEARD, following.address)
     else:
         following = replace(following, heard=heard)

@@ -142,6 +142,7 @@ def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_oth
     address = followed_by_two(bed, server, clock)
     arrived(server, address, *named((1, 0.045), (2, 0.044)))
     clock.tick(200)
+    np.testing.assert_allclose(running.find(bed).poses[:, 2], follow.LIFTED, 0, 1e3 * FLOAT32)
     arrived(server, address, state(*PRESS))
     clock.tick(2)
     assert pose_of(bed) == list(PRESS)
@@ -169,14 +170,18 @@ def test_what_others_send_is_not_taken(bed: Any, clock: Clock, server: socket.so
     assert pose_of(bed) != list(PRESS)
 
 
-def test_a_silent_server_is_told_once_and_when_it_is_heard(
+def test_under_a_silent_server_the_fingertip_lifts_and_it_is_told_once_and_when_it_is_heard(
     bed: Any, clock: Clock, server: socket.socket
 ) -> None:
     address = followed(bed, server, clock)
+    arrived(server, address, state(*PRESS))
+    clock.tick(3)
     notes = clock.tick(200)
     assert ["No pose from" in note.message for note in notes] == [True]
+    assert pose_of(bed)[:3] == [*PRESS[:2], follow.LIFTED]
     arrived(server, address, state(*PRESS))
     assert ["heard again" in note.message for note in clock.tick(2)] == [True]
+    assert pose_of(bed) == list(PRESS)
 
 
 @pytest.mark.parametrize("deleted", [False, True])
