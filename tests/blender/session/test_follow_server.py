@@ -142,7 +142,8 @@ def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_oth
     address = followed_by_two(bed, server, clock)
     arrived(server, address, *named((1, 0.045), (2, 0.044)))
     clock.tick(200)
-    np.testing.assert_allclose(running.find(bed).poses[:, 2], follow.LIFTED, 0, 1e3 * FLOAT32)
+    # Read from Blender's floats and written again, 200 times.
+    np.testing.assert_allclose(running.find(bed).poses[:, 2], follow.LIFTED, 0, 1e-4)
     arrived(server, address, state(*PRESS))
     clock.tick(2)
     assert pose_of(bed) == list(PRESS)
