@@ -199,6 +199,7 @@ def test_a_mesh_stands_where_its_surface_is_or_beside_the_one_before_in_a_place_
         bpy.context.view_layer.objects.active = bed
         bpy.ops.mesh.digital_clay_make(kind="solid")
         made.append(bpy.context.object)
+        made[-1].name = "Bowl"  # its place stays taken
     away = np.array([(one.matrix_world.translation - bed.matrix_world.translation).length for one in made])
     np.testing.assert_allclose(away / away[0], [1, 3, 2], rtol=1e-5)
     assert away[0] > 14 * 3e-3 * bridge.SCALE

@@ -29,7 +29,7 @@ from .poll_messages import from_rest, no_surface
 MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
 #: Space between the bed and what is put beside it, in widths of the bed.
 GAP = 0.35
-#: Which place beside its bed a mesh has that was made here: what is made next has another one.
+#: Which place beside its bed a mesh has that was made here, 0: none; what is made next has another one.
 MADE = "digiclay_made"
 
 
@@ -126,8 +126,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         bed = chosen_bed(context)
         formed = formed_bed.read_formed(bed)
         bodies = make_bodies(formed, self.model(bed), self.finding())
-        others = [thing for thing in context.scene.objects if thing.name.startswith(f"{bed.name} ")]
-        taken = {int(thing.get(MADE, 0)) for thing in others}
+        taken = {int(thing.get(MADE, 0)) for thing in context.scene.objects}
         place = next(number for number in count(1) if number not in taken) if self.beside else 0
         step = (1.0 + GAP) * float(np.ptp(formed.position[:, 0])) * bridge.SCALE
         where = bed.matrix_world.copy()
