@@ -30,7 +30,8 @@ examples:
   digiclay hands --from tuio --to osc://127.0.0.1:8766
   digiclay hands --from hts --play hands.txt
 
-A Quest sends the lines of Hand Tracking Streamer to --port by UDP or TCP, a tablet TUIO 1.1 or 2.0 by UDP.
+A Quest sends the lines of Hand Tracking Streamer to --port by UDP or TCP, a tablet TUIO 1.1 or 2.0 by UDP;
+for a tablet serve without --clutch.
 """
 #: Ports by source, as the programs have them.
 PORTS = {"hts": 9000, "tuio": 3333}

@@ -164,3 +164,22 @@ def test_without_a_part_tracked_hands_are_no_fingers() -> None:
     assert not found["clutch"].shaping[:, 0].any()
     assert found["cutoff"].force.max() > 1.5 * shaped(stream).force.max()
     assert found["coupling"].force.max() > 2.0
+
+
+@pytest.mark.parametrize(
+    ("coupling", "depth", "soft"), [(100.0, 10e-3, True), (100.0, 2e-3, True), (0.0, 2e-3, False)]
+)
+def test_fingers_of_a_pad_that_have_their_whole_depth_at_once_need_the_coupling(
+    coupling: float, depth: float, soft: bool
+) -> None:
+    scene = load(find("ridge_mound_valley"))
+    session = begin_session(replace(scene, fingers=2 * scene.fingers), LIMITS, Tracking(coupling=coupling))
+    places, force = [(-18e-3, 1e-3, 40e-3 - depth), (21e-3, -3e-3, 40e-3 - depth)], 0.0
+    order, _ = Order().name(check_fingers([*enumerate(places)], None, 0), 2)
+    for _ in range(200):
+        session, targets, clear = aim(session, order, 1)
+        session = follow(session, targets, 0, 1, clear)
+        force = max(force, session.state.finger_forces().max())
+    # Fingers were measured up to 2 N; 0.6 N and 0.15 N with the coupling, 5 N without.
+    assert (force < 1.0) == soft
+    assert force > 0.1
