@@ -29,10 +29,8 @@ def fill_room(axes: Any, size: Floats, room: Room = ROOM) -> None:
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     low, high = np.reshape(room, (2, 2))
-    corners, zoom = (
-        np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())).reshape(3, 8),
-        1.0,
-    )
+    corners = np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())).reshape(3, 8)
+    zoom = 1.0
     for _ in range(2):  # it is as large as the room once its size is known
         axes.set_box_aspect(size, zoom=zoom)
         axes.apply_aspect()

@@ -21,6 +21,9 @@ class Mode(IntEnum):
     LOCKED = 8
 
 
+#: The same as plain numbers: numpy takes an enumeration's member ten times as long.
+REST, HOLD, EDGE, BLISTER, SPRING, FORCE_FOLLOW, CRITICAL, FROZEN, LOCKED = map(int, Mode)
+
 MEANINGS: dict[Mode, str] = {
     Mode.REST: "at rest, not formed yet",
     Mode.HOLD: "keeps the height it was left at",

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.arrays import Flags, Floats, Modes, any_true
 from ..base.errors import ParameterError
-from ..base.modes import Mode
+from ..base.modes import BLISTER, CRITICAL, EDGE, FORCE_FOLLOW, HOLD, SPRING, Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement, SetPoint
@@ -75,10 +75,6 @@ BY_PLACE = Arrows(
         Arrow((*VIRTUAL_SPRING, Mode.BLISTER, Mode.FROZEN), Mode.EDGE, "at_edge"),
         Arrow((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), Mode.HOLD, "outside"),
     )
-)
-#: Plain numbers: an enumeration's member takes ten times as long.
-HOLD, EDGE, BLISTER, SPRING, FORCE_FOLLOW, CRITICAL = map(
-    int, (Mode.HOLD, Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.CRITICAL)
 )
 
 

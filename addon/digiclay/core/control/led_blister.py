@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Floats, Modes
-from ..base.modes import Mode
+from ..base.modes import FORCE_FOLLOW
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
 from .blister import BlisterCells, BlisterRule
@@ -106,8 +106,6 @@ class Follower(NamedTuple):
 
 #: Surface from which the blister rises.
 GROUND = EdgeGround()
-#: Plain number: numpy takes an enumeration's member ten times as long.
-FORCE_FOLLOW = int(Mode.FORCE_FOLLOW)
 #: How much farther than the estimated place and the reach of the period before pins may be led, m.
 MARGIN = 2e-3
 

@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Flags, Floats
+from ..base.modes import FORCE_FOLLOW, SPRING
 from ..model.layout import Disc
 from .travel import Heading
 from .virtual_master import (
     CARRIED,
-    FORCE_FOLLOW,
     IDLE,
     NOWHERE,
     SHAPING,
-    SPRING,
     SPRINGING,
     Master,
     MasterCell,

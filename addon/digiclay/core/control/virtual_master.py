@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Constants, Floats, Modes, count_true
-from ..base.modes import Mode
+from ..base.modes import FORCE_FOLLOW, SPRING
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement, SetPoint
@@ -45,8 +45,6 @@ NOWHERE = 1e3
 #: Share of its radius that a blister in search of the fingertip may take along what is frozen: 1.5 of 15 mm.
 #: The paper's pins rise by 1.2 mm within the loss time, quick ones by 5 mm, which would be left as spikes.
 CARRIED = 0.1
-#: Plain numbers: numpy takes an enumeration's member ten times as long.
-SPRING, FORCE_FOLLOW = int(Mode.SPRING), int(Mode.FORCE_FOLLOW)
 
 
 class Phase(IntEnum):
