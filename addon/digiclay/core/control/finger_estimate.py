@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +85,13 @@ def _list_surfaces(profile: _Profile, place: Place, radius: Form) -> tuple[Form,
         (r * one - r, r * x, r * y, r * xx, r * xy, r * yy),
         (t * one + place.z - profile.lowest, t * x, t * y, t * xx, t * xy, t * yy),
     )
+
+
+@lru_cache(64)
+def _resize_surfaces(known: _Profile, place: Place) -> tuple[tuple[Form, Form], tuple[float, float]]:
+    """Return the surfaces of a known fingertip at a place, `least` and `root`; asked for twice a period."""
+    profile = known.resize(place.size)
+    return _list_surfaces(profile, place, _find_radius(profile, place)), (profile.least, profile.root)
 
 
 def _list_slopes(profile: _Profile, place: Place, radius: Form) -> tuple[Form, ...]:
@@ -230,10 +237,9 @@ class FingerFilter:
         """Return the undersides over cells, (m,), m, of fingertips like the estimated ones at places, m."""
         surfaces, numbers = [], []
         for aim, estimate in zip(aims, like, strict=True):
-            place = Place(*aim, *estimate.mean.tolist()[6:])
-            profile = self._profile.resize(place.size)
-            surfaces.append(_list_surfaces(profile, place, _find_radius(profile, place)))
-            numbers.append((profile.least, profile.root))
+            own, joint = _resize_surfaces(self._profile, Place(*aim, *estimate.mean.tolist()[6:]))
+            surfaces.append(own)
+            numbers.append(joint)
         inner, tangent = sections.multiply(surfaces, basis)
         return join_surfaces(inner, tangent, *sections.spread(numbers))
 

@@ -30,13 +30,23 @@ class Whole:
         """Return numbers, or tuples of r numbers, of the fingers such that arrays combine with them."""
         return numbers[0]
 
+    def repeat(self, values: Floats) -> Floats:
+        """Return values (..., f) of the fingers such that arrays (..., m) combine with them."""
+        return values
+
     def cut(self, values: Any) -> list[Any]:
         """Return the values of each finger."""
         return [values]
 
+    def reduce(self, ufunc: np.ufunc, values: Floats) -> Floats:
+        """Return what a ufunc makes of the values (..., m) of each finger, (..., f)."""
+        made: Floats = ufunc.reduce(values, -1, None, None, True)
+        return made
+
     def add(self, values: Floats) -> list[float]:
         """Return the sum of values (m,) of each finger."""
-        return [float(np.add.reduce(values))]
+        sums: list[float] = self.reduce(np.add, values).tolist()
+        return sums
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
         """Return the mean of values where a test holds, or where it holds nowhere what is instead."""
@@ -62,26 +72,33 @@ class Sections(Whole):
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self.sizes, self.edges = np.array(sizes), np.cumsum([0, *sizes])
+        self.starts = self.edges[:-1]
         self.parts = [slice(*ends) for ends in pairwise(self.edges.tolist())]
 
     def spread(self, numbers: Sequence[Any]) -> Any:
         """See `Whole`; rows of tuples."""
         if all(one is numbers[0] for one in numbers) and not isinstance(numbers[0], tuple):
             return numbers[0]
-        return np.array(numbers).T.repeat(self.sizes, axis=-1)
+        return self.repeat(np.array(numbers).T)
+
+    def repeat(self, values: Floats) -> Floats:
+        """See `Whole`."""
+        return values.repeat(self.sizes, -1)
 
     def cut(self, values: Any) -> list[Any]:
         """See `Whole`."""
         return [values[..., part] for part in self.parts]
 
-    def add(self, values: Floats) -> list[float]:
+    def reduce(self, ufunc: np.ufunc, values: Floats) -> Floats:
         """See `Whole`."""
-        return [float(np.add.reduce(own)) for own in self.cut(values)]
+        made: Floats = ufunc.reduceat(values, self.starts, -1)
+        return made
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
         """See `Whole`."""
-        fingers = zip(self.cut(values), self.cut(test), instead, strict=True)
-        return [WHOLE.average(own, where, [other])[0] for own, where, other in fingers]
+        sums = self.add(np.where(test, values, 0.0))
+        counts = np.add.reduceat(test, self.starts, dtype=np.intp).tolist()
+        return [own / n if n else other for own, n, other in zip(sums, counts, instead, strict=True)]
 
     def multiply(self, forms: Sequence[Any], basis: Floats, out: Floats | None = None) -> Floats:
         """See `Whole`."""

@@ -20,7 +20,7 @@ from ..base.arrays import TINY, Cells, Flags, Floats, any_true
 from ..model.control_interface import Commands, Measurement
 from ..model.fingertip import continue_ball
 from ..model.layout import Disc
-from .finger_sections import BEYOND, OUTSIDE, Columns, Sections, Whole
+from .finger_sections import BEYOND, OUTSIDE, WHOLE, Columns, Sections, Whole
 from .travel import measure_square
 
 #: How far from a finger a pressed pin may be its own, in its largest semi-axes: 12 mm of the default one.
@@ -121,9 +121,10 @@ class HandControl:
 
     def _remember(self, own: Floats, obeyed: Cells) -> None:
         """Keep of each pin's command, in rows (r, m), what the finger obeyed remembers, (m,), for all."""
-        count = int(self.runs[0].rows)
+        count, width = int(self.runs[0].rows), own.shape[1]
+        at = obeyed * (count * width) + np.arange(width)
         for row in getattr(self.runs[0], "pin_rows", ()):
-            own[row::count] = own[obeyed * count + row, np.arange(obeyed.size)]
+            own[row::count] = own.reshape(-1).take(at + row * width)
 
     def locate_each(
         self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
@@ -422,32 +423,27 @@ class HandInGroups(HandControl):
         `cells` (m,), those of each `finger` one after the other, with the `force` shown of each. What changes
         of the controllers' rows is kept as soon as the next fingers are asked for.
         """
-        counts, count = np.bincount(finger, minlength=len(self.runs)), int(self.runs[0].rows)
+        counts, count = np.bincount(finger, minlength=len(self.runs)).tolist(), int(self.runs[0].rows)
         groups: dict[Any, list[int]] = {}
         for i, (run, own) in enumerate(zip(self.runs, memory, strict=True)):
             alike = run.sort(own) if counts[i] and hasattr(run, "sort") else None
             groups.setdefault(i if alike is None else (run, alike), []).append(i)
-        parts = Sections(counts.tolist()).parts
-        columns = [cells[part] for part in parts]
-        rows_of = [seen.own[i * count : (i + 1) * count] for i in range(len(columns))]
-        for first, *more in groups.values():
-            group = [first, *more]
-            chosen: Any = parts[first]
-            if more:
-                chosen = slice(None) if len(group) == len(memory) else np.isin(finger, group)
-            at, sections = cells[chosen], Sections(counts[group].tolist())
+        kept, width = seen.own.reshape(-1), seen.own.shape[1]
+        rows = (count * finger + np.arange(count)[:, None]) * width + cells
+        for group in groups.values():
+            chosen: Any = slice(None) if len(group) == len(memory) else np.isin(finger, group).nonzero()[0]
+            at, own_rows = cells[chosen], rows[:, chosen]
             part = Measurement(
                 seen.quadratic_basis.take(at, 1),
                 seen.height[at],
                 force[chosen],
                 seen.target[at],
                 seen.mode[at],
-                np.concatenate([rows_of[i].take(columns[i], 1) for i in group], axis=1),
+                kept.take(own_rows),
                 seen.cells[at],
             )
-            yield group, chosen, part, sections
-            for i, own in zip(group, sections.cut(part.own), strict=True):
-                rows_of[i][:, columns[i]] = own
+            yield group, chosen, part, WHOLE if len(group) == 1 else Sections([counts[i] for i in group])
+            kept[own_rows] = part.own
 
 
 def find_lowest(under: Floats) -> Cells:

@@ -132,7 +132,7 @@ class PulpEstimate:
 
 
 #: Heights of the top that are tried, about a guess, as shares of what pins can reach, 0.5 mm on a level bed.
-SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])
+SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])[:, None]
 
 
 class Reach(NamedTuple):
@@ -176,25 +176,26 @@ def find_tops(
     Where none does, it is the end of the range nearest to it. `guesses`: where tops are sought most closely,
     m; `under` (m,), predicted undersides, m; `lost` (m,), from `PulpEstimate.predict_loss`, N.
     """
-    nearest = sections.spread([own.max() for own in sections.cut(reach.part)])
-    (level,) = (reach.part >= nearest).nonzero()
+    (level,) = (reach.part >= sections.repeat(sections.reduce(np.maximum, reach.part))).nonzero()
     lowest, highest = reach.ends.take(level, 1).tolist()
-    tried = []
+    ranges = []
     for guess, ends in zip(guesses, pairwise(sections.find_bounds(level)), strict=True):
         low, high = min(lowest[slice(*ends)]), max(highest[slice(*ends)])
-        tops = (high - low) * SHARES
-        tops += min(max(guess, low), high)
-        np.maximum(tops, low, out=tops)
-        tried.append(np.minimum(tops, high, out=tops))
-    spread = sections.spread(tried)
-    depths = reach.form_heights(spread if spread.ndim == 2 else spread[:, None])
+        ranges.append((low, high, min(max(guess, low), high)))
+    low, high, guess = sections.spread(ranges)
+    tops = (high - low) * SHARES
+    tops += guess
+    np.maximum(tops, low, out=tops)
+    np.minimum(tops, high, out=tops)
+    depths = reach.form_heights(tops)
     least, most = reach.ends
     np.maximum(depths, least, out=depths)
     np.minimum(depths, most, out=depths)
     depths -= under
+    forces = sections.reduce(np.add, pulp.predict_force(depths, lost))
+    tried = sections.reduce(np.maximum, tops)  # those of each finger, all of whose cells have the same
     found = []
-    for force, tops, own in zip(wanted, tried, sections.cut(pulp.predict_force(depths, lost)), strict=True):
-        forces = np.add.reduce(own, axis=1)
-        weakest, *_, strongest = forces.tolist()
-        found.append((float(np.interp(force, forces, tops)), min(max(force, weakest), strongest)))
+    for force, own, heights in zip(wanted, forces.T, tried.T, strict=True):
+        weakest, *_, strongest = own.tolist()
+        found.append((float(np.interp(force, own, heights)), min(max(force, weakest), strongest)))
     return found

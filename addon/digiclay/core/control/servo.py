@@ -101,5 +101,10 @@ def take_cells(values: NDArray[Any], cells: Cells) -> NDArray[Any]:
 
 def sum_weighted(rows: Floats, weights: Floats | Flags) -> Floats:
     """Return the sums ([k][, b]) over cells of rows ([k,] m[, b]) times weights, or where a test holds."""
-    sums: Floats = rows.dot(weights) if weights.ndim == 1 else np.einsum("...mb,mb->...b", rows, weights)
+    if weights.ndim == 1:
+        sums: Floats = rows.dot(weights)
+    elif rows.shape[-1] == 1:  # the same rows for all runs
+        sums = rows[..., 0].dot(weights)
+    else:
+        sums = np.einsum("...mb,mb->...b", rows, weights)
     return sums

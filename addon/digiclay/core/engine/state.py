@@ -134,7 +134,7 @@ class ActiveSet:
             block[rows.force],
             block[rows.target],
             self.mode[:count],
-            block[rows.controlled],
+            (self.block if rows.fingers else block)[rows.controlled],
             self.cells[:count],
             block[rows.command],
             block[rows.sensed],

@@ -25,7 +25,8 @@ class Measurement(NamedTuple):
     mode: NDArray[np.int8]
     """(m,)."""
     own: Floats
-    """(rows, m): What the controller remembers of each cell; brought up to date in place."""
+    """(rows, m): What the controller remembers of each cell; brought up to date in place. Of several fingers
+    all active cells', of which the m are the first."""
     cells: NDArray[np.intp]
     """(m,): Their numbers in the bed."""
     command: Floats = NONE

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.arrays import Cells, Flags, Floats
 from .fingertip import Fingertip, Window, compute_underside
 from .interfaces import Pulp
-from .touch import Ahead, Touch, trace_finger
+from .touch import Ahead, Touch, trace_periods
 
 #: Most fingers of a scene.
 MOST_FINGERS = 32
@@ -127,10 +127,8 @@ def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
     forms = np.empty((fingers, periods, 2 * instants, 6))
     join, windows = np.empty((fingers, periods, 2, instants, 1)), np.empty((fingers, periods, 6))
     for tip, own in touch.shapes:  # those of one shape at once: as periods after each other
-        traced = trace_finger(tip, poses[:, :, own].transpose(2, 0, 1, 3).reshape(-1, instants, 7))
-        for rows, made in zip(
-            (forms, join, windows), (traced.forms, traced.join, traced.windows), strict=True
-        ):
-            rows[own] = np.reshape(made, (len(own), *rows.shape[1:]))
+        traced = trace_periods(tip, poses[:, :, own].transpose(2, 0, 1, 3).reshape(-1, instants, 7))
+        for rows, made in zip((forms, join, windows), traced, strict=True):
+            rows[own] = made.reshape(len(own), *rows.shape[1:])
     path = HandPath(forms, join, np.ascontiguousarray(windows.transpose(1, 2, 0)))
     return [HandPeriod(path, number, window) for number, window in enumerate(path.windows)]

@@ -105,8 +105,8 @@ def _loaded_share(gap: Floats, slip: Floats, growth: Floats) -> Floats:
     # Leaving: u grows from exp(-e(0)) to 1/pulp; the linear equation tells when.
     shrunk = np.expm1(np.minimum(gap, 0.0)) / slip
     leaving = np.log1p(np.maximum(growth * shrunk, _ALL_BUT_GONE)) / growth
-    share: Floats = np.clip(np.where(gap >= 0.0, 1.0 - gap / slip, leaving), 0.0, 1.0)
-    return share
+    share: Floats = np.where(gap >= 0.0, 1.0 - gap / slip, leaving)
+    return np.minimum(np.maximum(share, 0.0), 1.0)
 
 
 def replace_zeros(values: Floats) -> Floats:
