@@ -1,7 +1,8 @@
 """Process of the doors: ``python -m digiclay_serve.door_process``, started by `doors`.
 
 A process of its own: whatever clients do costs its time and its memory, not those of the session. Its
-standard input has a line of settings, then a byte a frame; it ends when that input ends.
+standard input has a line of settings, then an empty one a frame; it ends when that input ends. Its output has
+a line of addresses, an empty one an order, and a line of counts.
 """
 
 from __future__ import annotations
@@ -88,7 +89,11 @@ async def _serve(settings: dict[str, Any]) -> None:
                 reason = getattr(error, "strerror", None) or error
                 raise OutputError(f"Port {settings[key]} of {host} cannot be opened: {reason}.") from None
         _tell(ports)
+        os.set_blocking(1, False)
+        orders.bell = 1
         await ended.wait()
+        orders.bell = None
+        os.set_blocking(1, True)
         _tell({"counts": dict(link.counts)})  # before clients that take their time to close
         with suppress(asyncio.TimeoutError):
             await asyncio.wait_for(doors.aclose(), 3.0)

@@ -39,12 +39,17 @@ class LatestSlot:
 
     def __init__(self, memory: mmap.mmap) -> None:
         self._memory = memory
+        #: Pipe that is told of each value by a line, and does not block; None: there is none.
+        self.bell: int | None = None
         # One aligned machine word: it is written and read as a whole.
         self._head = np.frombuffer(memory, np.uint64, 2)
         self._seen = 0
 
     def write(self, value: bytes) -> None:
-        """Put a value in the place of the last one. Raises ValueError when it has another size."""
+        """Put a value in the place of the last one. Raises ValueError when it has another size.
+
+        Raises BrokenPipeError when nobody listens to the bell any more.
+        """
         size = len(self._memory) - HEAD
         if len(value) != size:
             raise ValueError(f"a value must have {size} bytes (got {len(value)})")
@@ -53,6 +58,9 @@ class LatestSlot:
         self._memory[HEAD:] = value
         self._head[1] = zlib.crc32(value)
         self._head[0] = number + 2
+        if self.bell is not None:
+            with suppress(BlockingIOError):  # it rings for earlier ones: the newest will be read
+                os.write(self.bell, b"\n")
 
     def read(self) -> bytes | None:
         """Return the newest value; None when there is none that was not read already."""
@@ -168,7 +176,7 @@ class Doors(AbstractContextManager["Doors"]):
         path = os.pathsep.join(filter(None, [*sorted(folders), os.environ.get("PYTHONPATH", "")]))
         self._process = subprocess.Popen(
             [sys.executable, "-m", f"{__package__}.door_process"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path},
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, env={**os.environ, "PYTHONPATH": path},
             start_new_session=True,  # Ctrl-C on a terminal is for the session
         )  # fmt: skip
         assert self._process.stdin is not None
@@ -180,8 +188,14 @@ class Doors(AbstractContextManager["Doors"]):
             self._end(HEEDING)
             raise OutputError(answer.get("error", "The process of the doors has ended: see above."))
         self.port, self.osc_port = int(answer["port"]), int(answer["osc_port"])
-        self._wake = self._process.stdin.fileno()
-        os.set_blocking(self._wake, False)
+        self._frames.bell = self._process.stdin.fileno()
+        os.set_blocking(self._frames.bell, False)
+
+    def wait(self, time: float) -> None:
+        """Wait for an order, for a time at most, s."""
+        assert self._process.stdout is not None
+        if select.select([self._process.stdout], [], [], time)[0]:
+            os.read(self._process.stdout.fileno(), 65536)
 
     def read_order(self) -> Order:
         """Return the newest order."""
@@ -192,11 +206,8 @@ class Doors(AbstractContextManager["Doors"]):
 
     def show(self, frame: bytes) -> None:
         """Show a packed frame to the clients. Raises OutputError when the process of the doors has ended."""
-        self._frames.write(frame)
         try:
-            os.write(self._wake, b".")
-        except BlockingIOError:  # it has been told of earlier ones, and will look at the newest
-            pass
+            self._frames.write(frame)
         except OSError:
             raise OutputError("The process of the doors has ended.") from None
 
@@ -216,8 +227,10 @@ class Doors(AbstractContextManager["Doors"]):
         """Read a line of JSON; an empty answer when there is none in time, s."""
         stdout = self._process.stdout
         assert stdout is not None
-        line = stdout.readline() if select.select([stdout], [], [], patience)[0] else b""
-        return dict(json.loads(line)) if line else {}
+        line = b"\n"
+        while line == b"\n" and select.select([stdout], [], [], patience)[0]:  # bells before it
+            line = stdout.readline()
+        return dict(json.loads(line)) if line.strip() else {}
 
     def _end(self, patience: float) -> None:
         """Have the process end, by itself within a time, s, or by signals."""

@@ -93,8 +93,8 @@ class TimeCounts:
 CATCH_UP = 0.05
 #: Width of a bin of the histograms, s.
 BIN = 1e-5
-#: Longest time without a look at whether there is a new pose, or to stop, s.
-LOOK = 5e-4
+#: Longest time without a look at whether to stop, s.
+LOOK = 2e-2
 #: Time after which another thread of this process gets the interpreter, s; by default it is five periods.
 SWITCH = 2e-4
 
@@ -131,7 +131,7 @@ def run_session(
         # What is new is not left to wait: its period begins early, by one at most.
         wait = schedule.begins - began - (period if order is not taken else 0.0)
         if wait > 0.0:
-            time.sleep(min(wait, LOOK))
+            doors.wait(min(wait, LOOK))
             continue
         taken, before = order, time.thread_time()
         count, begins = schedule.take_due(max(began, schedule.begins))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, sleep
 from typing import Any, cast
 
 import numpy as np
@@ -69,6 +69,10 @@ class Asked:
         if self.restless:
             self.order = self.order._replace(number=self.order.number + 1)
         return self.order
+
+    def wait(self, time: float) -> None:
+        """Wait for an order: the restless have one at once."""
+        sleep(0.0 if self.restless else time)
 
     def show(self, frame: bytes) -> None:
         """Keep a frame."""

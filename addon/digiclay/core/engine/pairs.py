@@ -112,7 +112,7 @@ class HandSelection(Selection):
 
 def count_inside(active: ActiveSet, windows: Floats) -> int:
     """Return in how many of t periods, the first, all windows (t, 6, f) stay within the reach of a set."""
-    reach = compute_reach(np.moveaxis(windows, 1, 0), active.peak)
+    reach = compute_reach(windows.swapaxes(0, 1), active.peak)
     assert active.reach is not None
     assert reach is not None
     (x, y, radius), (at_x, at_y, limit) = reach, active.reach

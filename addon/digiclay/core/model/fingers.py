@@ -96,7 +96,7 @@ class HandPath:
     def _compute(self, several: slice, places: Places) -> Floats:
         """Return the undersides in several periods, (t, p, k), m."""
         own = self.forms[places.fingers, several], self.join[places.fingers, several]
-        under = np.moveaxis(compute_underside(*own, places.basis[:, None]), 0, 2)
+        under = compute_underside(*own, places.basis[:, None]).transpose(1, 2, 0, 3)
         return under.reshape(*under.shape[:2], -1).take(places.at, axis=2)
 
 

@@ -113,7 +113,7 @@ def trace_periods(fingertip: Fingertip, poses: Floats) -> tuple[Floats, Floats, 
     count, instants, _ = poses.shape
     outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
     # Instant by instant: numpy's own reduction over so short an axis takes ten times as long.
-    places, (bases, tilts, bends) = np.moveaxis(outline[:, :, :2], 1, 0), compute_reaches(outline).T
+    places, (bases, tilts, bends) = outline[:, :, :2].swapaxes(0, 1), compute_reaches(outline).T
     low, high = reduce(np.minimum, places), reduce(np.maximum, places)
     windows = np.empty((count, 6))
     windows[:, :2] = 0.5 * (low + high)
