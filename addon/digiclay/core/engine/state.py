@@ -184,8 +184,8 @@ class ActiveSet:
 
     @cached_property
     def numbers(self) -> Floats:
-        """All numbers of the block in a row."""
-        return self.block.reshape(-1)
+        """Numbers of the physics, commands, targets and forces, in a row."""
+        return self.block[: self.rows.force + 1].reshape(-1)
 
 
 class State(NamedTuple):
