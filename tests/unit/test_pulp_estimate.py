@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from digiclay.core.control.blister import Blister, BlisterRule
+from digiclay.core.control.finger_sections import Sections
 from digiclay.core.control.led_blister import Follower, LeadProfile, LedBlister
 from digiclay.core.control.pulp_estimate import PulpEstimate, Reach, find_tops
 from digiclay.core.control.virtual_master import Phase
@@ -100,6 +101,26 @@ def test_the_forces_at_the_top_add_up_to_what_is_wanted(wanted, guess, low, high
     assert top is None or height == top
     assert force is None or PULP.predict_force(height - UNDER, np.zeros(9)).sum() == force
     assert force is None or total == pytest.approx(wanted)
+
+
+def test_several_fingertips_have_the_tops_that_each_has_alone():
+    random, sizes = np.random.default_rng(4), [9, 1, 30]
+    sections, cells = Sections(sizes), sum(sizes)
+    part, under = random.uniform(0.3, 1.0, cells), random.uniform(38e-3, 40e-3, cells)
+    drop, lost = random.uniform(0.0, 5e-3, cells), random.uniform(0.0, 0.02, cells)
+    ends = np.sort(random.uniform(39e-3, 43e-3, (2, cells)), axis=0)
+    wanted, guesses, edges, raised = (
+        [0.4, 0.05, 0.8],
+        [40e-3, 41e-3, 42e-3],
+        [39e-3, 40e-3, 43e-3],
+        [True, True, False],
+    )
+    many = Reach(sections.spread(edges), sections.spread(raised), part, drop, ends)
+    found = find_tops(wanted, guesses, many, under, lost, PULP, sections)
+    for i, own in enumerate(sections.parts):
+        alone = Reach(edges[i], raised[i], part[own], drop[own], ends[:, own])
+        (expected,) = find_tops([wanted[i]], [guesses[i]], alone, under[own], lost[own], PULP)
+        assert found[i] == pytest.approx(expected, rel=1e-12)  # sums in another order
 
 
 @pytest.mark.parametrize(
