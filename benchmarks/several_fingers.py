@@ -1,7 +1,5 @@
 """Benchmark ``fingers``: what several fingertips cost, and how near two of them may come to each other."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import statistics

@@ -1,7 +1,5 @@
 """Link of the doors to the session: newest frame, orders, lease of the fingertip, counts."""
 
-from __future__ import annotations
-
 import asyncio
 from collections import Counter
 from typing import Any

@@ -5,8 +5,6 @@ standard input has a line of settings, then an empty one a frame; it ends when t
 a line of addresses, an empty one an order, and a line of counts.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import logging

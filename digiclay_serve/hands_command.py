@@ -1,7 +1,5 @@
 """``digiclay hands``: fingers of tracked hands or of a touch pad, to a server of a session."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import json

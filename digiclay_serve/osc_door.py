@@ -1,7 +1,5 @@
 """OSC door: messages, requests and frames as datagrams, for a bounded number of subscribers."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections.abc import AsyncIterator

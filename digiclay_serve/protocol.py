@@ -3,8 +3,6 @@
 A request is a pose of the fingertip, poses of several, or a reset. A frame is the state after a period.
 """
 
-from __future__ import annotations
-
 import hmac
 import json
 import math

@@ -1,7 +1,5 @@
 """Session at a fixed rate: orders of the clients in, frames out, parts of a take to the disk."""
 
-from __future__ import annotations
-
 import gc
 import math
 import sys

@@ -1,7 +1,5 @@
 """``digiclay serve``: a session for other programs, in real time."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

@@ -4,8 +4,6 @@ A tracked pose goes through a clutch, a filter and a virtual coupling; each is a
 a row a finger. No clock, no bed: `served_session` has both.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Beds put together part by part for tests: every part at its default unless a test names another."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

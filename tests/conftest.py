@@ -1,7 +1,5 @@
 """What every test shares: one random source, no user settings, no window unless one is named."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Callable

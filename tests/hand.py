@@ -1,7 +1,5 @@
 """A finger moved by hand, tick by tick, over a running session."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Heights of the live skin by numpy, to compare with those of Blender's geometry nodes."""
 
-from __future__ import annotations
-
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.device.skin_lattice import SkinLattice

@@ -1,7 +1,5 @@
 """Other processes, for tests of what they do and leave behind."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Control methods of one's own as files, for the tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A copy of the package that a test may change: a new part is written into it and run."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The volume under a skin, reckoned without the solid that it is compared with."""
 
-from __future__ import annotations
-
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.surface.formed import find_base_level, make_skin

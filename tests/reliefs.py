@@ -1,7 +1,5 @@
 """Beds with a relief of pins that stand still, and strokes that smooth it, for tests."""
 
-from __future__ import annotations
-
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode

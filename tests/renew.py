@@ -5,8 +5,6 @@ heights and forces of states and takes, histories and metrics of runs. The files
 are. Commit the differences with their reason, and add it to `samples/README.md`.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Scene files for tests of the command line: a few pins, a tenth of a second or so."""
 
-from __future__ import annotations
-
 import csv
 import os
 import signal

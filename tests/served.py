@@ -1,7 +1,5 @@
 """A server of a small bed in a process of its own, for tests of its doors."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

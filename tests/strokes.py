@@ -1,7 +1,5 @@
 """Press strokes of every brush in sessions without Blender, and the shape that they leave."""
 
-from __future__ import annotations
-
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL

@@ -1,7 +1,5 @@
 """How long tests wait for other processes: so much longer than any takes that only what hangs is given up."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

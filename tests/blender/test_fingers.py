@@ -1,7 +1,5 @@
 """Further fingertips of a bed, and hands: added, moved, copied, deleted, undone, appended as the first is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Two fingertips near each other, beside each of them alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

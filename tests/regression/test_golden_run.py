@@ -8,8 +8,6 @@ exponent moved by a part in 1e15, which is what rounding does, moves these force
 ``python -m tests.renew`` writes new numbers.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Files of older versions: scenes, kept states and takes are what they were; see tests/samples."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

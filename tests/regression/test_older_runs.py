@@ -4,8 +4,6 @@ How they were made is in tests/samples/README.md. Runs are compared with the tol
 its reason: other processors and other versions of numpy take sums in another order.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import tomllib

@@ -1,7 +1,5 @@
 """Folders of sweeps and batches that an older version made are shown, and gone on with."""
 
-from __future__ import annotations
-
 import csv
 import shutil
 from pathlib import Path

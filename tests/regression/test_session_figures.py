@@ -4,8 +4,6 @@ Ranges, not digits: they hold what the paper says of Method I, so that a change 
 erases the ridge, loses the finger or shakes it does not pass unnoticed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode

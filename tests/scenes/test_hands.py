@@ -1,7 +1,5 @@
 """Several fingertips on one bed: as alone where they are apart, by the sum of forces where they meet."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

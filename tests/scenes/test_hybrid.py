@@ -1,7 +1,5 @@
 """Method III holds the force where the others lose it: fast drags, wrong models, noise, turned fingers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

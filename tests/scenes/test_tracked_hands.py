@@ -1,7 +1,5 @@
 """Two tracked hands shape a bed: off, late and trembling as optical tracking is, and worse."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache

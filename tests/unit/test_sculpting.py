@@ -1,7 +1,5 @@
 """A running session follows the finger, goes back, and is recorded; undo shortens the recording."""
 
-from __future__ import annotations
-
 import tracemalloc
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Fingers with identities: requests; lines of a Quest and of touch pads."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The server without a process: options, deadlines, session, take, token, lease."""
 
-from __future__ import annotations
-
 import socket
 from dataclasses import replace
 from pathlib import Path

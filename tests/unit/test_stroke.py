@@ -1,7 +1,5 @@
 """Strokes of the Press tool: path, orientation and motion of the fingertip, the queue; the hand's input."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Symmetric press strokes in a session: all images at once, in the time of one, and nothing is lost."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache, partial

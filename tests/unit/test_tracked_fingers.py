@@ -1,7 +1,5 @@
 """From tracked fingers to fingertips: whose is which, clutch, filter, coupling."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Method I: locate, control, model, direction and loss of its master; its blister, freezing, the rim."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Draws symmetric strokes on a turned and shifted bed, one after the other without a pause, by X events."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

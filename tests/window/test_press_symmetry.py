@@ -1,7 +1,5 @@
 """Symmetric strokes form at the same time, drawn without a pause on a turned bed in a real window."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

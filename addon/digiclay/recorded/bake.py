@@ -1,7 +1,5 @@
 """Bake of a session into the bed: ordinary animation, played and rendered without the simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ A file has the bed's name and a table a stroke: what the header of the tool was 
 places of the pointer. What is formed follows from the places; the times say how quick the hand was.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

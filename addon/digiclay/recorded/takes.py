@@ -1,7 +1,5 @@
 """Takes of a bed in the .blend: properties that copies, appends and undo include."""
 
-from __future__ import annotations
-
 from collections import deque
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Live sessions as values, and the table of those of this Blender; no Blender in here."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

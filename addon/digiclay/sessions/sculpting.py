@@ -1,7 +1,5 @@
 """Start, advance and return of a live session, and its queue of press strokes; no Blender."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Every test of a session has the extension enabled, a small bed to ask for, and time of its own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A small bed, a clock, and a finger: what the tests of live sessions in Blender share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

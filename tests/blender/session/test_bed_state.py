@@ -1,7 +1,5 @@
 """Undo, redo, files and copies carry the state of a session."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

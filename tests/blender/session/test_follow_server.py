@@ -1,7 +1,5 @@
 """A live session follows a server of poses: a socket that speaks its OSC, and `digiclay serve` itself."""
 
-from __future__ import annotations
-
 import importlib.util
 import signal
 import socket

@@ -1,7 +1,5 @@
 """A live session follows the fingertip, by whatever means it is moved."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy

@@ -1,7 +1,5 @@
 """The operators of a session, when they decline, and what is selected and modal meanwhile."""
 
-from __future__ import annotations
-
 from functools import partial
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """A button that cannot be pressed says why: Blender shows it where the mouse rests on it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy

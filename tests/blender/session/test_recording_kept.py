@@ -1,7 +1,5 @@
 """A recording under way outlives what ends or interrupts its session."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A live session makes a scene of its bed's settings when they have changed, in the very next tick."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Sessions with several fingertips, which come and go meanwhile: the session goes on with the others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What is edited, deleted or switched in mid-session has it wait or end, with a message."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy

@@ -4,8 +4,6 @@ A place is in pixels of the screen, with the pressure, 0 to 1, and the tilt to t
 -1 to 1.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -1,7 +1,5 @@
 """X server with a pen, for a Blender that reads pressure and tilt from it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

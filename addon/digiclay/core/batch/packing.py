@@ -1,7 +1,5 @@
 """Batch: which scenes go together, the paths of their fingertips, and the runs that go on."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass, replace

@@ -1,7 +1,5 @@
 """Sessions of many scenes in one call: played in step, recorded, evaluated."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

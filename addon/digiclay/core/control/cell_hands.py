@@ -5,8 +5,6 @@ in its blister or frozen only the pins whose last command was its own; a pressed
 whose underside is nearest, for no pin is pressed deep; and of two commands that of the nearer one is obeyed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -5,8 +5,6 @@ around it, those of them that feel the fingertip follow the force in turn, and s
 set spreads and moves with the fingertip.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

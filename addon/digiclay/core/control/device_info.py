@@ -6,8 +6,6 @@ n readings would need five times √n, more than a fingertip at the rim of its c
 that is controlled is the sum of the readings as they are, which has no bias.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

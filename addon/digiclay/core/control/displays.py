@@ -3,8 +3,6 @@
 After a display of heights a control method takes over (`Handover`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ opening comes in like 1/t. Here the opening follows from the wanted speed instea
 of a pin without load, and heights come in exponentially.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Exchange between neighboring cells: diffusion over a bed, which keeps the sum of what is exchanged."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

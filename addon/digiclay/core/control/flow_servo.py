@@ -5,8 +5,6 @@ aimed at, the delay δ of the valve, and earlier commands with speeds w_j that s
 a free pin then decays with poles at 0 and about 0.3.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -3,8 +3,6 @@
 What a scene, a panel or a comparison has to know of a method it finds here, by `find_method`.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass

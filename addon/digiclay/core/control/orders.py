@@ -21,8 +21,6 @@ A radius of 0 is no order, but for PLACE: the method is on its own. Driven pins 
 they have arrived.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ solved for the tension T, which is taken as linear in time over a control period
 there is no iteration.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise

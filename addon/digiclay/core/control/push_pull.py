@@ -5,8 +5,6 @@ listen: their valves open a little to the high and to the low reservoir in turn.
 cycle where it began; a loaded one rises less than it falls, drifts off, and so gives the hand away.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
