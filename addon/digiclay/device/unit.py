@@ -4,7 +4,7 @@ Blender copies, deletes and hides the objects that are selected, not those that 
 here finds what is missing or left over then and puts it right; the second, a timer, decides when.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -295,13 +295,9 @@ def _duplicate(thing: Any, parent: Any, owner: Any) -> Any:
     return made
 
 
-def _remove(found: Iterable[Any]) -> None:
+def _remove(found: list[Any]) -> None:
     """Remove parts; what is still held by another stands nowhere from then on, and can be had back."""
-    tips = list(found)
-    things = tips + [
-        child for tip in tips for child in tip.children if child.get(OWNED) and child not in tips
-    ]
-    for part in things:
+    for part in found:
         for child in [one for one in part.children if ROLE not in one]:
             # What the user has hung on a part stays where it is.
             where = child.matrix_world.copy()
@@ -309,12 +305,8 @@ def _remove(found: Iterable[Any]) -> None:
             child.matrix_world = where
         for collection in part.users_collection:
             collection.objects.unlink(part)
-    for part in sorted(things, key=lambda each: each.get(ROLE) == ELLIPSOID):  # a property of the others
-        if not part.users:
-            bpy.data.objects.remove(part)
-    # Deleted along with its bed, a fingertip was still held by that, and Blender has kept it.
-    while gone := [one for one in bpy.data.objects if one.get(OWNED) and not one.users]:
-        bpy.data.batch_remove(gone)
+    # Also what Blender has kept of things deleted before, since those still held it.
+    bpy.data.batch_remove([one for one in bpy.data.objects if one.get(OWNED) and not one.users])
 
 
 def _unlink(thing: Any) -> None:
