@@ -12,7 +12,6 @@ import sys
 import tarfile
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.model.trajectory import sample_poses
 from digiclay.core.scene.scene_source import find, load
 
-from .report import Report, Row, Steps, tabulate
+from .report import Report, Steps, tabulate
 
 ROOT = Path(__file__).parents[1]
 #: The paper's session.
@@ -148,7 +147,15 @@ def measure_serve(arguments: argparse.Namespace, steps: Steps) -> Report:
     rows = [{"what": name, **{f"{s}_s": figures[name][s] for s in SHARES}} for name in LINES]
     often = "after every frame" if fingers == 1 else f"{CAMERA:g} times a second"
     title = f"\ndigiclay serve {SCENE} --rate {rate} --fingers {fingers}: 625 pins, a pose {often}; ms\n"
-    return Report([title, *_list_deadlines(figures, rows, frames)], rows)
+    named = [{**row, "what": LINES[row["what"]]} for row in rows]
+    periods, missed = figures["periods"], figures["missed"]
+    lines = [
+        title,
+        *tabulate(named, {"": "what", **{share: f"{share}_s .2f 1e3" for share in SHARES}}),
+        f"\n{periods} periods; past their deadline: {missed} ({100.0 * missed / periods:.2f} %),",
+        f"of them left out: {figures['left_out']}; the client received {frames} frames",
+    ]
+    return Report(lines, rows)
 
 
 def _serve(seconds: float, rate: int, fingers: int) -> tuple[dict[str, Any], int]:
@@ -218,12 +225,3 @@ def _move(port: int, token: str, rate: int, fingers: int) -> tuple[list[float], 
                         answered = number
                     due = 0.0 if fingers == 1 else due
     return answers, frames
-
-
-def _list_deadlines(figures: Row, rows: Sequence[Row], frames: int) -> Iterator[str]:
-    """Give the lines of the report."""
-    named = [{**row, "what": LINES[row["what"]]} for row in rows]
-    yield from tabulate(named, {"": "what", **{share: f"{share}_s .2f 1e3" for share in SHARES}})
-    periods, missed = figures["periods"], figures["missed"]
-    yield f"\n{periods} periods; past their deadline: {missed} ({100.0 * missed / periods:.2f} %),"
-    yield f"of them left out: {figures['left_out']}; the client received {frames} frames"

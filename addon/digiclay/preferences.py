@@ -18,11 +18,6 @@ SHOWN = (
 )  # fmt: skip
 
 
-def take_palette(preferences: Any, context: Any) -> None:
-    """Recolor the beds of the open file."""
-    palettes.set_palette(preferences.palette)
-
-
 def redraw_views(preferences: Any, context: Any) -> None:
     """Draw the 3D views anew."""
     for window in context.window_manager.windows:
@@ -65,7 +60,7 @@ class Preferences(bpy.types.AddonPreferences):
     palette: choice(
         "Mode Colors", "Colors of the modes; a choice recolors the beds of the open file",
         items=[(name, *words) for name, words in palettes.WORDS.items()], default=palettes.DEFAULT,
-        update=take_palette,
+        update=lambda preferences, context: palettes.set_palette(preferences.palette),
     )  # fmt: skip
     take_press_tool: flag(
         "Take the Press Tool", "The start of a session takes the Press tool in hand", default=True

@@ -93,7 +93,9 @@ class JobProcess(Process):
 )  # fmt: skip
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
-    refuse_alone(arguments)
+    for name in ("program", "chunk"):
+        if getattr(arguments, name) is not None and arguments.submit is None:
+            raise OutputError(f"--{name} must be given with --submit only.")
     methods = [load_by_option(word, "--method") for word in arguments.method]
     made = read_jobs(find_jobs_file(arguments.file), list(dict.fromkeys(methods)))
     sound = next((job.scene for job in made.jobs if job.scene is not None), None)
@@ -177,17 +179,14 @@ def _start_job(folder: Folder, job: Job) -> JobProcess:
     return JobProcess(arguments, folder.find_log(job))
 
 
-def refuse_alone(arguments: argparse.Namespace) -> None:
-    """Refuse the options of a submission without one."""
-    for name in ("program", "chunk"):
-        if getattr(arguments, name) is not None and arguments.submit is None:
-            raise OutputError(f"--{name} must be given with --submit only.")
-
-
 def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int | None) -> list[str]:
     """Write the files of a farm, or none in case of an error; return the lines to print."""
     tasks = plan_series(folder.batch, chunk or CHUNK)
-    made = Submission(make_safe_name(folder.batch.name), find_full(folder.path), tasks, find_start(program))
+    # Without "..", through the links by which the user named it where that is right.
+    series = os.path.abspath(folder.path)
+    if not os.path.exists(series) or not os.path.samefile(series, folder.path):
+        series = os.path.realpath(folder.path)
+    made = Submission(make_safe_name(folder.batch.name), series, tasks, find_start(program))
     files, lines = FORMATS[form](made)
     for word in (made.series, *made.program):
         try:
@@ -204,12 +203,6 @@ def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int 
         write_whole(path, text.encode())
     count = len(split_frames(tasks))
     return [f"{count} tasks written to {', '.join(str(folder.path / name) for name in files)}", *lines]
-
-
-def find_full(path: Path) -> str:
-    """Return a full path without ``..``, through the links by which the user named it where that is right."""
-    full = os.path.abspath(path)
-    return full if os.path.exists(full) and os.path.samefile(full, path) else os.path.realpath(path)
 
 
 def find_start(program: str | None) -> list[str]:

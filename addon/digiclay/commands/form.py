@@ -16,7 +16,7 @@ from ..core.scene.assembly import assemble
 from ..core.scene.forming import GESTURES, make_forming_scene
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
-from ..core.session.run_scene import History, Result
+from ..core.session.run_scene import Result
 from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
 from .arguments import QUIET, add_scene, command, formats, say, scene_of
 from .run import plan_meshes, simulate, write_run
@@ -74,7 +74,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
         result = simulate(arguments, scene, path, stop)
-        row = find_displayed(result.history)
+        touching = np.flatnonzero(result.history["total_force"] > 0.0)
+        row = max(int(touching[0]) - 1, 0) if touching.size else len(result.history["time"]) - 1
         result, lines = _evaluate(result, row, laid)
         meshes = [
             plan_meshes(scene, result.history, arguments.export),
@@ -95,12 +96,6 @@ def _laid(scene: Scene) -> tuple[Scene, Fitted]:
     shape = replace(scene.shape, heights=pack(laid.heights))
     name = Path(scene.shape.file).stem
     return replace(scene, shape=shape, name=name, description=f"{name}, displayed and then formed."), laid
-
-
-def find_displayed(history: History) -> int:
-    """Return the last row before the fingertip touches."""
-    touching = np.flatnonzero(history["total_force"] > 0.0)
-    return max(int(touching[0]) - 1, 0) if touching.size else len(history["time"]) - 1
 
 
 def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]]:

@@ -100,7 +100,10 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
         *_neighbors(point, 0),
         point[low].ravel()[of],
         point[np.minimum(low + 1, rows - 1)].ravel()[of],
-        {name: _drop(pair, sunk) for name, pair in _weigh(spread, cap / spacing).items()},
+        {
+            name: Weights(*(np.where(sunk[:, None], 0.0, part) for part in pair))
+            for name, pair in _weigh(spread, cap / spacing).items()
+        },
     )
     place = np.stack(np.meshgrid(fine_x, fine_y), axis=-1).reshape(-1, 2)[of]
     faces = _join(surface, edge.size)
@@ -144,11 +147,6 @@ def _weigh(share: Floats, cap: float) -> dict[str, Weights]:
         "smooth": smooth,
         "membrane": Weights(np.column_stack([1.0 - line, none]), np.column_stack([line, none])),
     }
-
-
-def _drop(weights: Weights, which: NDArray[np.bool_]) -> Weights:
-    """Return weights that are 0 at some points."""
-    return Weights(*(np.where(which[:, None], 0.0, part) for part in weights))
 
 
 def _join(surface: Indices, edge: int) -> Indices:

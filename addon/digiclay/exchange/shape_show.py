@@ -81,7 +81,10 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     count = min(compute_display_time(display), LONGEST) / system.period
     (state,) = deque(periods(system, fingers, begin(system), max(1, round(count))), maxlen=1)
     off = float(np.abs(state.row(0) - display.heights).max())
-    poses = _lift_fingers(bed, scene, state.row(0))
+    poses, grid = bridge.poses(bed), make_grid(scene.layout)
+    for pose, finger in zip(poses, find_ellipsoids(scene), strict=True):  # above the shape where it is higher
+        touch = find_touch_height(grid, state.row(0), finger, float(pose[0]), float(pose[1]))
+        pose[2] = max(pose[2], touch + CLEARANCE)
     # All that can fail is done: from here on the bed changes.
     properties.write_scene(bed, scene)
     began, problem = sculpting.begin_session(
@@ -94,12 +97,3 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     view.show_state(bed, system, began.state)
     bridge.place_fingertips(bed, poses, find_ellipsoids(scene))
     return laid, off
-
-
-def _lift_fingers(bed: Any, scene: Scene, heights: Any) -> Any:
-    """Return the poses (f, 7) of the bed's fingertips, raised to above the shape where it is higher."""
-    poses, grid = bridge.poses(bed), make_grid(scene.layout)
-    for pose, finger in zip(poses, find_ellipsoids(scene), strict=True):
-        touch = find_touch_height(grid, heights, finger, float(pose[0]), float(pose[1]))
-        pose[2] = max(pose[2], touch + CLEARANCE)
-    return poses

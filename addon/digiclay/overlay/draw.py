@@ -10,7 +10,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..core.base.arrays import Floats
-from .picture import Box, Color, Dot, Line, Picture, Words
+from .picture import Color, Dot, Line, Picture, Words
 
 #: Corners of a dot.
 CORNERS = 20
@@ -24,7 +24,9 @@ def draw(picture: Picture, width: float, height: float) -> None:
     gpu.state.blend_set("ALPHA")
     try:
         for box in picture.boxes:
-            _fill(_corners(box), [(0, 1, 2), (0, 2, 3)], box.color, box.alpha)
+            right, top = box.x + box.width, box.y + box.height
+            corners = np.array([[box.x, box.y], [right, box.y], [right, top], [box.x, top]])
+            _fill(corners, [(0, 1, 2), (0, 2, 3)], box.color, box.alpha)
         for line in picture.lines:
             _stroke(line, (width, height))
         for dot in picture.dots:
@@ -52,12 +54,6 @@ def _stroke(line: Line, size: tuple[float, float]) -> None:
     shader.uniform_float("lineWidth", line.width)
     shader.uniform_float("color", (*line.color, 1.0))
     batch.draw(shader)
-
-
-def _corners(box: Box) -> Floats:
-    """Return the corners of a box, (4, 2)."""
-    right, top = box.x + box.width, box.y + box.height
-    return np.array([[box.x, box.y], [right, box.y], [right, top], [box.x, top]])
 
 
 def _dashes(line: Line) -> Floats:

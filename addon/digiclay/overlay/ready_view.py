@@ -62,9 +62,8 @@ def frame(context: Any, bed: Any) -> None:
     context.view_layer.update()
     axes, parallel = np.array(looking.view_rotation.to_matrix()), looking.view_perspective == "ORTHO"
     lens = np.diag(np.array(looking.window_matrix))[:2]
-    corners = _list_corners(
-        [(view.housing_of(bed), bed), (bed, bed), *_list_balls(fingertips_of(bed).values())]
-    )
+    balls = [(tip[BALL], tip[BALL]) for tip in fingertips_of(bed).values() if tip.get(BALL)]
+    corners = _list_corners([(view.housing_of(bed), bed), (bed, bed), *balls])
     if parallel:
         lens = lens * looking.view_distance
     free, taken = 2.0 * _find_room(context, bed, area, region, SIDEBAR) / size - 1.0
@@ -92,7 +91,7 @@ def reveal(context: Any, bed: Any, things: Iterable[Any]) -> None:
         return
     context.view_layer.update()
     (free, taken), region = _find_room(context, bed, *shown), shown[1]
-    points = np.concatenate([_list_points(thing) for thing in things])
+    points = np.concatenate([_place(_list_points(thing), thing) for thing in things])
     clip = np.column_stack([points, np.ones(len(points))]) @ np.array(region.data.perspective_matrix).T
     places = 0.5 * (clip[:, :2] / clip[:, 3:] + 1.0) * [region.width, region.height]
     seen = (clip[:, 3] > 0.0) & ((places >= free[0]) & (places <= free[1])).all(axis=1)
@@ -143,24 +142,19 @@ def place_eye(points: Floats, lens: Floats, room: Floats, parallel: bool, farthe
     return np.array([*np.clip(middle, least - high * z / lens, most - low * z / lens), z])
 
 
-def _list_balls(tips: Iterable[Any]) -> list[tuple[Any, Any]]:
-    """Return the ellipsoids of fingertips, each as the shape and as the object that places it."""
-    return [(tip[BALL], tip[BALL]) for tip in tips if tip.get(BALL)]
-
-
 def _list_corners(things: list[tuple[Any, Any]]) -> Floats:
     """Return the corners (k, 3) of the boxes about shapes of placed objects, world."""
     boxes = []
     for shape, placed in things:
-        points = np.array([vertex.co for vertex in shape.data.vertices])
+        points = _list_points(shape)
         corners = np.stack(np.meshgrid(*zip(points.min(axis=0), points.max(axis=0), strict=True)), axis=-1)
         boxes.append(_place(corners.reshape(-1, 3), placed))
     return np.concatenate(boxes)
 
 
 def _list_points(thing: Any) -> Floats:
-    """Return the points (k, 3) of an object's mesh, world."""
-    return _place(np.array([vertex.co for vertex in thing.data.vertices]), thing)
+    """Return the points (k, 3) of an object's mesh."""
+    return np.array([vertex.co for vertex in thing.data.vertices])
 
 
 def _place(points: Floats, placed: Any) -> Floats:

@@ -77,10 +77,6 @@ def _arrows(bed: Any, on: bool) -> None:
     _write_forces(bed)
 
 
-def _follow_overlay(display: Any, context: Any) -> None:
-    views.follow()
-
-
 def _show_details(display: Any, context: Any) -> None:
     """Show the bed beside the overlay, which is larger now."""
     views.follow()
@@ -126,7 +122,7 @@ class Display(bpy.types.PropertyGroup):
     )  # fmt: skip
     overlay: flag(
         "Overlay", "While a session runs, show force and state in a corner of the 3D view", default=True,
-        update=_follow_overlay,
+        update=lambda display, context: views.follow(),
     )  # fmt: skip
     overlay_full: flag(
         "Overlay Details",

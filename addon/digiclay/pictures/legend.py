@@ -224,9 +224,11 @@ def draw_force_plot(
     thick = max(0.010 * full, 0.5 * front.pixel)
     several, columns = force.ndim > 1, force.reshape(len(force), -1)
     paper, ink = (DARK, PAPER) if several else (PAPER, INK)
-    moments, highest = reduce_columns(time, columns)
+    # Columns, each with its largest force.
+    starts = np.unique(np.linspace(0, len(time), min(len(time), MOST), endpoint=False).astype(np.intp))
     lasts = max(float(time[-1] - time[0]), 1e-9)
-    place, high = (moments - time[0]) * ((right - left) / lasts), highest.T * (rise / top)
+    place = (time[starts] - time[0]) * ((right - left) / lasts)
+    high = np.maximum.reduceat(columns, starts, axis=0).T * (rise / top)
     low = np.zeros_like(high)
     if several:  # a line that is steep reaches to the columns beside it
         beside = np.clip(np.arange(len(place)) + np.array([[-1], [0], [1]]), 0, len(place) - 1)
@@ -252,13 +254,6 @@ def draw_force_plot(
     moment = front.write("time", size, right, above, FADED, "RIGHT")
     start, rate = float(time[0]), (right - left) / lasts
     return ForcePlot(called, been, cursor, label, moment, place, low, high, start, rate)
-
-
-def reduce_columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:
-    """Return times and forces (t[, f]) of at most so many columns, each with its largest force."""
-    count = len(time)
-    starts = np.unique(np.linspace(0, count, min(count, most), endpoint=False).astype(np.intp))
-    return time[starts], np.maximum.reduceat(force, starts, axis=0)
 
 
 def _area(place: Floats, low: Floats, high: Floats) -> Floats:

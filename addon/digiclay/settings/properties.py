@@ -97,7 +97,8 @@ def table_of(bed: Any) -> dict[str, Any]:
     settings = bed.digiclay
     method = method_of(settings)
     formed = find_method(method).blister is not None  # refuses one that is not known here
-    table: dict[str, Any] = {"name": _printable(bed.name), "preset": settings.preset}
+    name = "".join(letter if letter.isprintable() else " " for letter in bed.name)
+    table: dict[str, Any] = {"name": name, "preset": settings.preset}
     each = devices.list_settings(bed)
     fingers: list[dict[str, Any]] = [{} for _ in each]
     for section in SECTIONS:
@@ -186,11 +187,6 @@ def _path(value: Any) -> Any:
     """Return a value; a path that starts at the .blend's folder is one for the core as well."""
     relative = isinstance(value, str) and value.startswith("//")
     return bpy.path.abspath(value) if relative else value
-
-
-def _printable(name: str) -> str:
-    """Return an object's name as a scene may have it."""
-    return "".join(letter if letter.isprintable() else " " for letter in name)
 
 
 def find_layout_mismatch(bed: Any, layout: Layout) -> str:

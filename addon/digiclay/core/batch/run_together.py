@@ -16,7 +16,6 @@ from ..engine.state import ActiveSet, State
 from ..engine.system import System
 from ..metrics.summary import CellSums, compute_metrics_from_sums, sum_row
 from ..model.fingertip import require_one
-from ..model.layout import Grid
 from ..model.touch import FingerPath, FingerPeriod
 from ..model.trajectory import Trajectory
 from ..scene.assembly import assemble
@@ -158,12 +157,6 @@ class Histories:
         return self._history.finish(period, recording.every)
 
 
-def find_nearest_cells(grid: Grid, tip: Floats) -> NDArray[np.intp]:
-    """Return the cells that are the nearest to a fingertip of poses (t, 7) at some time, ascending."""
-    places = np.unique(tip[:, :2], axis=0)
-    return np.unique([np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places])
-
-
 class Sums:
     """Sums what the metrics of runs need over their cells, row by row; parameters as of `Histories`."""
 
@@ -206,7 +199,9 @@ class Sums:
         if same not in self._ways:
             moments = np.minimum(np.arange(count) * self._every, period) * time
             tip = play.ways[run].poses(moments)
-            self._ways[same] = moments, tip, find_nearest_cells(grid, tip)
+            places = np.unique(tip[:, :2], axis=0)
+            near = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
+            self._ways[same] = moments, tip, np.unique(near)
         moments, tip, cells = self._ways[same]
         metrics = compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells)
         return report(scene, now.ended(index), metrics)

@@ -93,9 +93,10 @@ class Fingertip(Parameters):
         lowest = inverse[:, :, 2] / np.sqrt(inverse[:, 2, 2])[:, None]
         tilt = form[:, :2, 2] / form[:, 2, 2][:, None]
         schur = form[:, :2, :2] - tilt[:, :, None] * form[:, 2, None, :2]
-        half = form[:, 2, 2] ** -0.5
-        parts = lowest, schur[:, 0], schur[:, 1, 1], tilt, half, _smaller_eigenvalue(schur)
-        return np.column_stack(parts)
+        a, b, c = schur[:, 0, 0], schur[:, 0, 1], schur[:, 1, 1]
+        larger = 0.5 * (a + c) + np.hypot(0.5 * (a - c), b)
+        smaller = (a * c - b * b) / larger  # eigenvalue
+        return np.column_stack([lowest, schur[:, 0], c, tilt, form[:, 2, 2] ** -0.5, smaller])
 
 
 @lru_cache(64)
@@ -173,14 +174,6 @@ def join_surfaces(inner: Floats, tangent: Floats, least: Any, root: Any) -> Floa
     inner *= inner
     inner += tangent
     return inner
-
-
-def _smaller_eigenvalue(matrices: Floats) -> Floats:
-    """Return the smaller eigenvalue of symmetric matrices (k, 2, 2)."""
-    a, b, c = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
-    larger = 0.5 * (a + c) + np.hypot(0.5 * (a - c), b)
-    smaller: Floats = (a * c - b * b) / larger
-    return smaller
 
 
 def make_matrices(quaternions: Floats) -> Floats:

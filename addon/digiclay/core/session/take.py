@@ -164,10 +164,13 @@ def to_scene(take: Take, name: str) -> Scene:
 
 
 def _make_path(times: Floats, poses: Floats) -> Path:
-    """Return a fingertip's poses (t, 7) at times (t,), s, as the path of a scene."""
+    """Return a fingertip's poses (t, 7) at evenly spaced times (t,), s, as the path of a scene."""
+    needed = np.ones(len(poses), bool)
+    bend = np.abs(poses[2:] - 2.0 * poses[1:-1] + poses[:-2]).max(axis=1)
+    needed[1:-1] = bend > STRAIGHT  # else a straight line passes through it
     waypoints = (
         Waypoint(float(times[row]), tuple(poses[row, :3].tolist()), tuple(poses[row, 3:].tolist()))
-        for row in np.flatnonzero(_find_turns(poses))
+        for row in np.flatnonzero(needed)
     )
     return Path("linear", tuple(waypoints))
 
@@ -180,14 +183,6 @@ def _is_at_rest(system: System, start: bytes) -> bool:
         and np.array_equal(state.mode(), rest.mode())
         and snapshot.dump(system, rest._replace(memory=state.memory)) == snapshot.dump(system, rest)
     )
-
-
-def _find_turns(poses: Floats) -> NDArray[np.bool_]:
-    """Return the poses that are needed to draw the path with straight lines, evenly spaced in time."""
-    needed = np.ones(len(poses), bool)
-    bend = np.abs(poses[2:] - 2.0 * poses[1:-1] + poses[:-2]).max(axis=1)
-    needed[1:-1] = bend > STRAIGHT
-    return needed
 
 
 def to_bytes(take: Take) -> bytes:

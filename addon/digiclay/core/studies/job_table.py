@@ -144,7 +144,8 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
         _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
         _refuse_twice("methods", methods, methods)
         parts = list(itertools.product(files, methods, changes.items()))
-        names = make_unique_names([_name_job(file, method, label) for file, method, (label, _) in parts])
+        named = [(find_name(file, SCENE), method, label) for file, method, (label, _) in parts]
+        names = make_unique_names(["-".join(filter(None, of_job)) for of_job in named])
         jobs = tuple(_make_job(name, *part) for name, part in zip(names, parts, strict=True))
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
@@ -218,11 +219,6 @@ def _find_scene(jobs: Path, word: str) -> Path:
     """Return the file of a scene: beside the JOBS file, or as anywhere else."""
     beside = jobs.parent / word
     return find(str(beside)) if os.path.exists(beside) else find(word)
-
-
-def _name_job(file: Path, method: str, label: str) -> str:
-    """Return what a job is called by its parts."""
-    return "-".join(part for part in (find_name(file, SCENE), method, label) if part)
 
 
 def _make_job(name: str, file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
