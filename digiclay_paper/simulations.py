@@ -9,31 +9,14 @@ import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.metrics.summary import (
-    compute_deviation,
-    compute_rfd,
-    compute_weights,
-    measure_amplitude,
-    measure_frequency,
-    measure_settling_time,
-    measure_surface_under,
-    sum_cells,
-)
+from digiclay.core.metrics import summary
 from digiclay.core.model.control_interface import find_set_point
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result, run, select_rows
-from digiclay.core.studies.speed_limits import (
-    Drag,
-    Follows,
-    Lift,
-    find_free_speed,
-    find_largest_speed,
-    find_unintended_losses,
-    track,
-)
+from digiclay.core.studies import speed_limits
 
 from . import scenes
 from .results import (
@@ -63,17 +46,17 @@ WINDOWS = {
 
 def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:
     """Return RFD, N, and deviations of force, N, and height, m, while shaping, by the names of `WINDOWS`."""
-    time, sums = done.history["time"], sum_cells(done.history)
-    weight, wanted = compute_weights(time), find_set_point(done.scene.set_point, sums.following)
+    time, sums = done.history["time"], summary.sum_cells(done.history)
+    weight, wanted = summary.compute_weights(time), find_set_point(done.scene.set_point, sums.following)
     above = np.full(len(time), np.nan)
-    above[sums.touching] = measure_surface_under(sums, done.history["fingertip"])
+    above[sums.touching] = summary.measure_surface_under(sums, done.history["fingertip"])
     windows = {}
     for name, spans in WINDOWS.items():
         rows = sums.shaping & np.any([(time >= start) & (time <= end) for start, end in spans], axis=0)
         windows[name] = {
-            "rfd": compute_rfd(time, sums.total, wanted, rows),
-            "force_deviation": compute_deviation(sums.total[rows], weight[rows]),
-            "height_deviation": compute_deviation(above[rows], weight[rows]),
+            "rfd": summary.compute_rfd(time, sums.total, wanted, rows),
+            "force_deviation": summary.compute_deviation(sums.total[rows], weight[rows]),
+            "height_deviation": summary.compute_deviation(above[rows], weight[rows]),
         }
     return windows
 
@@ -107,9 +90,9 @@ def vary(results: Results, extent: Extent, announce: Announce) -> None:
                 results.located.append(located(noise, radius, thresholds=thresholds))
 
 
-def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Result]:
+def dragged(scene: Scene, way: speed_limits.Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Result]:
     """Run a drag with a scene's device and method, and return what it came to, and the whole of it."""
-    follows, done = track(scene, way, speed)
+    follows, done = speed_limits.track(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
     part = select_rows(done.history, start, end)
     total, following = part["total_force"], np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)
@@ -174,7 +157,7 @@ def simulate(extent: Extent, announce: Announce) -> Results:
         announce(f"oscillation, a quicker device, K_f {gain:g} 1/N")
         swing, done, _ = _swing(gain, extent.position_gains[0], QUICKER)
         results.quicker.append(swing)
-        results.quicker_speed = find_free_speed(done.scene)
+        results.quicker_speed = speed_limits.find_free_speed(done.scene)
     for gain in extent.cell_gains:
         announce(f"oscillation, Method II, K_FF {gain:g} 1/N")
         results.cell_swings.append(_swing(gain, extent.position_gains[0], None, METHODS[1])[0])
@@ -231,21 +214,21 @@ def _track(results: Results, method: str, extent: Extent, announce: Announce) ->
     results.tracks[method] = []
     for speed in extent.speeds:
         announce(f"drag at {speed * 1e3:g} mm/s, {method}")
-        results.tracks[method].append(track(scene, Drag(height=TALL), speed)[0])
+        results.tracks[method].append(speed_limits.track(scene, speed_limits.Drag(height=TALL), speed)[0])
 
-    def tried(one: Follows) -> None:
+    def tried(one: speed_limits.Follows) -> None:
         announce(f"fastest drag, {name}, {one.speed * 1e3:.1f} mm/s, {method}")
         if name == RIDGE:
             results.tracks[method].append(one)
 
     for name, way in WAYS.items():
-        results.fastest[method, name] = find_largest_speed(
+        results.fastest[method, name] = speed_limits.find_largest_speed(
             scene, way, results.criterion,
             low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, report=tried,
         )  # fmt: skip
     results.tracks[method].sort(key=lambda one: one.speed)
-    results.lifting[method] = find_largest_speed(
-        scene, Lift(), results.criterion,
+    results.lifting[method] = speed_limits.find_largest_speed(
+        scene, speed_limits.Lift(), results.criterion,
         low=extent.lifts[0], high=extent.lifts[1], resolution=extent.resolution,
         report=lambda one: announce(f"lift at {one.speed * 1e3:.1f} mm/s, {method}"),
     )  # fmt: skip
@@ -289,7 +272,7 @@ def _boiled_down(done: Result) -> Session:
     followers = float(follow[follow > 0].mean()) if np.any(follow) else 0.0
     early = done.history["time"] <= DETAIL
     detail = {name: done.history[name][early] for name in ("time", "height")}
-    lost, windows = find_unintended_losses(done), measure_windows(done)
+    lost, windows = speed_limits.find_unintended_losses(done), measure_windows(done)
     return Session(done.scene, kept, detail, done.figures, lost, followers, windows)
 
 
@@ -302,9 +285,9 @@ def _swing(
     end = float(done.history["time"][-1])
     late, after = select_rows(done.history, end - WATCHED, end), select_rows(done.history, quick, end)
     wanted = find_set_point(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
-    settled = measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
+    settled = summary.measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
     swing = Swing(
-        gain, position_gain, measure_amplitude(late["total_force"]),
-        measure_frequency(late["time"], late["total_force"]), settled,
+        gain, position_gain, summary.measure_amplitude(late["total_force"]),
+        summary.measure_frequency(late["time"], late["total_force"]), settled,
     )  # fmt: skip
     return swing._replace(settling=None) if swing.sustained else swing, done, quick

@@ -26,16 +26,7 @@ from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_unde
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session import snapshot
-from digiclay.core.session.live_session import (
-    LiveSession,
-    Moment,
-    clamp_pose,
-    follow_path,
-    go_back,
-    interpolate_path,
-    start_recording,
-)
+from digiclay.core.session import live_session, snapshot
 from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 
@@ -63,11 +54,11 @@ AROUND = 0.015
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Session(LiveSession):
+class Session(live_session.LiveSession):
     """Session of a server at one instant."""
 
     #: Moment to which it goes back when it diverges.
-    kept: Moment
+    kept: live_session.Moment
     #: Of the last pose taken up.
     number: int = 0
     #: How often it went back.
@@ -94,11 +85,11 @@ def _begin_at_rest(scene: Scene, system: System, limits: Limits, tracking: Track
     """Return the session of a bed at rest; a fingertip in the place of another one is not there."""
     state = begin(system)
     first = sample_poses(scene.trajectories(), np.zeros(1))[0]
-    poses = clamp_pose(first, system.cell.actuator.stroke)
+    poses = live_session.clamp_pose(first, system.cell.actuator.stroke)
     for row in range(1, len(poses)):
         if (poses[:row] == poses[row]).all(1).any():
             poses[row, 2] = PARKED
-    kept = Moment(0, snapshot.dump(system, state), poses)
+    kept = live_session.Moment(0, snapshot.dump(system, state), poses)
     return Session(
         scene=scene, system=system, state=state, poses=poses, kept=kept, limits=limits, tracking=tracking,
         tracks=begin_tracks(poses), relaxed=np.zeros((len(poses), _read_pulp(scene)[1].size)),
@@ -170,17 +161,17 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
     system = session.system
     if session.refused is not None and np.array_equal(targets, session.refused):
         targets = session.poses
-    goals = clamp_pose(targets, system.cell.actuator.stroke)
+    goals = live_session.clamp_pose(targets, system.cell.actuator.stroke)
     way = session.limits.speed * system.period * count
     start = session.poses
     ends = np.array([
         _limit_way(*each, way, clear) for each in zip(start.tolist(), goals.tolist(), strict=True)
     ])  # fmt: skip
-    path = np.array([start, ends]) if count == 1 else interpolate_path(start, ends, count)
+    path = np.array([start, ends]) if count == 1 else live_session.interpolate_path(start, ends, count)
     try:
-        after = follow_path(session, path)
+        after = live_session.follow_path(session, path)
     except DivergenceError:
-        back = go_back(session, session.kept)
+        back = live_session.go_back(session, session.kept)
         tracks = begin_tracks(back.poses)
         return replace(back, diverged=session.diverged + 1, refused=targets, tracks=tracks)
     after = replace(after, poses=ends, number=number, behind=not np.array_equal(ends, goals))
@@ -189,9 +180,11 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
     return replace(after, kept=_keep(after))
 
 
-def _keep(session: Session) -> Moment:
+def _keep(session: Session) -> live_session.Moment:
     """Return the present moment of a session."""
-    return Moment(session.state.period, snapshot.dump(session.system, session.state), session.poses)
+    return live_session.Moment(
+        session.state.period, snapshot.dump(session.system, session.state), session.poses
+    )
 
 
 def _limit_way(start: list[float], goal: list[float], most: float, clear: float) -> list[float]:
@@ -220,7 +213,7 @@ def reset(session: Session) -> Session:
 def record(session: Session, room: int) -> Session:
     """Begin to record. `room`: control periods for which there is room at once."""
     now = _keep(session)
-    return replace(start_recording(session, now.snapshot, room=room), kept=now)
+    return replace(live_session.start_recording(session, now.snapshot, room=room), kept=now)
 
 
 def make_frame(session: Session) -> Frame:

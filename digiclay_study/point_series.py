@@ -19,17 +19,7 @@ from digiclay.core.files.run_folder import write_whole
 from digiclay.core.metrics.metric_table import ERRORS
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
-from digiclay.core.studies.axes import (
-    MOST,
-    Point,
-    Record,
-    find_numbers,
-    find_quantity,
-    find_value,
-    place_points,
-    read_varied,
-    refuse_twice,
-)
+from digiclay.core.studies import axes
 from digiclay.core.studies.evaluation import read_metrics
 from digiclay.core.studies.sweep_plan import Folder, format_table, hash_points, open_points
 
@@ -86,7 +76,7 @@ class Range:
 
 def read_range(text: str) -> Range:
     """Read a range, ``control.force_gain=0.5:8:log``; ParameterError in one line: key, rule, value."""
-    varied = read_varied(text, "LOW", "HIGH")
+    varied = axes.read_varied(text, "LOW", "HIGH")
     low, high = map(float, varied.ends) if not varied.words else (0.0, 1.0)
     rule = "must have LOW below HIGH" if low >= high else ""
     if len(varied.words) == 1:
@@ -99,19 +89,19 @@ def read_range(text: str) -> Range:
 def fit_ranges(ranges: Sequence[Range], path: Path, settings: Sequence[Setting]) -> list[Range]:
     """Return ranges as the scene's parameters have them: whole numbers, and units."""
     scene = load(path, settings)
-    refuse_twice([varied.key for varied in ranges], settings)
+    axes.refuse_twice([varied.key for varied in ranges], settings)
     return [_fit(varied, scene, path, settings) for varied in ranges]
 
 
 def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -> Range:
     """Return a range as the scene's parameter has it."""
-    declared = find_quantity(scene, varied.key)
+    declared = axes.find_quantity(scene, varied.key)
     if declared is None or varied.words:  # an unknown key, or a word: the scene file's own rules tell
         for word in varied.words or (varied.find_word(0.0),):
             load(path, [*settings, Setting(varied.key, word, "--vary")])
         return varied
     factor, measured = UNITS.get(varied.unit, (0.0, "")) if varied.unit else (1.0, declared.unit)
-    numbers = find_numbers(scene, varied.key)
+    numbers = axes.find_numbers(scene, varied.key)
     whole = any(isinstance(value, int) for value in numbers)
     for end in (varied.low, varied.high):
         rule = declared.broken_rule(end * factor)
@@ -153,14 +143,14 @@ class Subject:
         return tuple(varied.key for varied in self.ranges)
 
     @property
-    def unchanged(self) -> Point:
+    def unchanged(self) -> axes.Point:
         """The unchanged scene."""
-        return Point(UNCHANGED, (), self.scene)
+        return axes.Point(UNCHANGED, (), self.scene)
 
-    def make_points(self, shares: Floats, first: int, progress: Any = None) -> list[Point]:
+    def make_points(self, shares: Floats, first: int, progress: Any = None) -> list[axes.Point]:
         """Return the points at shares (points, parameters) of the ranges. `first`: index of the first."""
         rows = [tuple(map(Range.find_word, self.ranges, row)) for row in shares]
-        return place_points(self.path, self.settings, self.keys, rows, first=first, progress=progress)
+        return axes.place_points(self.path, self.settings, self.keys, rows, first=first, progress=progress)
 
     def open_folder(self, path: Path, name: str, plan: Mapping[str, Any]) -> AbstractContextManager[Folder]:
         """Open the folder of a study or a tuning, see `open_points`. `plan`: what else points depend on."""
@@ -180,7 +170,7 @@ class Subject:
 
         return open_points(path, name, description, describe)
 
-    def evaluate_unchanged(self, evaluation: Evaluation, *, quiet: bool) -> Record | None:
+    def evaluate_unchanged(self, evaluation: Evaluation, *, quiet: bool) -> axes.Record | None:
         """Return the record of the unchanged scene, None after a stop; print how long others take."""
         evaluation.finish([(self.unchanged,)], ())
         records = evaluation.collect()
@@ -196,13 +186,13 @@ class Subject:
         return record
 
     def write_table(
-        self, path: Path, points: Sequence[Point], records: Mapping[int, Record], *extra: str
+        self, path: Path, points: Sequence[axes.Point], records: Mapping[int, axes.Record], *extra: str
     ) -> None:
         """Write a table of points, in SI units; the unchanged scene has its own values.
 
         `extra`: metrics beside those of the subject.
         """
-        own = tuple(find_value(self.scene, key, "") for key in self.keys)
+        own = tuple(axes.find_value(self.scene, key, "") for key in self.keys)
         rows = [
             (point.index, *(tuple(map(Range.convert, self.ranges, point.words)) or own)) for point in points
         ]
@@ -231,5 +221,5 @@ def read_subject(arguments: argparse.Namespace) -> Subject:
 
 def refuse_too_many(option: str, points: int) -> None:
     """Refuse a plan of more points than a sweep may have. `option`: the one that sets their number."""
-    if points > MOST:
-        raise ParameterError(option, "", f"must come to {MOST} points at most", f"{points} points")
+    if points > axes.MOST:
+        raise ParameterError(option, "", f"must come to {axes.MOST} points at most", f"{points} points")

@@ -21,7 +21,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.base.modes import Mode
 from digiclay.device import palettes
 from digiclay.device.instant import Instant
-from digiclay.device.parts import ROLE
+from digiclay.roles import ROLE
 from digiclay.settings import properties
 
 from tests.timeouts import TIMEOUT
@@ -137,15 +137,21 @@ def mode_color(mode: Mode) -> tuple[float, ...]:
     return tuple(material.diffuse_color)
 
 
+#: Colors that are seen together, and how far apart in Lab each two are at least: a difference of 2.3 is just
+#: noticeable side by side, 10 is told apart at a glance.
+SETS = {
+    **{name: (tuple(palette.values()), len(Mode), 10.0) for name, palette in palettes.PALETTES.items()},
+    "fingertips": (palettes.FINGERS, 10, 15.5),
+}
+
+
 @pytest.mark.parametrize("vision", VISION)
-@pytest.mark.parametrize("name", palettes.PALETTES)
-def test_any_two_modes_look_different_with_any_color_vision(name, vision):
-    seen = [
-        lab(np.clip(VISION[vision] @ linear(color)[:3], 0.0, 1.0))
-        for color in palettes.PALETTES[name].values()
-    ]
-    # A difference of 2.3 is just noticeable side by side; 10 is told apart at a glance.
-    assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 10.0
+@pytest.mark.parametrize("name", SETS)
+def test_any_two_modes_or_fingertips_look_different_with_any_color_vision(name, vision):
+    colors, count, least = SETS[name]
+    seen = [lab(np.clip(VISION[vision] @ linear(color)[:3], 0.0, 1.0)) for color in colors]
+    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)]
+    assert (len(seen), min(apart) > least) == (count, True)
 
 
 @pytest.mark.usefixtures("extension")

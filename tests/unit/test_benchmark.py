@@ -16,35 +16,24 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import LEAST, make_bundles
 
-from benchmarks import processes, runs_together
+from benchmarks import processes, runs_together, session_parts
 from benchmarks.__main__ import main
 from benchmarks.kinds import BENCHMARKS
 from benchmarks.report import Report
 from benchmarks.runs_together import STUDIES, study
-from benchmarks.session_parts import (
-    CORE,
-    FILES,
-    LONGER,
-    PARTS,
-    TERMS,
-    Counted,
-    note_methods,
-    period_calls,
-    without,
-)
 from tests.assemble import sample
 
 
 @pytest.fixture
 def ledger():
     """A ledger of its own, in place of the class's."""
-    former, Counted.ledger = Counted.ledger, Counter()
-    yield Counted.ledger
-    Counted.ledger = former
+    former, session_parts.Counted.ledger = session_parts.Counted.ledger, Counter()
+    yield session_parts.Counted.ledger
+    session_parts.Counted.ledger = former
 
 
 def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger):
-    a = np.ones(3).view(Counted)
+    a = np.ones(3).view(session_parts.Counted)
     b = a + 1.0  # add
     np.exp(b, b)  # exp
     b *= 2.0  # multiply
@@ -53,14 +42,14 @@ def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger):
     b[1:]  # __getitem__
     b[0] = 1.0  # __setitem__
     assert ledger.total() == 7
-    assert (type(b), b.tolist()) == (Counted, [1.0, *(2.0 * np.exp(np.full(2, 2.0))).tolist()])
+    assert (type(b), b.tolist()) == (session_parts.Counted, [1.0, *(2.0 * np.exp(np.full(2, 2.0))).tolist()])
     ledger.clear()
     bound = np.eye(3).dot
-    with note_methods():  # of plain arrays
+    with session_parts.note_methods():  # of plain arrays
         product = bound(a)
         np.zeros(2).copy()
     assert ledger == {"dot": 1, "zeros": 1, "copy": 1}
-    assert type(product) is Counted
+    assert type(product) is session_parts.Counted
 
 
 def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted_and_of_method_iii_under_228():
@@ -74,7 +63,7 @@ def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted_and_of_m
         owner = getattr(called, "__self__", None)
         asked += event == "c_call" and type(owner) is np.ndarray and owner.shape == (2, 6)
 
-    calls, counted = period_calls(system, trajectories, 300)
+    calls, counted = session_parts.period_calls(system, trajectories, 300)
     sys.setprofile(note)
     try:
         for _ in periods(system, trajectories, begin(system), 300):
@@ -85,7 +74,7 @@ def test_a_period_of_method_i_makes_at_most_114_numpy_calls_all_counted_and_of_m
     assert (len(calls), statistics.median(calls) <= 114) == (300, True)
     # While the force is near its set point Method III solves every second period for less: 226.7 on average.
     scene = sample("ridge_mound_valley", "control.method=hybrid")
-    calls, _ = period_calls(assemble(scene), scene.trajectories(), 400)
+    calls, _ = session_parts.period_calls(assemble(scene), scene.trajectories(), 400)
     assert statistics.mean(calls[300:]) < 228
 
 
@@ -104,12 +93,12 @@ def test_a_mistake_is_one_line_and_exit_code_2(line, message, here, capsys):
 
 
 def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(here, capsys):
-    files = [path.relative_to(CORE).as_posix() for path in CORE.rglob("*.py")]
-    assert [name for name in FILES if not any(file.startswith(name) for file in files)] == []
-    assert set(FILES.values()) == set(PARTS)
+    files = [path.relative_to(session_parts.CORE).as_posix() for path in session_parts.CORE.rglob("*.py")]
+    assert [name for name in session_parts.FILES if not any(file.startswith(name) for file in files)] == []
+    assert set(session_parts.FILES.values()) == set(session_parts.PARTS)
     main(["session", "--scene", "my.toml", "--repeats", "1", "--calls"])
     out = capsys.readouterr().out
-    costs = {part: re.search(rf"^  {part} +([\d.]+) ", out, re.MULTILINE) for part in PARTS}
+    costs = {part: re.search(rf"^  {part} +([\d.]+) ", out, re.MULTILINE) for part in session_parts.PARTS}
     assert [part for part, cost in costs.items() if not cost or not float(cost[1]) > 0.0] == []
     elapsed, spent = (float(re.search(rf"{word} ([\d.e-]+) s \(", out)[1]) for word in ("in", "time"))
     # One process, one thread: it uses no more than passes, but for the grain of the two clocks.
@@ -128,13 +117,15 @@ def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(
 
 def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys):
     scene = sample("tap")
-    for term, section in TERMS.items():
-        less = without(scene, term)
+    for term, section in session_parts.TERMS.items():
+        less = session_parts.without(scene, term)
         part = scene.section(section)
         assert (less and less.with_sections(**{section: part})) == (None if part is None else scene)
-    less = without(replace(scene, simulation=replace(scene.simulation, physics_step=1e-3)), LONGER)
+    less = session_parts.without(
+        replace(scene, simulation=replace(scene.simulation, physics_step=1e-3)), session_parts.LONGER
+    )
     assert less.simulation.physics_step == less.simulation.control_period
-    assert without(less, LONGER) is None
+    assert session_parts.without(less, session_parts.LONGER) is None
     assert main(["terms", "tap", "--quick", "--quiet"]) == 0
     out = capsys.readouterr().out
     for name in ("the full scene", "without conduit", "without relaxation", "all of these"):

@@ -10,14 +10,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
-from ..core.files.run_folder import (
-    lock_name,
-    make_folder,
-    read_json,
-    remove_abandoned,
-    resolve_inside,
-    write_whole,
-)
+from ..core.files import run_folder
 from ..core.metrics.metric_table import ERRORS, METRICS, RUN
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
@@ -51,15 +44,15 @@ class Folder:
 
     def find_job(self, job: Job) -> Path:
         """Return the folder of a job's files."""
-        return resolve_inside(self.path, JOBS, job.name)
+        return run_folder.resolve_inside(self.path, JOBS, job.name)
 
     def find_run(self, job: Job) -> Path:
         """Return the folder of a job's run."""
-        return resolve_inside(self.path, RUNS, job.name)
+        return run_folder.resolve_inside(self.path, RUNS, job.name)
 
     def find_log(self, job: Job) -> Path:
         """Return the log file of a job's process."""
-        return resolve_inside(self.path, LOGS, f"{job.name}.log")
+        return run_folder.resolve_inside(self.path, LOGS, f"{job.name}.log")
 
     def is_done(self, job: Job) -> bool:
         """Return whether there is a whole run of just this job, and not of one it once was."""
@@ -69,11 +62,11 @@ class Folder:
         """Write the files of a job."""
         if job.scene is None:
             return
-        folder = make_folder(self.find_job(job))
-        remove_abandoned(folder)
+        folder = run_folder.make_folder(self.find_job(job))
+        run_folder.remove_abandoned(folder)
         write_code(job.scene, folder)
-        write_whole(folder / SCENE, format_scene(job.scene).encode())
-        write_whole(folder / JOB, self.batch.outputs.format().encode())
+        run_folder.write_whole(folder / SCENE, format_scene(job.scene).encode())
+        run_folder.write_whole(folder / JOB, self.batch.outputs.format().encode())
 
     def read_failures(self) -> dict[str, str]:
         """Return why jobs failed that other processes have done, by their names.
@@ -94,7 +87,7 @@ class Folder:
 
     def measure_start_up(self) -> float | None:
         """Return the seconds it usually took until a job's process began to work."""
-        timings = (read_json(self.find_run(job) / TIMING) or {} for job in self.batch.jobs)
+        timings = (run_folder.read_json(self.find_run(job) / TIMING) or {} for job in self.batch.jobs)
         times = [timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)]
         return median(times) if times else None
 
@@ -103,8 +96,8 @@ class Folder:
         cards = [self._make_card(job, failed.get(job.name, "") or job.error) for job in self.batch.jobs]
         path = self.path / INDEX
         refresh = AGAIN if any(card.facts == UNDONE for card in cards) else 0
-        with lock_name(path, PATIENCE):
-            write_whole(path, page(f"Batch {self.batch.name}", summary, cards, refresh).encode())
+        with run_folder.lock_name(path, PATIENCE):
+            run_folder.write_whole(path, page(f"Batch {self.batch.name}", summary, cards, refresh).encode())
         return path
 
     def summarize(self, count: int, failed: Mapping[str, str], state: str = "done") -> str:
@@ -130,7 +123,7 @@ class Folder:
             return Card(job.name, facts=UNDONE)
         run = self.find_run(job)
         thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
-        metrics, timing = (read_json(run / name) or {} for name in ("metrics.json", TIMING))
+        metrics, timing = (run_folder.read_json(run / name) or {} for name in ("metrics.json", TIMING))
         took = sum(value for value in timing.values() if isinstance(value, float))
         facts = [
             ("method", str(metrics.get("method", ""))),
@@ -165,7 +158,7 @@ def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
 
 def read_batch(path: Path) -> Folder:
     """Return a batch's folder with the jobs it has, without their definitions."""
-    description = read_json(path / MARK)
+    description = run_folder.read_json(path / MARK)
     if description is None or not isinstance(description.get("batch"), str):
         raise OutputError(f"{path} is no folder of a job series: it has no {MARK} of 'digiclay batch'.")
     named = description.get("jobs")
@@ -194,7 +187,7 @@ def note_failure(job: Path, error: str) -> None:
         log = series.find_log(Job(job.resolve().name, None))
         if error:
             log.parent.mkdir(exist_ok=True)
-            write_whole(log, f"{ERROR}{error}\n".encode())
+            run_folder.write_whole(log, f"{ERROR}{error}\n".encode())
         elif find_error(read_tail(log)):
             log.unlink(missing_ok=True)
 

@@ -13,15 +13,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, one_line
-from ..core.files.run_folder import (
-    claim_files,
-    format_json,
-    lock_name,
-    make_folder,
-    read_json,
-    remove_abandoned,
-    write_whole,
-)
+from ..core.files import run_folder
 from ..core.scene.scene_source import load, load_recorded
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import Run, has_files, is_whole, read_run
@@ -60,7 +52,7 @@ def judge_run(job: Path, run: Path) -> RunState:
         return RunState.CHANGED
     if _read_code(job) != _read_code(run):
         return RunState.CHANGED
-    timing = read_json(run / TIMING)
+    timing = run_folder.read_json(run / TIMING)
     if timing is None:
         return RunState.INCOMPLETE
     sizes = timing.get(FILES)
@@ -86,7 +78,7 @@ def _is_same(one: Path, other: Path, read: Callable[[Path], object]) -> bool:
 
 def list_lacking(run: Path, outputs: Outputs) -> list[str]:
     """Return those of `MOVING` that are wanted and not there."""
-    files = (read_json(run / TIMING) or {}).get(FILES)
+    files = (run_folder.read_json(run / TIMING) or {}).get(FILES)
     # Older runs have not noted their files.
     there = files if isinstance(files, Mapping) else {path.name for path in run.iterdir()}
     return [kind for kind in MOVING if getattr(outputs, kind) and f"{kind}.mp4" not in there]
@@ -102,13 +94,13 @@ def is_done(job: Path, run: Path) -> bool:
 
 def note_film(run: Path, kind: str, seconds: float, *, encoded: bool) -> None:
     """Note in a run what was drawn for one of its films, and its file once there is one."""
-    with lock_name(run / TIMING, PATIENCE):
-        timing: dict[str, Any] = read_json(run / TIMING) or {}
+    with run_folder.lock_name(run / TIMING, PATIENCE):
+        timing: dict[str, Any] = run_folder.read_json(run / TIMING) or {}
         timing[kind] = (timing.get(kind) or 0.0) + seconds
         if encoded and isinstance(timing.get(FILES), dict):
             name = f"{kind}.mp4"
             timing[FILES] = {**timing[FILES], name: (run / name).stat().st_size}
-        write_whole(run / TIMING, format_json(timing))
+        run_folder.write_whole(run / TIMING, run_folder.format_json(timing))
 
 
 #: What the lines begin with that are meant for the series.
@@ -250,7 +242,7 @@ class Work:
             return False
         refuse_without_blender()
         began = time.perf_counter()
-        with lock_name(make_folder(folder) / format_range(frames)):
+        with run_folder.lock_name(run_folder.make_folder(folder) / format_range(frames)):
             self._draw(read_run(run, *ARRAYS), looks, kind, frames, folder)
         note_film(run, kind, time.perf_counter() - began, encoded=False)
         return True
@@ -265,10 +257,10 @@ class Work:
         from ..pictures.film import encode_film
 
         began = time.perf_counter()
-        with claim_files([out], PATIENCE):
+        with run_folder.claim_files([out], PATIENCE):
             finished = read_run(run, *ARRAYS)
             frames = range(looks.count(finished.history["time"]))
-            folder = make_folder(find_frames(run, kind))
+            folder = run_folder.make_folder(find_frames(run, kind))
             self._draw(finished, looks, kind, frames, folder)
             with scratch():
                 encode_film([name_frame(folder, frame) for frame in frames], out, looks)
@@ -294,7 +286,7 @@ class Work:
 
     def _draw(self, run: Run, looks: Any, kind: str, frames: range, folder: Path) -> None:
         """Draw those frames that are missing; what killed processes have left of others is removed."""
-        remove_abandoned(folder)
+        run_folder.remove_abandoned(folder)
         if not list_missing(folder, frames):
             return
         from ..pictures.film import draw_frames

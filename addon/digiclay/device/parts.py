@@ -5,25 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import bridge
+from .. import bridge, roles
 from ..bridge import SCALE
 from ..compat import bpy, shader_nodes
 from ..core.base.errors import DigiclayError
 from ..core.base.modes import COLORS, Mode
-from ..roles import (
-    BALL,
-    ELLIPSOID,
-    FINGERS,
-    FINGERTIP,
-    HAND,
-    OWNED,
-    PALM,
-    PIN,
-    ROLE,
-    ellipsoid,
-    fingertips_of,
-    owner_of,
-)
 from ..ui_text import localize
 from . import heat, primitives
 from .instant import Instant
@@ -60,7 +46,7 @@ WEIGHTS = ("weight low ", "weight high ")
 def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None = None) -> Any:
     """Make an object of data (None: an empty), marked with its role."""
     made = bpy.data.objects.new(name, data)
-    made[ROLE] = role
+    made[roles.ROLE] = role
     made.parent = parent
     collection.objects.link(made)
     return made
@@ -68,11 +54,11 @@ def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None 
 
 def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
     """Return the material of a part, as the user may have changed it, or make it."""
-    existing = next((m for m in bpy.data.materials if m.get(ROLE) == name), None)
+    existing = next((m for m in bpy.data.materials if m.get(roles.ROLE) == name), None)
     if existing is not None:
         return existing
     made = bpy.data.materials.new(f"Digital Clay {name.replace('_', ' ')}")
-    made[ROLE] = name
+    made[roles.ROLE] = name
     made.diffuse_color = bridge.linear(color, alpha)
     made.roughness = roughness
     shader = next(node for node in shader_nodes(made).nodes if node.type == "BSDF_PRINCIPLED")
@@ -115,14 +101,14 @@ def make_sources(instant: Instant, length: float, deck: float, rim: float) -> So
     collection = bpy.data.collections.new("Digital Clay Parts")
     # The node that reads the collection sorts it by name: hence the number in front.
     for code, (look, color) in enumerate(looks):
-        pin = marked(mesh, f"{code:02d} {look}", PIN, collection)
+        pin = marked(mesh, f"{code:02d} {look}", roles.PIN, collection)
         pin.material_slots[0].link = "OBJECT"
         pin.material_slots[0].material = material(look, color, roughness=0.45)
-    arrow = marked(_arrow(instant.pitch), f"{len(looks)} force arrow", PIN, collection)
-    case = marked(_housing(instant, deck, rim), f"{len(looks) + 1} housing", PIN, collection)
+    arrow = marked(_arrow(instant.pitch), f"{len(looks)} force arrow", roles.PIN, collection)
+    case = marked(_housing(instant, deck, rim), f"{len(looks) + 1} housing", roles.PIN, collection)
     meshes = make_meshes(make_lattice(instant, choose_parts(len(instant.height))), deck, _clays())
     skin = [
-        marked(mesh, f"{code} {mesh.name}", PIN, collection)
+        marked(mesh, f"{code} {mesh.name}", roles.PIN, collection)
         for code, mesh in enumerate(meshes, len(looks) + 2)
     ]
     clear = material("skin_clear", CLAY, roughness=0.6, alpha=CLEAR_CLAY)
@@ -207,16 +193,16 @@ def make_fingertip(collection: Any, bed: Any, number: int = 1, palm: Any = None)
     """Make a fingertip of a bed, or of a palm on it: an empty that is moved, in it an ellipsoid."""
     # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
     # of the device, kept in the ellipsoid's scale.
-    made = marked(None, name_fingertip(number), FINGERTIP, collection, parent=palm or bed)
+    made = marked(None, name_fingertip(number), roles.FINGERTIP, collection, parent=palm or bed)
     hold_fingertip(bed, number, made)
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"
     made.lock_scale = (True, True, True)
     mesh = bridge.mesh("Digital Clay Ellipsoid", primitives.ball())
     mesh.materials.append(None)
-    ball = marked(mesh, mesh.name, ELLIPSOID, collection, parent=made)
-    made[BALL] = ball
-    made[OWNED] = ball[OWNED] = True
+    ball = marked(mesh, mesh.name, roles.ELLIPSOID, collection, parent=made)
+    made[roles.BALL] = ball
+    made[roles.OWNED] = ball[roles.OWNED] = True
     lock_in_place(ball)
     ball.material_slots[0].link = "OBJECT"
     color_fingertip(made, number, clear=False)
@@ -230,26 +216,26 @@ def name_fingertip(number: int) -> str:
 
 def find_free_number(bed: Any) -> int:
     """Return the least number that no fingertip of a bed has; raise DigiclayError where all have one."""
-    taken = fingertips_of(bed)
-    free = (number for number in range(1, len(FINGERS) + 1) if number not in taken)
+    taken = roles.fingertips_of(bed)
+    free = (number for number in range(1, len(roles.FINGERS) + 1) if number not in taken)
     number = next(free, None)
     if number is None:
-        raise DigiclayError(localize(TOO_MANY, len(FINGERS), len(FINGERS) + 1))
+        raise DigiclayError(localize(TOO_MANY, len(roles.FINGERS), len(roles.FINGERS) + 1))
     return number
 
 
 def hold_fingertip(bed: Any, number: int, tip: Any) -> None:
     """Have a bed, and the palm that a fingertip stands on, hold it as that of a number."""
-    bed[FINGERS[number - 1]] = tip
-    palm = owner_of(tip, PALM)
+    bed[roles.FINGERS[number - 1]] = tip
+    palm = roles.owner_of(tip, roles.PALM)
     if palm is not None:
-        palm[FINGERS[number - 1]], tip[HAND] = tip, palm
+        palm[roles.FINGERS[number - 1]], tip[roles.HAND] = tip, palm
 
 
 def make_palm(collection: Any, bed: Any) -> Any:
     """Make the palm of a hand over a bed: an empty that moves its fingertips as one."""
-    made = marked(None, "Digital Clay Hand", PALM, collection, parent=bed)
-    made[OWNED] = True
+    made = marked(None, "Digital Clay Hand", roles.PALM, collection, parent=bed)
+    made[roles.OWNED] = True
     made.empty_display_type, made.empty_display_size = "CUBE", PALM_SIZE * SCALE
     return made
 
@@ -262,7 +248,7 @@ def lock_in_place(ball: Any) -> None:
 
 def color_fingertip(tip: Any, number: int, *, clear: bool) -> None:
     """Give the ellipsoid of a fingertip the color of its number, opaque, or clear so that arrows are seen."""
-    ball = ellipsoid(tip)
+    ball = roles.ellipsoid(tip)
     if ball is not None:
         place = (number - 1) % len(FINGER_COLORS)
         kind, color = (f"fingertip_{place + 1}", FINGER_COLORS[place]) if place else ("fingertip", SKIN)

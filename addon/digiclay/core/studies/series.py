@@ -12,18 +12,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..base.errors import DigiclayError, OutputError, explain_os_error, one_line
+from ..files import run_folder
 from ..files.file_lock import hold_lock
-from ..files.run_folder import (
-    describe_claim,
-    format_json,
-    is_unfinished,
-    lock_name,
-    read_json,
-    remove_abandoned,
-    remove_if_empty,
-    resolve_inside,
-    write_whole,
-)
 
 #: The lock of the process that works in the folder.
 LOCK = ".lock"
@@ -57,15 +47,15 @@ def open_series(
     with ExitStack() as until_the_end:
         with ExitStack() as while_it_is_made, explain_os_error(f"{path} cannot be used"):
             _make_folder(path, kind, while_it_is_made, until_the_end)
-            there = read_json(path / kind.mark)
+            there = run_folder.read_json(path / kind.mark)
             if refuse_another is not None and (there is not None or not _is_bare(path, kind)):
                 refuse_another(there)
             if there != description:
-                write_whole(path / kind.mark, format_json(description))
+                run_folder.write_whole(path / kind.mark, run_folder.format_json(description))
             for name in kind.folders:
-                resolve_inside(path, name).mkdir(exist_ok=True)
-                remove_abandoned(path / name)
-            remove_abandoned(path)
+                run_folder.resolve_inside(path, name).mkdir(exist_ok=True)
+                run_folder.remove_abandoned(path / name)
+            run_folder.remove_abandoned(path)
         yield
 
 
@@ -75,18 +65,18 @@ def _make_folder(path: Path, kind: Kind, while_it_is_made: ExitStack, until_the_
         raise OutputError(f"{path} is a file: choose another folder with --out.")
     if not path.exists() or os.access(path.resolve().parent, os.W_OK):
         # A run of this name cannot end in between, nor one begin.
-        while_it_is_made.enter_context(lock_name(path))
-    until_the_end.enter_context(remove_if_empty(path.resolve() / kind.mark))
+        while_it_is_made.enter_context(run_folder.lock_name(path))
+    until_the_end.enter_context(run_folder.remove_if_empty(path.resolve() / kind.mark))
     path.mkdir(parents=True, exist_ok=True)
     if not (path / kind.mark).is_file() and not _is_bare(path, kind):
         raise OutputError(f"{path} holds other things than a {kind.name}: choose another folder with --out.")
-    until_the_end.enter_context(hold_lock(path / LOCK, describe_claim(path, "being worked in")))
+    until_the_end.enter_context(hold_lock(path / LOCK, run_folder.describe_claim(path, "being worked in")))
 
 
 def _is_bare(path: Path, kind: Kind) -> bool:
     """Return whether nothing has been done in a folder: there is but the frame of a series."""
     for found in path.iterdir():
-        frame = found.name in (LOCK, kind.mark) or is_unfinished(found)
+        frame = found.name in (LOCK, kind.mark) or run_folder.is_unfinished(found)
         if not frame and not (found.name in kind.folders and found.is_dir() and not any(found.iterdir())):
             return False
     return True
