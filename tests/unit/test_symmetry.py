@@ -117,6 +117,8 @@ def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(metho
 ONE, LOWER, RAISE = "virtual_master", Brush.LOWER, Brush.RAISE
 X, TURNED_X = make_images("X"), make_images("X", center=(0.7e-3, -0.4e-3), angle=0.4)
 STEEP = line((-7.7, -6.4), (7.7, 6.4))
+#: As a hand draws along an axis: up to 1.4 mm beside it.
+WAVE = np.column_stack([0.9 + 0.5 * np.sin(np.linspace(0, 9, 30)), np.linspace(-9, 9, 30)])
 
 
 def follow_to_the_end(session: Running, periods: int = 8) -> tuple[Running, float, Floats]:
@@ -141,7 +143,16 @@ MEETING = {
     "side by side, as near as two are told apart": (ONE, RAISE, line((2.6, -9), (2.6, 9)), X, 1.05),
     "the same with Method III": ("hybrid", LOWER, line((2.6, -9), (2.6, 9)), X, 1.05),
     "Method II, at forces at which others wait": ("cell_states", LOWER, line((4, -9), (4, 9)), X, 1.05),
-    "nearer, one follows": (ONE, LOWER, line((1.5, -9), (1.5, 9)), X, 1.6),
+    "nearer, one follows": (ONE, LOWER, line((1.6, -9), (1.6, 9)), X, 1.6),
+    "by hand along the axis, one presses": (ONE, LOWER, WAVE, X, 1.15),
+    "the same, raised": ("hybrid", RAISE, WAVE, X, 1.05),
+    "a click in a small ring, every other one": (
+        ONE,
+        LOWER,
+        line((8, 0), (8, 0)),
+        make_images("RADIAL", 24),
+        2.0,
+    ),
     "towards the axis, nearer than one may come down": (ONE, LOWER, line((11, -9), (1, 9)), X, 1.1),
     "from another axis, turned": (ONE, LOWER, line((9, 6), (1, -8)), TURNED_X, 1.4),
     "across the axis both go on": (ONE, LOWER, line((-18, -9), (18, 9)), X, 1.15),

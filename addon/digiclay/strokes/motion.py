@@ -8,7 +8,7 @@ draw the fingertip after them. No Blender in here.
 
 Each image of a path has a fingertip, as far as there are any, and all go at once, side by side as well. None
 comes down where a method would take it for another one: the one of the later image lifts, and waits above
-until the other one is away; where images coincide, one of them is gone along.
+until the other one is away; where images coincide, or nearly so all along, one of them is gone along.
 
 A brush that raises presses until the blister starts, and rises to its height there. Every brush then goes
 along at its height, up and down over what is formed.
@@ -17,6 +17,7 @@ along at its height, up and down over what is formed.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -38,6 +39,7 @@ from .stroke import (
     YIELDING,
     Brush,
     Stroke,
+    alter,
 )
 from .tracking import SUDDEN, Tracking
 
@@ -68,9 +70,10 @@ FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3
-#: An image comes down no nearer to another one, in largest semi-axes of the fingertip; so near, in pitches,
-#: it is the same. Where two meet none lifts: beside the blister of another one pins then run away upwards.
-APART, SAME = 1.0, 0.5
+#: An image comes down no nearer to another one, in largest semi-axes of the fingertip; where all its path is
+#: so near to what another one goes along, it leaves that to the valves; so near, in pitches, it is the same.
+#: Where two meet none lifts: beside the blister of another one pins then run away upwards.
+APART, MERGED, SAME = 1.0, 0.6, 0.5
 #: Phases in which it touches, or is about to.
 DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
 
@@ -153,9 +156,9 @@ def follow(
         firm = firm and force > (FIRM if drags and _is_uneven(stroke, device, pose) else hard)
         if firm and stroke.waited * period < PATIENCE:
             return replace(stroke, waited=stroke.waited + 1, pace=0.0), np.array([pose, pose])
-        stroke = stroke if firm else replace(stroke, waited=0)
+        stroke = stroke if firm else alter(stroke, waited=0)
         # No farther than to where the force may count.
-        count = 1 if count > 1 and drags and _is_uneven(stroke, device, pose, count * period) else count
+        count = _count_even(stroke, device, pose, count, period) if drags else count
     way, path = Way(device, period, find_safe(stroke, device, now)), [pose]
     while len(path) <= count and stroke.phase not in (FINISHING, DONE):
         step = _step(stroke, way, path[-1][:3].tolist())
@@ -180,16 +183,13 @@ def follow_images(
     do: what they do follows from the path alone. Otherwise as `follow`.
     """
     path, hard = [poses], math.inf
-    if stroke.tracking:
+    if tracking := stroke.tracking:
         gap = min((math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf)
-        count = 1 if gap < 2.0 * stroke.tracking.reach(count * period) else count
-        hard = stroke.tracking.hard if gap < 2.0 * stroke.tracking.radius else hard
-    for part in stroke.parts if count > 1 else ():
-        dragged, at = part.tracking and part.phase == DRAGGING, poses[part.image % len(poses)]
-        if part.phase in (ABOVE, YIELDING, PRESSING) or (
-            dragged and _is_uneven(part, device, at, count * period)
-        ):
-            count = 1
+        count = _count_while(lambda periods: gap >= 2.0 * tracking.reach(periods * period), count)
+        hard = tracking.hard if gap < 2.0 * tracking.radius else hard
+    for part in stroke.parts:
+        if count > 1:
+            count = _count_settled(part, device, poses[part.image % len(poses)], count, period)
     while len(path) <= count and stroke.parts:
         before, (stroke, places) = stroke, _follow_once(stroke, device, now, path[-1], period, forces, hard)
         if stroke is before:
@@ -200,6 +200,34 @@ def follow_images(
     return stroke, np.array(path)
 
 
+def _count_while(holds: Callable[[int], bool], most: int) -> int:
+    """Return for how many periods, `most` or a half, a quarter ... of them, something holds; at least 1."""
+    while most > 1 and not holds(most):
+        most //= 2
+    return most
+
+
+def _count_even(part: Stroke, device: Device, pose: Floats, most: int, period: float) -> int:
+    """Return for how many periods a fingertip that drags stays on even ground, `most` at most."""
+    return _count_while(lambda periods: not _is_uneven(part, device, pose, periods * period), most)
+
+
+def _count_settled(part: Stroke, device: Device, pose: Floats, most: int, period: float) -> int:
+    """Return for how many periods what an image does follows from its path alone, `most` at most."""
+    if part.phase == DRAGGING and part.tracking:
+        return _count_even(part, device, pose, most, period)
+    standing = part.phase == PRESSING and _stands(part, device, pose, period)
+    return 1 if part.phase in (ABOVE, YIELDING, PRESSING) and not standing else most
+
+
+def _stands(part: Stroke, device: Device, pose: Floats, period: float) -> bool:
+    """Tell whether an image is so near the pins that it no longer looks at how they stand."""
+    # What others form counts until it is near the pins: then it would wait for those that creep.
+    if part.standing is None:
+        return False
+    return bool(pose[2] <= Way(device, period, 0.0).find_touch(part, *pose[:2].tolist()) + CLEARANCE + NEAR)
+
+
 def _follow_once(
     stroke: Stroke, device: Device, now: Floats, poses: Floats, period: float, forces: Floats, hard: float
 ) -> tuple[Stroke, Floats]:
@@ -208,15 +236,13 @@ def _follow_once(
     busy = [next((part for part in parts[first::count] if not part.left), None) for first in range(count)]
     at = {part.image: poses[part.image % count] for part in busy if part}
     for image, pose in sorted(at.items()):
-        part = replace(parts[image], samples=stroke.samples, held=stroke.held)
+        part = alter(parts[image], samples=stroke.samples, held=stroke.held)
         # One that waits lets pass whoever is down: none has to lift again from the clay.
         others = parts if part.phase == YIELDING else parts[:image]
         down = [at[one.image] for one in others if one.image in at and one.phase in DOWN]
         part = _yield(part, parts[:image], down, device, now, pose)
-        if part.standing is not None and part.phase == PRESSING:
-            touch = Way(device, period, 0.0).find_touch(part, *pose[:2].tolist())
-            # What others form counts until it is near the pins: then it would wait for those that creep.
-            part = replace(part, standing=None) if pose[2] > touch + CLEARANCE + NEAR else part
+        if part.phase == PRESSING and not _stands(part, device, pose, period):
+            part = replace(part, standing=None)
         part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]), hard)
         if len(path) == 1 and not part.left:
             return stroke, poses
@@ -241,8 +267,8 @@ def _yield(
     if part.phase != YIELDING or pose[2] < find_safe(part, device, now) - NEAR:
         return part
 
-    def is_same(other: Stroke, index: int) -> bool:
-        return math.dist(part.place(index), other.place(index)) < SAME * device.grid.layout.pitch
+    def is_same(other: Stroke, index: int, apart: float = SAME * device.grid.layout.pitch) -> bool:
+        return math.dist(part.place(index), other.place(index)) < apart
 
     for other in earlier:
         while part.reached < other.reached and is_same(other, part.reached):
@@ -251,6 +277,9 @@ def _yield(
             part = replace(_reach(part, device, part.reached + 1), phase=ABOVE)
         if part.drawn and other.drawn and is_same(other, part.reached):
             return leave(part)
+        gone = range(part.reached, other.reached + 1) if other.standing is not None else ()
+        if part.tracking and gone and all(is_same(other, index, MERGED * least) for index in gone):
+            return leave(part) if other.drawn else part
     return part if near or part.phase == ABOVE else replace(part, phase=PRESSING)
 
 
@@ -385,12 +414,12 @@ def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | N
         if tracking:
             assert stroke.ground is not None
             change = 0.0
-            if tracking.slope:  # else pins ahead are there in time anyway
+            if tracking.slope and not tracking.ready:  # else pins ahead are there in time anyway
                 near = stroke.ground[device.grid.disc(x, y, tracking.radius)]
                 change = float(np.abs(near - z - tracking.sink).max(initial=0.0))
             speed = tracking.limit_drag(change, pressed=stroke.brush is Brush.LOWER)
             speed = min(speed, stroke.pace + HURRY * way.period)
-            stroke = replace(stroke, pace=speed)
+            stroke = alter(stroke, pace=speed)
         dragged = drag(stroke, device, x, y, speed * way.period)
         if dragged is None:
             return None
@@ -410,8 +439,8 @@ def _climb(stroke: Stroke, z: float, aim: float, period: float) -> tuple[Stroke,
     wanted = math.copysign(min(fastest, math.sqrt(2.0 * gain * abs(far))), far)
     climb = stroke.climb + min(max(wanted - stroke.climb, -gain * period), gain * period)
     if abs(far) <= max(abs(climb), gain * period) * period:
-        return replace(stroke, climb=0.0), aim
-    return replace(stroke, climb=climb), z + climb * period
+        return alter(stroke, climb=0.0), aim
+    return alter(stroke, climb=climb), z + climb * period
 
 
 def _turn(stroke: Stroke, turn: Floats, clear: bool, period: float) -> Floats:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -243,6 +243,12 @@ def draw(
     if not stroke.held:
         return stroke
     return replace(stroke, samples=(*stroke.samples, Sample(x, y, _limit_depth(depth), share, lean)))
+
+
+def alter(stroke: Stroke, **values: Any) -> Stroke:
+    """Return a stroke with some values, itself where it has them: a copy takes a tenth of a step."""
+    same = all(getattr(stroke, name) == value for name, value in values.items())
+    return stroke if same else replace(stroke, **values)
 
 
 def deepen(stroke: Stroke, by: float) -> Stroke:
