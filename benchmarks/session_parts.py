@@ -52,9 +52,9 @@ def solve(scene: Scene, commands: Floats | None = None) -> list[Floats]:
     return [np.array(column) for column in zip(*rows, strict=True)]
 
 
-def time_run(scene: Scene, commands: Floats | None = None) -> float:
+def time_run(scene: Scene) -> float:
     """Return the CPU time of a run of which nothing is kept, s."""
-    _, states = run(scene, commands)
+    _, states = run(scene)
     started = process_time()
     for _ in states:
         pass

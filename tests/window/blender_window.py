@@ -28,6 +28,11 @@ def bed(seen: Seen, name: str) -> np.ndarray:
     return np.array(seen[name]["bed"])
 
 
+def up(seen: Seen, name: str) -> np.ndarray:
+    """Return how far the pins are up in a step, mm."""
+    return bed(seen, name) - REST
+
+
 def down(seen: Seen, name: str) -> np.ndarray:
     """Return how far the pins are down in a step, mm."""
     return REST - bed(seen, name)

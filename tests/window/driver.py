@@ -140,6 +140,11 @@ def sessions() -> list[Any]:
     return running
 
 
+def session() -> Any:
+    """Return the session of the first bed, or None."""
+    return part("sessions.running").find(beds()[0])
+
+
 def stopped() -> Iterator[float | None]:
     yield from until(lambda: not sessions())
 

@@ -27,12 +27,8 @@ QUICK, SLOWER = (0.5, 125), (0.6, 125)
 SPIKE, SPIKES = 12e-3, ((0.0, 0.0), (0.0, 18.0))
 
 
-def find_session(blender: Any) -> Any:
-    return blender.part("sessions.running").find(blender.beds()[0])
-
-
 def put_spikes(blender: Any) -> None:
-    session = find_session(blender)
+    session = blender.session()
     system = session.system
     state = blender.part("core.engine.simulation").begin(system)
     cells = system.grid.at(*(1e-3 * np.array(SPIKES)).T)
@@ -87,7 +83,7 @@ def smooth(blender: Any) -> Iterator[float | None]:
     first: list[list[float]] = []
 
     def started() -> bool:
-        strokes = find_session(blender).strokes
+        strokes = blender.session().strokes
         if strokes:
             first.append([1e3 * strokes[-1].samples[0].x, 1e3 * strokes[-1].samples[0].y])
         return bool(strokes)
@@ -117,7 +113,7 @@ def by_brush(blender: Any) -> Iterator[float | None]:
     note(blender, "by brush")
     blender.shot("smooth_brush")
     process = line(blender, (-HALF, 0.0), (HALF, 0.0), *SLOWER, last="sleep 2")
-    yield from blender.until(lambda: any(one.reached for one in find_session(blender).strokes))
+    yield from blender.until(lambda: any(one.reached for one in blender.session().strokes))
     yield from act(blender, "key Escape sleep 0.2 mouseup 1")
     yield from finish(blender, process)
     note(blender, "escaped")

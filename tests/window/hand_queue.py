@@ -30,10 +30,6 @@ WAVE = ((-27.0, -9.0), (-9.0, 12.0), (9.0, -12.0), (27.0, 9.0))
 LOADS = {"alone": (30, 0.0), "few redraws": (4, 0.0), "a load": (30, 0.15)}
 
 
-def session(blender: Any) -> Any:
-    return blender.part("sessions.running").find(blender.beds()[0])
-
-
 def draw(blender: Any, *paths: tuple[tuple[float, float], ...]) -> Any:
     words = []
     for path in paths:
@@ -69,14 +65,14 @@ def queue(blender: Any) -> Iterator[float | None]:
     process = draw(blender, *LINES)
     while process.poll() is None:
         yield 0.02
-    ended, simulated = time.perf_counter(), session(blender).state.period
+    ended, simulated = time.perf_counter(), blender.session().state.period
     blender.shot("queue_ghost")
-    blender.SEEN["left"] = len(session(blender).strokes)
-    while session(blender).strokes:
+    blender.SEEN["left"] = len(blender.session().strokes)
+    while blender.session().strokes:
         yield 0.02
     spent = time.perf_counter() - ended
     preferences.most_periods = usual
-    simulated = (session(blender).state.period - simulated) * session(blender).system.period
+    simulated = (blender.session().state.period - simulated) * blender.session().system.period
     blender.SEEN["time"] = {"after the hand": spent, "simulated": simulated}
     yield from blender.settle()
     note(blender, "formed")
@@ -93,8 +89,8 @@ def haste(blender: Any) -> Iterator[float | None]:
         yield from done(blender, hand(keys))
         yield from blender.until(lambda: not loop.in_haste)
         note(blender, name)
-        blender.SEEN[name]["left"] = len(session(blender).strokes)
-        yield from blender.until(lambda: not session(blender).strokes)
+        blender.SEEN[name]["left"] = len(blender.session().strokes)
+        yield from blender.until(lambda: not blender.session().strokes)
         yield from blender.settle()
         note(blender, f"{name}, formed")
         yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "key ctrl+z sleep 0.2")
@@ -126,7 +122,7 @@ def under_load(blender: Any, name: str, rate: int, load: float) -> Iterator[floa
     process, path = draw(blender, WAVE), []
 
     def formed() -> bool:
-        strokes = session(blender).strokes
+        strokes = blender.session().strokes
         path[:] = [(sample.x, sample.y) for sample in strokes[0].samples] if strokes else path
         return bool(path) and not strokes and process.poll() is not None
 
@@ -137,5 +133,5 @@ def under_load(blender: Any, name: str, rate: int, load: float) -> Iterator[floa
         bpy.app.timers.unregister(burn)
     yield from blender.settle()
     note(blender, name)
-    blender.SEEN[name] |= {"path": path, "exact": session(blender).state.row(0).tolist()}
+    blender.SEEN[name] |= {"path": path, "exact": blender.session().state.row(0).tolist()}
     yield from reset(blender)

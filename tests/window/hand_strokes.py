@@ -89,8 +89,7 @@ def stroke(
 def note(blender: Any, name: str) -> None:
     """Write down the heights, how many strokes the fingertip has finished, and how the view is turned."""
     blender.look(name)
-    session = blender.part("sessions.running").find(blender.beds()[0])
-    area, _ = blender.view()
+    session, (area, _) = blender.session(), blender.view()
     blender.SEEN[name] |= {
         "bed": blender.heights().round(3).tolist(),
         "drawn": session.finished_strokes if session else 0,
@@ -163,14 +162,12 @@ def script(blender: Any) -> Iterator[float | None]:
 
 def message(blender: Any) -> Iterator[float | None]:
     """Draw a stroke after another one, with no key between them, while Blender shows a message."""
-    tip, running = blender.fingertip(), blender.part("sessions.running")
+    tip = blender.fingertip()
     size = tip.scale.copy()
     for scale, waits in ((0.0 * size, True), (size, False)):
         tip.scale = scale
-        yield from blender.until(
-            lambda waits=waits: bool(running.find(blender.beds()[0]).blocking_reason) == waits
-        )
-    blender.SEEN["message"] = running.last_message()
+        yield from blender.until(lambda waits=waits: bool(blender.session().blocking_reason) == waits)
+    blender.SEEN["message"] = blender.part("sessions.running").last_message()
     yield from stroke(blender, "stroke under a message", (-HALF, 0.0), (HALF, 0.0))
     yield from reset(blender)
 

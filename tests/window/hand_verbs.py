@@ -29,7 +29,7 @@ LONG, CENTER = 21.0, (6.0, -3.0)
 
 def keep(blender: Any, name: str) -> None:
     note(blender, name)
-    session = blender.part("sessions.running").find(blender.beds()[0])
+    session = blender.session()
     locked = blender.part("core.base.modes").Mode.LOCKED
     blender.SEEN[name]["locked"] = [] if session is None else (session.state.mode() == locked).tolist()
     blender.shot(f"verbs_{name.replace(' ', '_')}")

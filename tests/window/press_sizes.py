@@ -52,8 +52,7 @@ def script(blender: Any) -> Iterator[float | None]:
 def write_down(blender: Any, name: str) -> None:
     """Note the sizes, in mm, and the sessions."""
     note(blender, name)
-    bed, settings = blender.beds()[0], brush(blender)
-    session = blender.part("sessions.running").find(bed)
+    bed, settings, session = blender.beds()[0], brush(blender), blender.session()
     blender.SEEN[name] |= {
         "size": bed.digiclay.size,
         "drawn size": 2e3 * blender.part("bridge").finger_of(blender.fingertip()).width,

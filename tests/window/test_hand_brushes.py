@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.window.blender_window import REST, Seen, bed
+from tests.window.blender_window import Seen, up
 from tests.window.hand_brushes import HALF, LONG, SPIKE
 
 PLAYED = {"script": "hand_brushes.py", "size": (1100, 640), "by_hand": True}
@@ -11,11 +11,6 @@ PLAYED = {"script": "hand_brushes.py", "size": (1100, 640), "by_hand": True}
 COLUMNS = np.abs(np.arange(-36, 37, 3)) <= LONG
 #: Rows and column of the pins that stand out.
 MIDDLE, ABOVE = (12, 12), (18, 12)
-
-
-def up(seen: Seen, name: str) -> np.ndarray:
-    """Return how far the pins are up, mm, rows by columns."""
-    return bed(seen, name) - REST
 
 
 @pytest.mark.parametrize(("name", "row"), [("raised", 12), ("inverted", 5)])

@@ -5,15 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from tests.window.blender_window import REST, Seen, bed
+from tests.window.blender_window import Seen, up
 from tests.window.hand_verbs import CENTER
 
 PLAYED = {"script": "hand_verbs.py", "size": (1300, 760), "by_hand": True}
-
-
-def up(seen: Seen, name: str) -> np.ndarray:
-    """Return how far the pins are up, mm, rows by columns."""
-    return bed(seen, name) - REST
 
 
 def locked(seen: Seen, name: str) -> np.ndarray:

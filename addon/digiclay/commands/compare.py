@@ -103,7 +103,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
         words = _list_words(arguments, suite.list_suite_methods())
         code: int = suite.run_suite(arguments, _list_methods(words), [word for word, _ in words])
         return code
-    _refuse_options_of_suite(arguments)
+    for name in SUITE_ONLY:
+        if getattr(arguments, name) not in (None, False):
+            raise OutputError(f"--{name.replace('_', '-')} is for --suite.")
+    if arguments.scene is None:
+        raise OutputError("The following arguments are required: SCENE, or --suite.")
     path, methods = find(arguments.scene), _list_methods(_list_words(arguments, DEFAULT))
     out: Path = arguments.out or Path(f"{find_name(path)}_compare")
     check_folder(out, overwrite=arguments.overwrite)
@@ -152,15 +156,6 @@ def _list_words(arguments: argparse.Namespace, default: Sequence[str]) -> list[t
 def _list_methods(words: Sequence[tuple[str, str]]) -> list[str]:
     """Return the names of the methods to compare; those of one's own are loaded."""
     return list(dict.fromkeys(load_by_option(word, option) for word, option in words))
-
-
-def _refuse_options_of_suite(arguments: argparse.Namespace) -> None:
-    """Refuse what needs --suite, and a missing scene."""
-    for name in SUITE_ONLY:
-        if getattr(arguments, name) not in (None, False):
-            raise OutputError(f"--{name.replace('_', '-')} is for --suite.")
-    if arguments.scene is None:
-        raise OutputError("The following arguments are required: SCENE, or --suite.")
 
 
 def _speeds(scene: Scene) -> Metrics:

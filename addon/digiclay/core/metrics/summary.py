@@ -202,9 +202,7 @@ def find_stretches(rows: Flags) -> list[slice]:
     return [slice(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def measure_oscillation(
-    time: ArrayLike, values: ArrayLike, rows: Flags, window: float = WINDOW
-) -> float | None:
+def measure_oscillation(time: ArrayLike, values: ArrayLike, rows: Flags) -> float | None:
     """Return the rms over time of a signal less its moving average.
 
     ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window, s, around row i. A row
@@ -217,9 +215,9 @@ def measure_oscillation(
         t, y = moment[stretch], signal[stretch]
         area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
         # Half a millionth of the window: an edge on the first row is within.
-        inner = (t - 0.5 * window >= t[0] - 5e-7 * window) & (t + 0.5 * window <= t[-1] + 5e-7 * window)
-        below, above = (np.interp(t[inner] + side * window, t, area) for side in (-0.5, 0.5))
-        off.append(y[inner] - (above - below) / window)
+        inner = (t - 0.5 * WINDOW >= t[0] - 5e-7 * WINDOW) & (t + 0.5 * WINDOW <= t[-1] + 5e-7 * WINDOW)
+        below, above = (np.interp(t[inner] + side * WINDOW, t, area) for side in (-0.5, 0.5))
+        off.append(y[inner] - (above - below) / WINDOW)
         weight.append(compute_weights(t)[inner])
     return compute_rms(np.concatenate(off), np.concatenate(weight)) if off else None
 

@@ -78,8 +78,8 @@ def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: f
     return float(height[cells].mean())
 
 
-def find_contact_outline(finger: Fingertip, turn: Floats, depth: float, count: int = 48) -> Floats:
-    """Return the outline of the fingertip (count, 2), m, a depth, m, above its lowest point; `turn` (4,)."""
+def find_contact_outline(finger: Fingertip, turn: Floats, depth: float) -> Floats:
+    """Return the outline of the fingertip (48, 2), m, a depth, m, above its lowest point; `turn` (4,)."""
     rotation = make_matrices(np.asarray(turn, np.float64)[None])[0]
     axes = np.array([finger.length, finger.width, finger.height])
     shape = rotation @ np.diag(axes**-2.0) @ rotation.T
@@ -90,7 +90,7 @@ def find_contact_outline(finger: Fingertip, turn: Floats, depth: float, count: i
     lean = np.linalg.solve(flat, tilt)
     middle = -level * lean
     square = 1.0 - level**2 * (shape[2, 2] - tilt @ lean)
-    angle = np.arange(count) * (2.0 * math.pi / count)
+    angle = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
     circle = np.sqrt(max(0.0, square)) * np.array([np.cos(angle), np.sin(angle)])
     outline = np.linalg.solve(np.linalg.cholesky(flat).T, circle).T
     return np.asarray(outline + middle + spread[:2, 2] / half)
