@@ -1,5 +1,6 @@
 """Draws symmetric strokes on a turned and shifted bed, one after the other without a pause, by X events."""
 
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -24,6 +25,12 @@ from tests.window.hand_strokes import (
 APART = ((27.0, 9.0), (27.0, 21.0))
 ACROSS = ((-27.0, -9.0), (27.0, 12.0))
 ALONG = ((0.0, -24.0), (0.0, 24.0))
+#: Strokes that are timed on the bed "design": symmetry, images, ends, mm; the last ones 1 mm beside the axis.
+FAR, BESIDE = ((20.0, 8.5), (40.0, 12.0)), ((1.0, -10.0), (1.0, 10.0))
+TIMED = {
+    "1": ("NONE", 2, FAR), "2": ("X", 2, FAR), "6": ("RADIAL", 6, FAR), "12": ("RADIAL", 12, FAR),
+    "1 beside": ("NONE", 2, BESIDE), "2 beside": ("X", 2, BESIDE),
+}  # fmt: skip
 
 
 def script(blender: Any) -> Iterator[float | None]:
@@ -119,3 +126,23 @@ def impatient(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.digiclay.take_replay)  # in steps of its own
     yield from done(blender, hand("sleep 0.1"))
     note(blender, "replayed")
+    yield from time_images(blender)
+
+
+def time_images(blender: Any) -> Iterator[float | None]:
+    """Note the periods of strokes with several images, and the seconds until all is formed."""
+    yield from prepare(blender, "TOP", bed="design")
+    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0), 0.3), "click 1 sleep 0.3")
+    yield from blender.until(lambda: bool(blender.sessions()))
+    settings, timed = brush(blender), {}
+    settings.depth = 4.0
+    for name, (symmetry, count, way) in TIMED.items():
+        yield from reset(blender)
+        settings.symmetry, settings.radial = symmetry, count
+        begun, process = time.perf_counter(), line(blender, *way, 0.3, 125)
+        yield from blender.until(lambda: any(one.strokes for one in blender.sessions()), 0.01)
+        yield from blender.until(lambda: not any(one.strokes for one in blender.sessions()), 0.01)
+        (session,), seconds = blender.sessions(), time.perf_counter() - begun
+        timed[name] = session.state.period - session.gestures[-1].period, seconds
+        yield from finish(blender, process)
+    blender.SEEN["timed"] = timed

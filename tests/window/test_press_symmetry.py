@@ -40,6 +40,13 @@ def test_images_are_alike_on_a_turned_bed(seen: Seen, name, turns):
         np.testing.assert_allclose(formed, turn(formed), rtol=0, atol=3e-3)
 
 
+def test_twelve_images_on_a_large_bed_take_the_periods_of_one(seen: Seen) -> None:
+    print({name: f"{periods} periods, {seconds:.2f} s" for name, (periods, seconds) in seen["timed"].items()})
+    # While the hand is slower than the fingertip, the session waits for it.
+    for name, alone in (("2", "1"), ("6", "1"), ("12", "1"), ("2 beside", "1 beside")):
+        assert seen["timed"][name][0] <= 1.15 * seen["timed"][alone][0] + 16
+
+
 def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_one(seen: Seen) -> None:
     three, two = down(seen, "three"), down(seen, "two")
     # The last one alone has pins in the middle of a row beside the bed's edge.

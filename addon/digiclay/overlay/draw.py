@@ -45,7 +45,8 @@ def cursor(lines: list[Line], words: Sequence[Words] = ()) -> None:
 
 def _stroke(line: Line, size: tuple[float, float]) -> None:
     """Draw a line into a region of a size in pixels, with smooth edges."""
-    kind, points = ("LINES", _dashes(line)) if line.dashed else ("LINE_STRIP", line.points)
+    points = _dashes(line) if line.dashed else line.points
+    kind = "LINES" if line.dashed or line.pairs else "LINE_STRIP"
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     flat = np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
     batch = batch_for_shader(shader, kind, {"pos": flat})

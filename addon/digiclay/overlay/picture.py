@@ -94,12 +94,13 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Line through points (k, 2), pixels; solid or dashed."""
+    """Line through points (k, 2), pixels; solid or dashed, or lines between pairs of points."""
 
     points: Floats
     color: Color
     width: float
     dashed: bool = False
+    pairs: bool = False
 
 
 @dataclass(frozen=True)

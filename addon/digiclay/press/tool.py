@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,10 @@ MARK, PARTS = 2e-3, 240
 
 def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> list[Line]:
     """Return light lines on dark ones along paths (k, 2), pixels; `width` is that of a thin line, pixels."""
-    return [Line(path, *look) for look in ((DARK, 4.0 * width), (color, 2.0 * width)) for path in paths]
+    if not paths:
+        return []
+    points = np.concatenate([np.repeat(path, 2, axis=0)[1:-1] for path in paths])
+    return [Line(points, *look, pairs=True) for look in ((DARK, 4.0 * width), (color, 2.0 * width))]
 
 
 def make_label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
@@ -65,6 +69,12 @@ def close(path: Floats) -> Floats:
     return np.concatenate([path, path[:1]])
 
 
+def map_paths(change: Callable[[Floats], Floats], paths: Sequence[Floats]) -> list[Floats]:
+    """Return what a function makes of the places of all paths at once, path by path."""
+    lengths = [len(path) for path in paths]
+    return np.split(change(np.concatenate(paths)), np.cumsum(lengths)[:-1]) if paths else []
+
+
 def draw_on_bed(
     context: Any, bed: Any, paths: Sequence[Floats], text: str, xy: tuple[float, float],
     color: Color = LIGHT, corner: tuple[float, float] = (0.0, 0.0),
@@ -73,7 +83,7 @@ def draw_on_bed(
     from ..overlay.draw import cursor
 
     system = context.preferences.system
-    lines = [np.asarray(corner) + bridge.project(context, bed, path) for path in paths]
+    lines = map_paths(lambda places: np.asarray(corner) + bridge.project(context, bed, places), paths)
     shown = [line for line in lines if np.isfinite(line).all()]
     label = make_label(text, xy, system.ui_scale) if np.isfinite(xy).all() else ()
     cursor(make_lines(shown, system.pixel_size, color), label)
@@ -138,13 +148,10 @@ def _number(layout: Any, owner: Any, name: str, units: float) -> None:
     row.prop(owner, name)
 
 
-def touch_outline(
-    bed: Any, cells: Grid, height: Floats, place: Floats, depth: float, kind: Brush = Brush.LOWER
-) -> Floats:
-    """Return the rim of what a brush would form at a place, lying on the pins, (k, 3), m."""
+def touch_outline(bed: Any, layout: Layout, place: Floats, depth: float, kind: Brush = Brush.LOWER) -> Floats:
+    """Return the rim of what a brush would form at a place (2,), m, (k, 2), m."""
     tip = fingertip_of(bed)
-    outline = find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, kind, cells.layout)
-    return drape(cells, height, place[:2] + outline)
+    return place + find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, kind, layout)
 
 
 def find_outline(finger: Fingertip, turn: Floats, depth: float, kind: Brush, layout: Layout) -> Floats:
@@ -175,23 +182,15 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
         return
     settings = tool.operator_properties(OPERATOR)
     depth, kind = 1e-3 * settings.depth, _shown_brush(target.bed, settings)
-    rims = [
-        touch_outline(
-            target.bed,
-            target.grid,
-            target.height,
-            np.array([*image.place(*target.point[:2]), target.point[2]]),
-            depth,
-            kind,
-        )
-        for image in find_images(settings)
-    ]
+    rim = close(touch_outline(target.bed, target.grid.layout, target.point[:2], depth, kind))
+    rims = [np.column_stack(image.place(*rim.T)) for image in find_images(settings)]
     amount = 1e-3 * getattr(settings, amount_name(kind))
     text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)
     text += describe_queue(*_measure_queue(target.bed))
     text = text if preferences.get(context).show_cursor_text else ""
     color = SMOOTHING if kind in SWEEPS else LIGHT
-    paths = [*map(close, rims), *find_axes(target.grid, target.height, settings), *_trail(target)]
+    paths = map_paths(partial(drape, target.grid, target.height), [*rims, *_trail(target)])
+    paths += find_axes(target.grid, target.height, settings)
     draw_on_bed(context, target.bed, paths, text, xy, color, (region.x, region.y))
 
 
@@ -226,7 +225,7 @@ def _shown_brush(bed: Any, settings: Any) -> Brush:
 
 
 def _trail(target: aim.Target) -> list[Floats]:
-    """Return what fingertips have still to go along, and their rims where they are, on the pins; or none."""
+    """Return what fingertips have still to go along, and their rims where they are, (k, 2), m; or none."""
     session = running.find(target.bed)
     if session is None or not session.strokes:
         return []
@@ -237,7 +236,7 @@ def _trail(target: aim.Target) -> list[Floats]:
     for pose in session.poses[list_pressing(session)]:
         rim = find_outline(finger, pose[3:], top - pose[2], kind, target.grid.layout)
         ways.append(close(pose[:2] + rim))
-    return [drape(target.grid, target.height, way) for way in ways if len(way) > 1]
+    return [way for way in ways if len(way) > 1]
 
 
 def _scale_key(key: str, scalar: float) -> tuple[str, dict[str, Any], dict[str, Any]]:

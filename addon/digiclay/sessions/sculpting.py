@@ -464,7 +464,7 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
     state, pose, period, device = running.state, running.pose, running.system.period, find_device(running)
     if stroke.brush in WHOLE:
         return order_all(stroke, pose)
-    arrived = live_session.has_arrived(state)
+    arrived = stroke.phase == FINISHING and live_session.has_arrived(state)
     if stroke.brush in SWEEPS:
         return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
     if stroke.phase == FINISHING:

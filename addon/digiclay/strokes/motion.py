@@ -183,7 +183,7 @@ def follow_images(
     do: what they do follows from the path alone. Otherwise as `follow`.
     """
     path, hard = [poses], math.inf
-    if tracking := stroke.tracking:
+    if (tracking := stroke.tracking) and tracking.hard < math.inf:
         gap = min((math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf)
         count = _count_while(lambda periods: gap >= 2.0 * tracking.reach(periods * period), count)
         hard = tracking.hard if gap < 2.0 * tracking.radius else hard

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ..core.shapes.heightmap import HeightMap
 from .tracking import Tracking
 
 Place = tuple[float, float]
+Coordinate = TypeVar("Coordinate", float, Floats)
 
 #: What the fingertip does: it waits for its turn, goes above the path's first place, presses there, rises
 #: with the blister (if its brush has one), goes along the path, leaves it, waits above until the valves have
@@ -39,8 +40,8 @@ class Image(NamedTuple):
     x0: float = 0.0
     y0: float = 0.0
 
-    def place(self, x: float, y: float) -> Place:
-        """Return where a place comes to, m."""
+    def place(self, x: Coordinate, y: Coordinate) -> tuple[Coordinate, Coordinate]:
+        """Return where a place comes to, or places (n,), m."""
         return self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0
 
     def trace(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
