@@ -74,6 +74,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
         result = simulate(arguments, scene, path, stop)
+        # The shape is judged in the last row before the fingertip touches.
         touching = np.flatnonzero(result.history["total_force"] > 0.0)
         row = max(int(touching[0]) - 1, 0) if touching.size else len(result.history["time"]) - 1
         result, lines = _evaluate(result, row, laid)

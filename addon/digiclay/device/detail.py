@@ -45,11 +45,7 @@ def _sizes() -> Iterator[tuple[Any, float]]:
     scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     for window in bpy.context.window_manager.windows:
         beds = [thing for thing in window.scene.objects if is_bed(thing) and _is_automatic(thing)]
-        for area in window.screen.areas if beds else ():
-            if area.type != "VIEW_3D":
-                continue
-            region = next(one for one in area.regions if one.type == "WINDOW")
-            looking = area.spaces.active.region_3d
+        for region, looking in _regions(window) if beds else ():
             lens = np.array(looking.window_matrix)
             for bed in beds:
                 to_clip = np.array(looking.perspective_matrix @ bed.matrix_world)
@@ -57,6 +53,14 @@ def _sizes() -> Iterator[tuple[Any, float]]:
                 size = measure_pitch(to_clip, lens, pitch, region.height) / scale
                 sizes[bed] = max(size, sizes.get(bed, 0.0))
     yield from sizes.items()
+
+
+def _regions(window: Any) -> Iterator[tuple[Any, Any]]:
+    """Give the regions of a window's 3D views, with where each looks from."""
+    for area in window.screen.areas:
+        if area.type == "VIEW_3D":
+            region = next(one for one in area.regions if one.type == "WINDOW")
+            yield region, area.spaces.active.region_3d
 
 
 def _is_automatic(bed: Any) -> bool:

@@ -121,10 +121,9 @@ class HandControl:
 
     def _remember(self, own: Floats, obeyed: Cells) -> None:
         """Keep of each pin's command, in rows (r, m), what the finger obeyed remembers, (m,), for all."""
-        count, width = int(self.runs[0].rows), own.shape[1]
-        at = obeyed * (count * width) + np.arange(width)
+        count = int(self.runs[0].rows)
         for row in getattr(self.runs[0], "pin_rows", ()):
-            own[row::count] = own.reshape(-1).take(at + row * width)
+            own[row::count] = own[obeyed * count + row, np.arange(obeyed.size)]
 
     def locate_each(
         self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
