@@ -326,7 +326,7 @@ def change_scene(
     if numbers != was:
         start = running.stroke_start and change(running.stroke_start)
         running = replace(running, gestures=tuple(map(change, running.gestures)), stroke_start=start)
-    names = ["clock", "paused", "blocking_reason", "finished_strokes", "last_place"]
+    names = ["clock", "paused", "blocking_reason", "stale", "finished_strokes", "last_place"]
     names += [] if lost else ["gestures", "strokes", "stroke_start"]
     if lost:
         other = _give_fingers(other, 1)

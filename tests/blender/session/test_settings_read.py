@@ -13,7 +13,7 @@ from digiclay.live import handlers
 from digiclay.sessions import running
 from digiclay.settings import properties
 
-from tests.blender.session.live import TICK, Clock, move, started, undone, waits
+from tests.blender.session.live import TICK, Clock, exact, move, only_bed, press, started, undone, waits
 
 #: Set point of the force, N, and where it stands.
 DEFAULT, SET_POINT = 0.4, "digiclay.control.virtual_master.force_setpoint"
@@ -121,10 +121,11 @@ def test_a_setting_that_undo_puts_back_is_simulated_with_its_state(bed: Any, clo
     started(bed)
     bed.digiclay.control.virtual_master.force_setpoint = 0.8
     bpy.ops.ed.undo_push(message="Set")
-    clock.tick()
+    press(bed, clock)
     assert set_point() == pytest.approx(0.8)
     undone(clock)
     assert set_point() == pytest.approx(DEFAULT)
+    assert (exact(only_bed()) == 40e-3).all()
     bpy.ops.ed.redo()
     clock.tick(handlers.STALE)
     assert set_point() == pytest.approx(0.8)

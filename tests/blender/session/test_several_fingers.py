@@ -12,6 +12,7 @@ from digiclay import bridge, roles
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import COLORS
 from digiclay.core.scene.scene_source import load
+from digiclay.core.session import snapshot
 from digiclay.device import parts, unit
 from digiclay.live import beds, handlers, tick
 from digiclay.overlay import views
@@ -131,6 +132,7 @@ def test_the_session_goes_on_with_the_fingertips_that_are_left(
     left = 3 - gone
     force = running.find(pair).state.finger_forces()[left - 1]
     bpy.ops.ed.undo_push(message="Pressed")
+    pressed = beds.read_snapshot(pair)
     if how == "deleted":
         select(fingertips_of(pair)[gone])
         bpy.ops.object.delete()
@@ -152,7 +154,9 @@ def test_the_session_goes_on_with_the_fingertips_that_are_left(
     clock.tick(handlers.STALE)
     bed = only_bed()
     assert tuple(fingertips_of(bed)) == (1, 2)
-    assert running.find(bed).numbers == (1, 2)
+    session = running.find(bed)
+    assert session.numbers == (1, 2)
+    assert snapshot.dump(session.system, session.state) == pressed
     assert press(bed, clock, 1, 2) == []
 
 
