@@ -163,10 +163,19 @@ def script(blender: Any) -> Iterator[float | None]:
     preferences.show_cursor_text, blender.SEEN["texts"] = True, texts
     bed = blender.beds()[0]
     yield from blender.open_sidebar()
+    looking, covered = blender.view()[0].spaces.active.region_3d, []
+    before = looking.view_distance, looking.view_location.copy()
     bed.digiclay_display.overlay_full = True
-    yield from act(blender, to(on_the_screen(blender, 24.0, -8.0), 0.3))
+    for _ in range(2):  # and with a session that finds them there
+        yield from act(blender, to(on_the_screen(blender, 24.0, -8.0), 0.3))
+        covered.append(count_covered(blender))
+        blender.call(bpy.ops.digiclay.session_stop)
+        looking.view_distance, looking.view_location = before
+        looking.update()
+        blender.call(bpy.ops.digiclay.session)
+    yield from blender.settle()
     note(blender, "overlay details")
-    blender.SEEN["covered"] = count_covered(blender)
+    blender.SEEN["covered"] = covered
     bed.digiclay_display.overlay_full = False
     blender.view()[0].spaces.active.show_region_ui = False
     for shown, kind in (("pins", "smooth"), ("skin", "membrane"), ("both", "smooth")):

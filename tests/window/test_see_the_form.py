@@ -55,7 +55,7 @@ def test_the_overlay_does_not_cover_the_bed(seen: Seen) -> None:
 
 
 def test_the_bed_gives_way_to_the_details_of_the_overlay_beside_an_open_sidebar(seen: Seen) -> None:
-    assert seen["covered"] == 0
+    assert seen["covered"] == [0, 0]
 
 
 def test_the_text_at_the_cursor_can_be_off_while_its_ring_is_drawn(seen: Seen) -> None:

@@ -21,6 +21,7 @@ from ..live import beds, follow, handlers, loop, tick
 from ..live.beds import active_session
 from ..overlay import views
 from ..overlay.ready_view import light
+from ..panels.display import show_details
 from ..press import tool
 from ..recorded import takes
 from ..roles import bed_of
@@ -285,6 +286,7 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         beds.deselect(bed)
         view.show_form(bed)
         light(context)
+        show_details(bed.digiclay_display, context)
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
         if loop.is_running():

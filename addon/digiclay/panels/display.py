@@ -77,7 +77,7 @@ def _arrows(bed: Any, on: bool) -> None:
     _write_forces(bed)
 
 
-def _show_details(display: Any, context: Any) -> None:
+def show_details(display: Any, context: Any) -> None:
     """Show the bed beside the overlay, which is larger now."""
     views.follow()
     bed = display.id_data
@@ -127,7 +127,7 @@ class Display(bpy.types.PropertyGroup):
     overlay_full: flag(
         "Overlay Details",
         "Show curves, heights of picked pins and modes in the overlay, not force and state alone",
-        update=_show_details,
+        update=show_details,
     )  # fmt: skip
     seconds: number(
         "Past (s)", "Time span of the overlay's curves, in s", default=5.0, min=0.5, max=SPAN, precision=1,
