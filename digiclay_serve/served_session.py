@@ -122,8 +122,8 @@ def feel(session: Session, time: float) -> Felt:
     state, system, poses = session.state, session.system, session.poses
     first, heights, force = session.scene.fingers[0], state.row(0), state.finger_forces()
     law, tip, peak = first.contact or Contact(), first.fingertip or Fingertip(), float(heights.max())
-    # What grows is the tension: the force and what has relaxed of it meanwhile.
-    tension = force + session.relaxed @ _read_pulp(session.scene)[0]
+    # What grows is the tension: the force and what has relaxed of it meanwhile; none over the clay.
+    tension = np.where(force > 0.0, force + session.relaxed @ _read_pulp(session.scene)[0], 0.0)
 
     def look() -> Around:
         basis = system.grid.compute_basis(np.arange(system.grid.count))

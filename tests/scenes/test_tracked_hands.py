@@ -79,9 +79,10 @@ class Stream:
 class Shaped:
     """What became of a stream."""
 
-    #: (t,), s; (t, 2), N; (t, 2): whether pins follow the force below each.
+    #: (t,), s; (t, 2), N; (t, 2), m, above the clay; (t, 2): whether pins follow the force below each.
     time: np.ndarray
     force: np.ndarray
+    height: np.ndarray
     shaping: np.ndarray
     session: Session
 
@@ -108,9 +109,10 @@ def shaped(stream: Stream, tracking: Tracking = HANDS) -> Shaped:
         session = follow(session, targets, 0, 1, clear)
         follows = position[session.state.mode() == Mode.FORCE_FOLLOW]
         near = [np.hypot(*(follows - pose[:2]).T).min(initial=1.0) < 8e-3 for pose in session.poses]
-        rows.append((count * PERIOD, *session.state.finger_forces(), *near))
+        heights = session.poses[:, 2] - session.state.row(0).max()
+        rows.append((count * PERIOD, *session.state.finger_forces(), *heights, *near))
     table = np.array(rows)
-    return Shaped(table[:, 0], table[:, 1:3], table[:, 3:] > 0, session)
+    return Shaped(table[:, 0], table[:, 1:3], table[:, 3:5], table[:, 5:] > 0, session)
 
 
 WORSE = {"gone": (4.0, 4.06), "silent": (5.0, 5.06), "exchanged": (6.0, 6.5), "hostile": True}
@@ -149,8 +151,9 @@ def test_nobody_presses_on_after_a_dropout(gone: bool) -> None:
     if gone:
         assert seen.deviation(0) <= 0.06
     assert seen.force.max() < 2.0
-    # It comes again over the clay, and would have to land once more.
+    # It comes again over the clay at once, and would have to land once more.
     assert not seen.force[seen.time > 6.0, 1].any()
+    assert seen.height[(seen.time > 6.1) & (seen.time < 9.0), 1].max() < HANDS.clutch + 3e-3  # it trembles
     assert seen.session.tracks.there.all()
 
 
