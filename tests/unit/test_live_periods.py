@@ -20,6 +20,8 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, recent_trace, snapshot
 from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
+    LEAST,
+    RELEASED,
     Clock,
     Recording,
     clamp_pose,
@@ -97,18 +99,25 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling():
 
 
 @pytest.mark.parametrize(
-    ("drawing", "spent", "between"),
+    ("drawing", "least", "spent", "between"),
     [
-        pytest.param(1e-3, 23e-3, 33e-3, id="a graphics card: all of the time but a share for the person"),
-        pytest.param(15e-3, 19e-3, 34e-3, id="a slow one: what is left of the time between two ticks"),
-        pytest.param(30e-3, 15e-3, 45e-3, id="drawing takes all of it: a share of the drawing"),
-        pytest.param(0.5, 0.25, 0.75, id="drawing by software"),
+        pytest.param(
+            1e-3, LEAST, 23e-3, 33e-3, id="a graphics card: all of the time but a share for the person"
+        ),
+        pytest.param(15e-3, LEAST, 19e-3, 34e-3, id="a slow one: what is left of the time between two ticks"),
+        pytest.param(30e-3, LEAST, 15e-3, 45e-3, id="drawing takes all of it: a share of the drawing"),
+        pytest.param(0.5, LEAST, 0.25, 0.75, id="drawing by software"),
+        pytest.param(1e-3, RELEASED, 23e-3, 33e-3, id="a graphics card, when the hand has let go"),
+        pytest.param(
+            1 / 30, RELEASED, 1 / 30, 1 / 15, id="a slow one: as long as the drawing, 15 pictures a second"
+        ),
+        pytest.param(0.5, RELEASED, 0.5, 1.0, id="software"),
     ],
 )
-def test_the_periods_of_a_queue_leave_the_window_its_redraws(drawing, spent, between):
+def test_the_periods_of_a_queue_leave_the_window_its_redraws(drawing, least, spent, between):
     interval, clock, now = 1 / 30, Clock(), 0.0
     for _ in range(60):
-        spare = find_spare(clock, now, interval)
+        spare = find_spare(clock, now, interval, least)
         clock = count_queue(clock, now, 8 * spare, spare)
         gone = max(interval, spare + drawing)
         now += gone

@@ -179,6 +179,17 @@ def test_images_that_meet_give_way_and_all_of_them_form(name: str) -> None:
     assert is_replayed(keep(session))
 
 
+def test_images_begin_no_error_estimate_of_their_own() -> None:
+    session = begin()
+    assert session.monitor is not None
+    session = replace(session, monitor=session.monitor._replace(age=100))
+    session = go_on(queue(session, APART, make_images("X")), 1)
+    assert session.system.fingers == 2
+    assert session.monitor is not None
+    # One of several fingertips takes a tenth of the stroke's time.
+    assert (session.monitor.age, session.monitor.state) == (101, None)
+
+
 def test_no_fingertip_lifts_again_for_another_one_that_is_down() -> None:
     images = make_images("RADIAL", 12, (1.1e-3, -0.7e-3), 0.4)
     session, pressing, lifted = queue(begin(), line((3.7, 0.9), (11.6, 5.4)), images, RAISE), set[int](), 0

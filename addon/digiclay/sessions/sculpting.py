@@ -121,7 +121,8 @@ def advance(
         running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))
     running = replace(running, tick=running.tick + 1)
     if running.strokes and not running.paused:
-        return _work_off(running, now, live_session.find_spare(running.clock, now, interval))
+        least = live_session.LEAST if running.strokes[-1].held else live_session.RELEASED
+        return _work_off(running, now, live_session.find_spare(running.clock, now, interval, least))
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:
@@ -196,7 +197,7 @@ def _give_fingers(running: Running, count: int) -> Running:
     for finger, image in zip(range(had, total), images, strict=False):
         poses[finger] = *image.place(x, y), max(z, above), *turn_image(poses[0, 3:], image)
     recording = running.recording and running.recording.let_in(poses)
-    monitor = running.monitor and accuracy.start(scene)
+    monitor = accuracy.restart(running.monitor, scene)
     return _pack(
         replace(running, system=system, state=state, poses=poses, recording=recording, monitor=monitor)
     )

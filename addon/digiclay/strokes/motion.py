@@ -149,7 +149,7 @@ def follow(
     time: what it does depends on the force, N; elsewhere it does on one above `hard`, N.
     """
     if stroke.phase == PRESSING and stroke.standing is None:
-        stroke = replace(stroke, standing=now.copy())
+        stroke = _look_down(stroke, device, now, *pose[:2].tolist())
     if stroke.tracking and stroke.phase in (PRESSING, DRAGGING):
         drags = stroke.phase == DRAGGING
         firm = force > min(FIRM, hard)  # only then it counts whether the ground is uneven
@@ -172,6 +172,14 @@ def follow(
         if stroke.phase != before.phase:
             break
     return stroke, np.array(path)
+
+
+def _look_down(stroke: Stroke, device: Device, now: Floats, x: float, y: float) -> Stroke:
+    """Return the stroke of a fingertip above a place, where it comes down to pins at heights (n,), m."""
+    stroke, way = replace(stroke, standing=now.copy()), Way(device, 0.0, 0.0)
+    touch, lowest = way.find_touch(stroke, x, y), way.find_lowest(stroke, x, y)
+    slopes = touch - device.find_surface(now, x, y) > UNEVEN
+    return replace(stroke, touch=touch, slopes=slopes, lowest=lowest)
 
 
 def follow_images(
@@ -216,16 +224,14 @@ def _count_settled(part: Stroke, device: Device, pose: Floats, most: int, period
     """Return for how many periods what an image does follows from its path alone, `most` at most."""
     if part.phase == DRAGGING and part.tracking:
         return _count_even(part, device, pose, most, period)
-    standing = part.phase == PRESSING and _stands(part, device, pose, period)
+    standing = part.phase == PRESSING and _stands(part, pose)
     return 1 if part.phase in (ABOVE, YIELDING, PRESSING) and not standing else most
 
 
-def _stands(part: Stroke, device: Device, pose: Floats, period: float) -> bool:
+def _stands(part: Stroke, pose: Floats) -> bool:
     """Tell whether an image is so near the pins that it no longer looks at how they stand."""
     # What others form counts until it is near the pins: then it would wait for those that creep.
-    if part.standing is None:
-        return False
-    return bool(pose[2] <= Way(device, period, 0.0).find_touch(part, *pose[:2].tolist()) + CLEARANCE + NEAR)
+    return part.standing is not None and bool(pose[2] <= part.touch + CLEARANCE + NEAR)
 
 
 def _follow_once(
@@ -241,7 +247,7 @@ def _follow_once(
         others = parts if part.phase == YIELDING else parts[:image]
         down = [at[one.image] for one in others if one.image in at and one.phase in DOWN]
         part = _yield(part, parts[:image], down, device, now, pose)
-        if part.phase == PRESSING and not _stands(part, device, pose, period):
+        if part.phase == PRESSING and not _stands(part, pose):
             part = replace(part, standing=None)
         part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]), hard)
         if len(path) == 1 and not part.left:
@@ -361,9 +367,8 @@ def _step(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None
     if stroke.phase == PRESSING:
         return _press(stroke, way, place)
     if stroke.phase == RISING:
-        lowest = way.find_lowest(stroke, x, y)
-        stroke, z = _climb(stroke, z, lowest, way.period)
-        return replace(stroke, phase=DRAGGING if abs(z - lowest) < NEAR else RISING), (x, y, z)
+        stroke, z = _climb(stroke, z, stroke.lowest, way.period)
+        return replace(stroke, phase=DRAGGING if abs(z - stroke.lowest) < NEAR else RISING), (x, y, z)
     return _drag_on(stroke, way, place)
 
 
@@ -380,13 +385,10 @@ def _wait_for_stamp(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Poi
 def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
     """Come down to the pins, and press into them: to the depth of the stroke, or until a blister starts."""
     x, y, z = place
-    lowest, after, fastest = way.find_lowest(stroke, x, y), DRAGGING, PRESS
-    touch = way.find_touch(stroke, x, y)
-    assert stroke.standing is not None
-    slopes = touch - way.device.find_surface(stroke.standing, x, y) > UNEVEN
+    lowest, touch, after, fastest = stroke.lowest, stroke.touch, DRAGGING, PRESS
     if stroke.tracking:
         # Felt beside its lowest point alone, a fingertip is lost when it is quick.
-        fastest = min(stroke.tracking.sink_speed, PRESS if slopes else math.inf)
+        fastest = min(stroke.tracking.sink_speed, PRESS if stroke.slopes else math.inf)
         if stroke.brush is not Brush.LOWER:
             pressed = max(0.0, touch - stroke.tracking.press)
             lowest, after = way.pass_over_locked(stroke, x, y, pressed), RISING
@@ -400,13 +402,13 @@ def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
         if z > end:
             z = max(end, z - speed * way.period)
             break
-    return replace(stroke, phase=after if z - lowest < NEAR else PRESSING), (x, y, z)
+    return alter(stroke, phase=after if z - lowest < NEAR else PRESSING), (x, y, z)
 
 
 def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None:
     """Go along the path at the height of the stroke; a blister goes along where the fingertip is near it."""
     (x, y, z), tracking, device = place, stroke.tracking, way.device
-    lowest = way.find_lowest(stroke, x, y)
+    lowest = stroke.lowest
     if tracking is None or abs(z - lowest) <= SLACK:
         if stroke.drawn and abs(z - lowest) < NEAR:
             return replace(stroke, phase=LEAVING), place
@@ -419,12 +421,12 @@ def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | N
                 change = float(np.abs(near - z - tracking.sink).max(initial=0.0))
             speed = tracking.limit_drag(change, pressed=stroke.brush is Brush.LOWER)
             speed = min(speed, stroke.pace + HURRY * way.period)
-            stroke = alter(stroke, pace=speed)
         dragged = drag(stroke, device, x, y, speed * way.period)
         if dragged is None:
             return None
         stroke, x, y = dragged
         lowest = way.find_lowest(stroke, x, y)
+        stroke = alter(stroke, pace=speed if tracking else 0.0, lowest=lowest)
     if tracking is None:
         return stroke, (x, y, max(lowest, z - PRESS * way.period) if z > lowest else lowest)
     stroke, z = _climb(stroke, z, lowest, way.period)

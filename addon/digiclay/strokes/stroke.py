@@ -178,6 +178,11 @@ class Stroke:
     ground: Floats | None = None
     #: (n,), heights of the pins when the fingertip came down to the image that it is at, m; None before.
     standing: Floats | None = None
+    #: How high it is when it first touches one of those, m; whether that is beside its lowest point; and how
+    #: low it is to be where it is, m.
+    touch: float = 0.0
+    slopes: bool = False
+    lowest: float = 0.0
     #: First sample of the present pass of a path that accumulates.
     first: int = 0
     #: How the blister follows, of a device that has one; found when the fingertip begins.

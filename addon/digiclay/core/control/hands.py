@@ -428,7 +428,7 @@ class HandInGroups(HandControl):
             alike = run.sort(own) if counts[i] and hasattr(run, "sort") else None
             groups.setdefault(i if alike is None else (run, alike), []).append(i)
         kept, width = seen.own.reshape(-1), seen.own.shape[1]
-        rows = (count * finger + np.arange(count)[:, None]) * width + cells
+        rows = (count * width * finger + cells) + width * np.arange(count)[:, None]
         for group in groups.values():
             chosen: Any = slice(None) if len(group) == len(memory) else np.isin(finger, group).nonzero()[0]
             at, own_rows = cells[chosen], rows[:, chosen]
@@ -438,11 +438,11 @@ class HandInGroups(HandControl):
                 force[chosen],
                 seen.target[at],
                 seen.mode[at],
-                kept.take(own_rows),
+                kept.take(own_rows, mode="clip"),  # another mode checks
                 seen.cells[at],
             )
             yield group, chosen, part, WHOLE if len(group) == 1 else Sections([counts[i] for i in group])
-            kept[own_rows] = part.own
+            kept[own_rows.ravel()] = part.own.ravel()  # one row of numbers takes half the time
 
 
 def find_lowest(under: Floats) -> Cells:

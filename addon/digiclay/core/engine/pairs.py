@@ -37,6 +37,9 @@ PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, 
 class HandSelection(Selection):
     """Selection of the active cells of a bed under f fingertips, one disc each: arrays (f,)."""
 
+    #: Fingertips cross a pitch in a few periods; a set takes longer to make than one does.
+    margin = 1.5
+
     @cached_property
     def kept(self) -> int:
         """Control periods for which a set is kept: to make one takes as long as a period of ten fingers."""

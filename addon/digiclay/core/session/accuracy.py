@@ -197,6 +197,12 @@ def start(scene: Scene) -> ErrorMonitor | None:
         return None
 
 
+def restart(monitor: ErrorMonitor | None, scene: Scene) -> ErrorMonitor | None:
+    """Return the monitor of a session whose fingertips have changed; a stretch that this ends begins anew."""
+    begun = start(scene) if monitor else None
+    return begun._replace(age=monitor.age) if monitor and begun and monitor.state is None else begun
+
+
 def reset(monitor: ErrorMonitor) -> ErrorMonitor:
     """Return the monitor of a session that has just become another one."""
     return ErrorMonitor(monitor.system)

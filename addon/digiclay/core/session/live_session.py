@@ -25,8 +25,9 @@ WINDOW = 1.0
 #: Longest time the periods of one tick may take, as a share of the time between two ticks: the rest
 #: is for drawing, and for the person at the window.
 SHARE = 0.7
-#: Least time of those of a queue, as a share of what Blender draws for: software draws for half a second.
-LEAST = 0.5
+#: Least time of those of a queue, as a share of what Blender draws for, while a hand draws, and once it has
+#: let go and waits: software draws for half a second. What draws 30 pictures a second still shows 15 then.
+LEAST, RELEASED = 0.5, 1.0
 #: Share of the time beside the periods that is drawing for certain: Blender also waits for the next tick.
 DRAWN = 0.9
 #: Shortest time between two ticks that is counted with, s: ticks may come in a burst.
@@ -101,11 +102,11 @@ def _extend_window(ticks: Ticks, gone: float, done: float) -> Ticks:
     return ticks
 
 
-def find_spare(clock: Clock, now: float, interval: float) -> float:
+def find_spare(clock: Clock, now: float, interval: float, least: float = LEAST) -> float:
     """Return how long the periods of a queue may take in a tick at `now`, of ticks an `interval` apart, s."""
     # Drawing is not seen from here, only all the time between two ticks that the periods did not take.
     beside = interval if clock.seen is None else max(0.0, now - clock.seen - clock.spent)
-    return max(min(SHARE * interval, interval - DRAWN * beside), LEAST * beside)
+    return max(min(SHARE * interval, interval - DRAWN * beside), least * beside)
 
 
 def count_queue(clock: Clock, now: float, done: float, spent: float) -> Clock:

@@ -75,7 +75,7 @@ def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: f
     cells = grid.disc(x, y, radius)
     if not cells.size:
         cells = grid.at(np.array([x]), np.array([y]))
-    return float(height[cells].mean())
+    return float(np.add.reduce(height.take(cells))) / cells.size
 
 
 def find_contact_outline(finger: Fingertip, turn: Floats, depth: float) -> Floats:
