@@ -365,9 +365,7 @@ trajectory = {waypoints = [
 """
 
 
-def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_first_one(
-    tmp_path: Path,
-) -> None:
+def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_first_one(tmp_path):
     path = tmp_path / "two.toml"
     path.write_text(TWO, encoding="utf-8")
     assert bpy.ops.digiclay.open_scene(filepath=str(path)) == {"FINISHED"}

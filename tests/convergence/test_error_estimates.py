@@ -80,9 +80,7 @@ def test_the_true_error_is_at_most_twice_the_estimate_and_that_no_more_than_twen
         ("adaptive", 5e-3, 5e-3, "adaptive", 2.5e-3),
     ],
 )
-def test_a_reference_has_shorter_steps(
-    stepper: str, period: float, step: float, by: str, finer: float
-) -> None:
+def test_a_reference_has_shorter_steps(stepper, period, step, by, finer):
     judge = reference_settings(Simulation(control_period=period, physics_step=step, stepper=stepper))
     assert (judge.stepper, judge.physics_step) == (by, pytest.approx(finer))
 

@@ -36,9 +36,7 @@ from benchmarks.several_fingers import TURN, make_scene, measure_near
         ("cell_states", "crossing, 11", TURN, 1.1),
     ],
 )
-def test_no_finger_is_stolen_by_another_one_that_comes_near(
-    method: str, case: str, turn: float, most: float
-) -> None:
+def test_no_finger_is_stolen_by_another_one_that_comes_near(method, case, turn, most):
     together, alone = measure_near(method, case, turn)
     for own, single in zip(together, alone, strict=True):
         assert own["max_total_force"] < 2.0  # N: what fingers were measured up to

@@ -90,9 +90,7 @@ def test_a_scene_written_by_hand_still_resolves_to_the_same_values(path: Path) -
 
 
 @pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
-def test_a_kept_state_of_an_older_version_is_what_it_was_and_the_session_goes_on_as_it_did(
-    path: Path,
-) -> None:
+def test_a_kept_state_of_an_older_version_is_what_it_was_and_the_session_goes_on_as_it_did(path):
     system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
     state = snapshot.load(system, path.read_bytes())
     assert state.period == known["period"]

@@ -170,9 +170,7 @@ def test_without_a_part_tracked_hands_are_no_fingers() -> None:
 @pytest.mark.parametrize(
     ("coupling", "depth", "soft"), [(100.0, 10e-3, True), (100.0, 2e-3, True), (0.0, 2e-3, False)]
 )
-def test_fingers_of_a_pad_that_have_their_whole_depth_at_once_need_the_coupling(
-    coupling: float, depth: float, soft: bool
-) -> None:
+def test_fingers_of_a_pad_that_have_their_whole_depth_at_once_need_the_coupling(coupling, depth, soft):
     scene = load(find("ridge_mound_valley"))
     session = begin_session(replace(scene, fingers=2 * scene.fingers), LIMITS, Tracking(coupling=coupling))
     places, force = [(-18e-3, 1e-3, 40e-3 - depth), (21e-3, -3e-3, 40e-3 - depth)], 0.0

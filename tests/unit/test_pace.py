@@ -171,9 +171,7 @@ def test_pins_stay_where_a_stroke_of_method_iii_has_left_them() -> None:
 # More than twice the stated speed through a valley 12 mm deep: without yielding 351 kN. How deep it gets
 # before is chance, so one speed has more than its neighbors.
 @pytest.mark.parametrize(("push", "most"), [(0.22, 50.0), (0.24, 50.0), (0.25, 500.0)])
-def test_pins_give_way_under_a_fingertip_that_is_not_where_it_is_taken_to_be(
-    push: float, most: float
-) -> None:
+def test_pins_give_way_under_a_fingertip_that_is_not_where_it_is_taken_to_be(push, most):
     system = assemble(DESIGN)
     fast = replace(find_stated(DESIGN, system), push=push)
     assert lead(DESIGN, system, fast, -12e-3).force < most

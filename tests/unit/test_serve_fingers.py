@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -305,9 +304,7 @@ def test_a_datagram_that_is_none_is_refused_and_changes_nothing(data: bytes) -> 
         ("--record new --to ws://127.0.0.1:1/ --token=a-token-of-tests", "has ended"),
     ],
 )
-def test_a_wrong_option_of_hands_is_refused_in_one_line(
-    words: str, message: str, here: Path, refused: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wrong_option_of_hands_is_refused_in_one_line(words, message, here, refused, monkeypatch):
     monkeypatch.delenv("DIGICLAY_SERVE_TOKEN", raising=False)
     for name, text in (("empty", ""), ("bad", "[1]\n"), ("nan", '[NaN, "a"]\n')):
         (here / name).write_text(text, encoding="utf-8")

@@ -428,9 +428,7 @@ def of_two(places: tuple[float, float], force: dict[int, float], own: tuple[floa
         ((-6e-3, 6e-3), {}, (0.0, 0.0), (None, None)),  # none does
     ],
 )
-def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_are(
-    places, force, own, lags
-) -> None:
+def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_are(places, force, own, lags):
     for mirror in (1, -1):
         given = of_two(places, force, own)
         given["fingertip"][:, :, 0] *= mirror

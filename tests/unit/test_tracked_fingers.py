@@ -65,9 +65,7 @@ EXCHANGED = [
     ("before", "after", "held"), [r[1:] for r in EXCHANGED], ids=[r[0] for r in EXCHANGED]
 )
 @pytest.mark.parametrize("turn", [0.0, 2.0])
-def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(
-    before: Any, after: Any, held: tuple[int, ...], turn: float
-) -> None:
+def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(before, after, held, turn):
     way = np.array([math.cos(turn), math.sin(turn), 0.0])
     start, now = ([tuple(np.array([0, 0, 0.04]) + x * way) for x in xs] for xs in (before, after))
     poses = np.array([[*place, *LEVEL] for place in start])
@@ -95,9 +93,7 @@ RENAMED = [
     ("before", "time", "after", "held"), [r[1:] for r in RENAMED], ids=[r[0] for r in RENAMED]
 )
 @pytest.mark.parametrize("turn", [0.0, 2.0])
-def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(
-    before: Any, time: float, after: Any, held: tuple[int, ...], turn: float
-) -> None:
+def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(before, time, after, held, turn):
     def tell(fingers: Any) -> list[tuple[int, tuple[float, ...]]]:
         way = 1e-3 * np.array([math.cos(turn), math.sin(turn)])
         place = ((one, x * way, 1e-3 * z) for one, (x, z) in ((one, (*at, 40)[:2]) for one, at in fingers))

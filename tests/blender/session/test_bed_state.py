@@ -79,9 +79,7 @@ def test_a_message_is_of_its_bed_and_not_of_a_copy_or_of_a_new_one(bed: Any) -> 
 
 
 @pytest.mark.parametrize("recovered", [False, True], ids=["saved", "after a crash"])
-def test_a_file_of_a_session_goes_on_bit_for_bit(
-    bed: Any, clock: Clock, tmp_path: Path, recovered: bool
-) -> None:
+def test_a_file_of_a_session_goes_on_bit_for_bit(bed, clock, tmp_path, recovered):
     # What Blender saves by itself is a copy of the open file as it stands in the last tick.
     started(bed)
     move(bed, clock, [(0.0, 38.0)] * 10)

@@ -97,9 +97,7 @@ def followed_by_two(bed: Any, server: socket.socket, clock: Clock) -> Any:
     return followed(bed, server, clock)
 
 
-def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
-    bed: Any, clock: Clock, server: socket.socket
-) -> None:
+def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(bed, clock, server):
     address = followed_by_two(bed, server, clock)
     frames = [
         (named((2, 0.045)), [(20.0, 45.0), None]),
@@ -123,9 +121,7 @@ def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(
             np.testing.assert_allclose(pose[[0, 2]] * 1e3, where, 20 * FLOAT32, 1e3 * FLOAT32)
 
 
-def test_a_server_of_one_finger_leaves_the_others_to_the_hand(
-    bed: Any, clock: Clock, server: socket.socket
-) -> None:
+def test_a_server_of_one_finger_leaves_the_others_to_the_hand(bed, clock, server):
     address = followed_by_two(bed, server, clock)
     second = fingertips_of(bed)[2]
     second.rotation_mode, second.location.x = "XYZ", 0.1
@@ -136,9 +132,7 @@ def test_a_server_of_one_finger_leaves_the_others_to_the_hand(
     assert second.rotation_mode == "XYZ"  # nothing has moved it
 
 
-def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_others_lift(
-    bed: Any, clock: Clock, server: socket.socket
-) -> None:
+def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_others_lift(bed, clock, server):
     address = followed_by_two(bed, server, clock)
     arrived(server, address, *named((1, 0.045), (2, 0.044)))
     clock.tick(200)
@@ -185,9 +179,7 @@ def test_under_a_silent_server_the_fingertip_lifts_and_it_is_told_once_and_when_
 
 
 @pytest.mark.parametrize("deleted", [False, True])
-def test_the_subscription_is_renewed_and_ends(
-    bed: Any, clock: Clock, server: socket.socket, deleted: bool
-) -> None:
+def test_the_subscription_is_renewed_and_ends(bed, clock, server, deleted):
     followed(bed, server, clock)
     uid = running.find(bed).uid
     clock.tick(40)
@@ -249,9 +241,7 @@ def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Pa
         (signal.SIGSTOP, "No pose from"),  # its port is open still
     ],
 )
-def test_a_servers_end_is_told_in_two_seconds(
-    bed: Any, clock: Clock, tmp_path: Path, number: int, words: str
-) -> None:
+def test_a_servers_end_is_told_in_two_seconds(bed, clock, tmp_path, number, words):
     from tests.served import serve
 
     started(bed)

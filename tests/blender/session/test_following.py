@@ -16,9 +16,7 @@ from digiclay.sessions import running, sculpting
 from tests.blender.session.live import FLOAT32, TICK, Clock, exact, move, press, shown, started
 
 
-def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_session_is(
-    bed: Any, clock: Clock
-) -> None:
+def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_session_is(bed, clock):
     started(bed)
     lowest = []
     for z in np.linspace(46, 37, 8):
@@ -109,9 +107,7 @@ def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed: Any, clock: C
     assert len(running.find(bed).recording.path) == len(path) + 20  # 0.1 s by the wall's clock
 
 
-def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_other(
-    bed: Any, clock: Clock
-) -> None:
+def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_other(bed, clock):
     started(bed)
     bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
     other = bpy.context.object

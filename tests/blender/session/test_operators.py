@@ -97,9 +97,7 @@ def test_a_bed_of_another_view_layer_is_left_alone(bed: Any) -> None:
     [("selected before", ["Digital Clay"]), ("not selected before", []), ("another is active", []),
      ("another was selected meanwhile", ["Cube"])],
 )  # fmt: skip
-def test_after_the_session_the_active_bed_is_selected_as_before(
-    bed: Any, case: str, wanted: list[str]
-) -> None:
+def test_after_the_session_the_active_bed_is_selected_as_before(bed, case, wanted):
     cube = bpy.data.objects["Cube"]
     bed.select_set(case != "not selected before")
     beds.deselect(bed)

@@ -82,9 +82,7 @@ def test_stopping_one_of_two_sessions_keeps_its_recording_alone(recording: Any, 
     assert handlers.reload_states in bpy.app.handlers.undo_post
 
 
-def test_a_saved_file_has_the_take_so_far_and_recording_goes_on(
-    recording: Any, clock: Clock, tmp_path: Path
-) -> None:
+def test_a_saved_file_has_the_take_so_far_and_recording_goes_on(recording, clock, tmp_path):
     with pytest.raises(RuntimeError):
         save(tmp_path / "nowhere" / "saved.blend")
     assert (seconds(recording), handlers.has_unsaved()) == ([], True)
@@ -110,9 +108,7 @@ def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, t
 @pytest.mark.parametrize(
     ("how", "kept"), [("the recording goes on", []), ("session_stop", ["Take 1"]), ("take_keep", ["Take 1"])]
 )
-def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(
-    recording: Any, clock: Clock, how: str, kept: list[str]
-) -> None:
+def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(recording, clock, how, kept):
     for _ in range(2):
         handlers.write_recovery()
         assert seconds(recording) == [SECONDS]

@@ -48,9 +48,7 @@ def change(group: Any, name: str) -> None:
     assert getattr(group, name) != value, name
 
 
-def test_settings_that_stay_are_not_read_again(
-    bed: Any, clock: Clock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_settings_that_stay_are_not_read_again(bed, clock, monkeypatch):
     made: list[str] = []
     scene_of = properties.scene_of
 
@@ -82,9 +80,7 @@ def test_every_parameter_and_choice_that_is_changed_changes_the_stored_settings(
 
 
 @pytest.mark.parametrize("how", ["animation", "driver"])
-def test_a_setting_that_blender_moves_is_simulated_from_the_next_tick(
-    bed: Any, clock: Clock, how: str
-) -> None:
+def test_a_setting_that_blender_moves_is_simulated_from_the_next_tick(bed, clock, how):
     if how == "animation":
         for frame in (1, 11):
             bed.digiclay.control.virtual_master.force_setpoint = 0.1 * frame

@@ -124,9 +124,7 @@ def test_a_fingertip_that_is_added_in_mid_session_forms_too(pair: Any, clock: Cl
 
 @pytest.mark.parametrize("gone", [1, 2])
 @pytest.mark.parametrize("how", ["deleted", "removed"])
-def test_the_session_goes_on_with_the_fingertips_that_are_left(
-    pair: Any, clock: Clock, gone: int, how: str
-) -> None:
+def test_the_session_goes_on_with_the_fingertips_that_are_left(pair, clock, gone, how):
     started(pair)
     press(pair, clock, 1, 2, lift=False)
     left = 3 - gone
@@ -175,9 +173,7 @@ HUNG = [
 
 
 @pytest.mark.parametrize("what", [*HUNG, "a fingertip on a bone"])
-def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(
-    pair: Any, clock: Clock, what: str
-) -> None:
+def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(pair, clock, what):
     bpy.ops.digiclay.add_hand()
     palm, own = bpy.context.object, fingertips_of(pair)
     (bpy.ops.object.armature_add if "bone" in what else bpy.ops.object.empty_add)(location=(0.1, 0.2, 0.3))
@@ -213,9 +209,7 @@ def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(
 
 
 @pytest.mark.parametrize("scale", [(1.5, 1.5, 1.5), (-1.0, 1.0, 1.0), (0.8, -0.8, 0.8)])
-def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_their_sizes(
-    pair: Any, clock: Clock, scale: tuple[float, float, float]
-) -> None:
+def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_their_sizes(pair, clock, scale):
     bpy.ops.digiclay.add_hand()
     started(pair)
     bpy.context.object.scale, before = scale, bridge.poses(pair)[2:, :2]
@@ -309,9 +303,7 @@ def keyframe(pair: Any) -> None:
             fingertips_of(pair)[number].keyframe_insert("location", frame=frame)
 
 
-def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exported(
-    pair: Any, clock: Clock, tmp_path: Path
-) -> None:
+def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exported(pair, clock, tmp_path):
     started(pair)
     running.put(sculpting.set_recording(running.find(pair), True))
     press(pair, clock, 1, 2)
@@ -355,9 +347,7 @@ ODD: dict[str, Callable[[Any], object]] = {
 
 
 @pytest.mark.parametrize("what", ODD)
-def test_an_odd_fingertip_has_the_session_wait_and_nothing_is_lost(
-    pair: Any, clock: Clock, what: str
-) -> None:
+def test_an_odd_fingertip_has_the_session_wait_and_nothing_is_lost(pair, clock, what):
     started(pair)
     press(pair, clock, 1, 2)
     before = exact(pair)
@@ -386,9 +376,7 @@ def test_the_state_of_two_is_continued_by_three_and_by_one(pair: Any, clock: Clo
     np.testing.assert_array_equal(running.find(pair).state.row(0), formed)
 
 
-def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(
-    pair: Any, clock: Clock, tmp_path: Path
-) -> None:
+def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, clock, tmp_path):
     started(pair)
     move(pair, {1: 46.0, 2: 46.0})
     clock.tick(3)

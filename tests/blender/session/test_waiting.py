@@ -61,9 +61,7 @@ def edit_through_a_linked_duplicate(bed: Any) -> None:
         (lambda bed: fingertip_of(bed).scale.zero(), "scaled to nothing", None),
     ],
 )
-def test_a_session_waits_while_it_is_hindered(
-    bed: Any, clock: Clock, hinder: Any, words: str, free: Any
-) -> None:
+def test_a_session_waits_while_it_is_hindered(bed, clock, hinder, words, free):
     started(bed)
     hinder(bed)
     waits(bed, clock, words=words)
