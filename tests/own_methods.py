@@ -43,10 +43,7 @@ class MethodOne(virtual_master.VirtualMaster):
 """
 #: A memory as of a controller that follows a fingertip, and none.
 PLACED = (
-    PAD.replace(
-        "    def command",
-        "    def begin(self, device):\n        return Kept()\n\n    def command",
-    )
+    PAD.replace("    def command", "    def begin(self, device):\n        return Kept()\n\n    def command")
     + "\nclass Kept(NamedTuple):\n    place: float = 0.5\n"
 )
 

@@ -21,10 +21,7 @@ ROOT = Path(__file__).parents[2]
 #: What the tests of the core may import; what has more needs more than the wheel brings along.
 CORE_ONLY = ("numpy", "trimesh", "pytest", "hypothesis")
 #: Tests whose need of more no import shows.
-NEEDING_MORE = {
-    "test_source_file.py": "Pillow",
-    "test_speed_limits.py": "Pillow",
-}
+NEEDING_MORE = {"test_source_file.py": "Pillow", "test_speed_limits.py": "Pillow"}
 #: Folders of tests that are run with other versions of the libraries.
 FOLDERS = ("unit", "regression")
 #: Python and the file of requirements/ that pins its libraries, empty for what pip chooses.

@@ -42,10 +42,7 @@ LIFT = [(0, 0, 0, 43), (0.8, 0, 0, 36), (1.2, 0, 0, 37), (3.2, 0, 0, 46)]
 
 
 @pytest.mark.parametrize(
-    ("method", "arrangement"),
-    [
-        *(("cell_states", name) for name in ("aligned", "staggered", "hexagonal")),
-    ],
+    ("method", "arrangement"), [*(("cell_states", name) for name in ("aligned", "staggered", "hexagonal"))]
 )
 def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method: str, arrangement: str) -> None:
     # The finger ends 6 mm above the surface; the pins under it press into it from below.

@@ -119,8 +119,7 @@ def pressed(session: Session, count: int = 20) -> Session:
 
 
 @pytest.mark.parametrize(
-    ("most", "height", "flags"),
-    [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)],
+    ("most", "height", "flags"), [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)]
 )
 def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, flags: int) -> None:
     session, seen = begin_session(STILL, replace(LIMITS, force=most)), 0

@@ -7,13 +7,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.spline import interpolate_monotone
 from digiclay.core.model.layout import Layout, find_grid_shape, make_grid
 from digiclay.core.surface import skins
-from digiclay.core.surface.formed import (
-    BASE_THICKNESS,
-    Formed,
-    find_base_level,
-    make_skin,
-    make_solid,
-)
+from digiclay.core.surface.formed import BASE_THICKNESS, Formed, find_base_level, make_skin, make_solid
 from digiclay.core.surface.pins_solid import BRIDGE, make_parts, make_pins_solid
 from digiclay.core.surface.skins import SKINS, SurfaceGrid, fit_skin
 from digiclay.device.instant import Instant

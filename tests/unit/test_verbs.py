@@ -97,11 +97,7 @@ OTHERS = [
 
 @pytest.mark.parametrize(
     ("brush", "keys", "method"),
-    [
-        *((*one, "hybrid") for one in OTHERS),
-        (*OTHERS[0], "virtual_master"),
-        (*OTHERS[1], "cell_states"),
-    ],
+    [*((*one, "hybrid") for one in OTHERS), (*OTHERS[0], "virtual_master"), (*OTHERS[1], "cell_states")],
 )
 def test_a_locked_pin_keeps_its_height_under_every_brush_and_no_finger_presses_into_it(brush, keys, method):
     held = play(begin(control={"method": method}), HOLE, stroke("lock", ((6e-3, 0.0), (9e-3, 0.0))))

@@ -13,11 +13,7 @@ from tests.window.hand_strokes import finish, note, on_the_screen, prepare
 
 HAND = Path(__file__).parent / "tablet" / "pen_hand.py"
 #: Row, mm, pressure, and tilt to the right and to the user, of each stroke; half its length, mm.
-STROKES = {
-    "firm": (24.0, 1.0, 0.0, 0.0),
-    "light": (0.0, 0.5, 0.0, 0.0),
-    "leaning": (-24.0, 1.0, 0.8, 0.0),
-}
+STROKES = {"firm": (24.0, 1.0, 0.0, 0.0), "light": (0.0, 0.5, 0.0, 0.0), "leaning": (-24.0, 1.0, 0.8, 0.0)}
 HALF = 12.0
 
 
