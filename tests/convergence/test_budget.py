@@ -69,20 +69,17 @@ def test_a_larger_budget_leaves_less_to_do_and_what_is_left_out_is_left_out_of_t
     assert one.scene == rebuilt
 
 
-def test_a_trial_that_leaves_the_budget_is_broken_off_and_not_kept() -> None:
+def test_a_trial_beyond_the_budget_is_broken_off_and_one_below_the_own_error_refused() -> None:
     relaxation = next(tried for tried in found("tap", 5e-6).tried if "relax" in tried.text)
     assert (relaxation.departure, relaxation.kept) == (math.inf, False)
+    with pytest.raises(ParameterError, match=r"own integration.*richardson"):
+        find_omissions(cut("tap"), 1e-10)
 
 
 @pytest.mark.parametrize("budget", [0.0, -1e-6, math.nan, math.inf])
 def test_a_budget_that_is_no_length_is_refused(budget: float) -> None:
     with pytest.raises(ParameterError, match=r"run.budget must be above 0 m"):
         find_omissions(cut("tap"), budget)
-
-
-def test_a_budget_below_the_integrations_own_error_is_refused_with_the_remedy() -> None:
-    with pytest.raises(ParameterError, match=r"own integration.*richardson"):
-        find_omissions(cut("tap"), 1e-10)
 
 
 def test_run_with_a_budget_tells_what_it_left_out_and_writes_it(tmp_path, capsys):

@@ -226,9 +226,10 @@ def test_no_python_file_is_over_the_limit() -> None:
     assert {str(path.relative_to(ROOT)): size for path, size in sizes.items() if size > MAX_LINES} == {}
 
 
-def test_no_package_registry_is_named() -> None:
+def test_no_package_registry_and_no_path_of_one_machine_is_named() -> None:
     pattern = HOSTS.replace(",", r"\.").replace(" ", "|")
     assert lines_with(re.compile(pattern, re.IGNORECASE)) == []
+    assert lines_with(MACHINE_PATH) == []
 
 
 def test_requirements_are_exact_pins_without_a_place_to_get_them() -> None:
@@ -236,10 +237,6 @@ def test_requirements_are_exact_pins_without_a_place_to_get_them() -> None:
     files = tracked("requirements/*.txt")
     lines = [(path.name, line) for path in files for line in path.read_text(encoding="utf-8").splitlines()]
     assert [pair for pair in lines if not pin.fullmatch(pair[1])] == []
-
-
-def test_no_path_of_one_machine_is_named() -> None:
-    assert lines_with(MACHINE_PATH) == []
 
 
 def test_the_extension_and_the_package_have_one_version() -> None:

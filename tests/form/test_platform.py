@@ -115,10 +115,12 @@ REFUSED = (
 )
 
 
-def test_the_zip_has_no_threads_and_executes_no_text() -> None:
+def test_the_zip_has_no_threads_executes_no_text_and_installs_or_patches_nothing() -> None:
     assert [text for text in REFUSED if not find_refused(text)] == []
     assert find_refused("import subprocess\nmodule.exec_module(it)\nbed.eval(3)") == set()
     assert {path: found for path, text in modules() if (found := find_refused(text))} == {}
+    found = [(path, match.group()) for path, text in modules() for match in FORBIDDEN.finditer(text)]
+    assert found == []
 
 
 def test_the_permissions_are_those_that_are_used_and_online_access_is_asked_for() -> None:
@@ -130,8 +132,3 @@ def test_the_permissions_are_those_that_are_used_and_online_access_is_asked_for(
     if any("window_manager.clipboard" in text for text in texts.values()):
         used.add("clipboard")
     assert set(MANIFEST["permissions"]) == used
-
-
-def test_nothing_installs_updates_or_patches() -> None:
-    found = [(path, match.group()) for path, text in modules() for match in FORBIDDEN.finditer(text)]
-    assert found == []

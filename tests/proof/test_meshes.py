@@ -54,12 +54,15 @@ def test_a_file_has_as_many_parts_as_bodies(meshes: Path, stem: str, parts: int)
     assert int(re.search(r"Number of parts\s*:\s*(\d+)", said)[1]) == parts
 
 
-def test_admesh_does_find_a_fault(meshes: Path, tmp_path: Path) -> None:
+def test_admesh_and_the_slicer_do_find_faults(meshes: Path, tmp_path: Path) -> None:
     whole, first = bytearray((meshes / "bilinear/surface.stl").read_bytes()), 96 + 50 * 9
     # Two corners of a triangle change places.
     whole[first : first + 24] = whole[first + 12 : first + 24] + whole[first : first + 12]
     (tmp_path / "bad.stl").write_bytes(whole)
     assert faults(tmp_path / "bad.stl") != {}
+    skin = meshes / "bilinear" / "skin.stl"
+    said = told("prusa-slicer", "--export-gcode", "--output", tmp_path / "skin.gcode", skin)
+    assert COMPLAINTS.findall(said) != []
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -94,9 +97,3 @@ def test_the_slicer_makes_g_code_without_a_warning(meshes: Path, tmp_path: Path,
     assert layers == sorted(layers)
     assert max(layers) == pytest.approx(37.7, abs=1.0)
     assert len(layers) == pytest.approx(37.7 / 0.3, abs=4)
-
-
-def test_the_slicer_does_complain_of_an_open_skin(meshes: Path, tmp_path: Path) -> None:
-    skin = meshes / "bilinear" / "skin.stl"
-    said = told("prusa-slicer", "--export-gcode", "--output", tmp_path / "skin.gcode", skin)
-    assert COMPLAINTS.findall(said) != []

@@ -78,7 +78,7 @@ def test_a_viscous_dent_s_volume_recovers_with_its_time_constant(time_constant, 
     assert taken / np.log(dent[first] / dent[last]) == pytest.approx(time_constant, rel=0.05)
 
 
-def test_what_spreads_in_a_viscous_bed_is_not_lost() -> None:
+def test_what_spreads_in_a_viscous_bed_is_not_lost_and_one_that_has_recovered_costs_nothing() -> None:
     # Hardly any recovery: after the finger left, the commanded heights' sum stays as it is.
     system, way = _system(scene("viscous", recovery_time=1e6, side=17))
     sums = [
@@ -89,6 +89,12 @@ def test_what_spreads_in_a_viscous_bed_is_not_lost() -> None:
     # 1.4 s of 1e6 s, 1.4e-6; rounding.
     assert sums[-1] == pytest.approx(sums[0], rel=2e-6)
     assert sums[0] < -20e-3
+    system, way = _system(scene("viscous", (*PRESS[:4], (6.0, 0, 0, 70)), recovery_time=0.3))
+    *_, last = periods(system, [way], begin(system), 1000)
+    assert last.active.cells.size == 0
+    assert np.all(last.row(system.rows.target) == REST)
+    assert np.abs(last.row(0) - REST).max() <= DEAD_BAND + 1e-12
+    assert set(last.mode().tolist()) == {int(Mode.REST)}
 
 
 def _system(made: Scene) -> tuple[System, Any]:
@@ -109,15 +115,6 @@ def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement: str
     # more, heights by no more than the dead band as well.
     assert np.abs(asked - asked_wide).max() <= 0.1 * DEAD_BAND
     assert np.abs(narrow - wide).max() <= 1.1 * DEAD_BAND
-
-
-def test_a_viscous_bed_that_has_recovered_is_at_rest_and_costs_nothing() -> None:
-    system, way = _system(scene("viscous", (*PRESS[:4], (6.0, 0, 0, 70)), recovery_time=0.3))
-    *_, last = periods(system, [way], begin(system), 1000)
-    assert last.active.cells.size == 0
-    assert np.all(last.row(system.rows.target) == REST)
-    assert np.abs(last.row(0) - REST).max() <= DEAD_BAND + 1e-12
-    assert set(last.mode().tolist()) == {int(Mode.REST)}
 
 
 def test_a_pushed_pin_gives_way_and_stays_and_one_that_is_not_stays_at_rest_while_it_listens() -> None:
@@ -188,15 +185,12 @@ def test_a_one_time_refresh_moves_row_by_row_and_a_gradual_one_shows_intermediat
         assert nearest <= 2 * DEAD_BAND, share
 
 
-def test_the_approximate_gradual_refresh_moves_all_rows_at_once_and_is_the_quickest() -> None:
+def test_the_approximate_refresh_is_the_quickest_and_a_small_step_as_quick_as_the_hardware() -> None:
     ways = ("approximate_gradual", "one_time", "gradual")
     rows = [moving(displayed(way, "saddle")[0]) for way in ways]
     assert rows[0].sum(axis=1).max() == 9
     ends = [np.flatnonzero(row.any(axis=1))[-1] for row in rows]
     assert ends == sorted(ends)
-
-
-def test_a_small_step_settles_as_quickly_as_digital_clay_s_hardware() -> None:
     result, _ = displayed("approximate_gradual", "dome", amplitude=1e-3)
     # Three steps of a third of a millimeter; 50 to 100 ms each.
     end = np.flatnonzero(moving(result).any(axis=1))[-1] * PERIOD

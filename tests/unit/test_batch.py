@@ -301,7 +301,7 @@ def read(made: str) -> list[str]:
     return [unescape(found) for found in re.findall(r'(?:src|href)="([^"]*)"', made)]
 
 
-def test_the_page_refers_to_nothing_but_files_beside_it_and_holds_its_thumbnails():
+def test_a_page_refers_to_files_beside_it_alone_and_shows_names_and_errors_never_as_html():
     picture = encode_png(np.full((3, 5, 3), 77, np.uint8))
     done = Card("a", picture, [("lag", "1 mm")], [("film", "runs/a b/film #1.mp4")], leads="f.mp4")
     failed = Card("b", error="it broke", links=[("log", "l")])
@@ -309,9 +309,6 @@ def test_the_page_refers_to_nothing_but_files_beside_it_and_holds_its_thumbnails
     kind, _, data = shown.partition(",")
     assert (kind, base64.b64decode(data)) == ("data:image/png;base64", picture)
     assert [leads, *links] == ["f.mp4", "runs/a%20b/film%20%231.mp4", "l"]
-
-
-def test_names_and_errors_are_shown_as_they_are_and_never_as_html():
     nasty = '<script>alert("x")</script> & Söhne'
     made = page(nasty, nasty, [Card(nasty, facts=[(nasty, nasty)]), Card(nasty, error=nasty)])
     assert read(made) == []

@@ -179,13 +179,22 @@ def cycle(behavior: Any, measurement: Measurement) -> Commands:
     return given
 
 
-def test_push_pull_never_reads_the_force():
+def test_push_pull_never_reads_the_force_and_listens_down_as_fast_as_up():
     behavior = control("push_pull")
     blind = seen(behavior, height=middle(-0.5), force=np.nan)
     given = cycle(behavior, blind)
     for row in (given.target, given.command, blind.own):
         assert np.all(np.isfinite(row))
     assert np.flatnonzero(given.mode == Mode.FORCE_FOLLOW).tolist() == [12]
+    behavior = control("push_pull")
+    up, down = cycle(behavior, seen(behavior)).command, orders(behavior, seen(behavior)).command
+    assert np.all(up > 0.0)
+    assert np.array_equal(up, -down)  # the reservoirs are alike
+    table = {"supply": {"high": 0.8e5, "low": -0.2e5}, "control": {"method": "push_pull"}}
+    up, down = assemble(resolve(table)).controller.drive.open_for(np.array([8e-3, -8e-3]))
+    # Flow goes with the square of the opening and the pressure: 4 times the pressure, half the opening.
+    # The conduit and the table's interpolation change it by some percent.
+    assert -down / up == pytest.approx(2.0, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -196,18 +205,6 @@ def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height
     given = cycle(behavior, seen(behavior, height=middle(drift)))
     assert (given.mode[12] == Mode.FORCE_FOLLOW) == bool(dragged)
     assert given.target[12] - REST == pytest.approx(dragged * 1e-3)
-
-
-def test_a_listening_pin_goes_down_as_fast_as_up_also_under_unlike_reservoirs():
-    behavior = control("push_pull")
-    up, down = cycle(behavior, seen(behavior)).command, orders(behavior, seen(behavior)).command
-    assert np.all(up > 0.0)
-    assert np.array_equal(up, -down)  # the reservoirs are alike
-    table = {"supply": {"high": 0.8e5, "low": -0.2e5}, "control": {"method": "push_pull"}}
-    up, down = assemble(resolve(table)).controller.drive.open_for(np.array([8e-3, -8e-3]))
-    # Flow goes with the square of the opening and the pressure: 4 times the pressure, half the opening.
-    # The conduit and the table's interpolation change it by some percent.
-    assert -down / up == pytest.approx(2.0, rel=0.05)
 
 
 # The pyramid's first row is at rest already; 11 periods of 5 ms are the first to be longer than 52.5 ms.

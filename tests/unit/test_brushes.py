@@ -109,23 +109,13 @@ def test_ridges_drawn_in_quick_succession_both_form_and_along_the_edge_too():
     assert len(done.gestures) == 2
 
 
-def test_level_lowers_a_hill_and_raises_a_hollow():
+def test_level_lowers_a_hill_raises_a_hollow_and_fills_a_valley_that_it_crosses_by_a_bend():
     session = form(begin(), [(12.0, -9.0), (12.0, 9.0)], Brush.RAISE, 6.0)
     session = form(session, [(-12.0, -9.0), (-12.0, 9.0)], Brush.LOWER, 8.0)
     before = along(session)
     assert (before.max(), before.min()) == (pytest.approx(6.0, abs=0.2), pytest.approx(-8.0, abs=0.2))
     level = form(session, [(-34.0, 0.0), (34.0, 0.0)], Brush.LEVEL)
     np.testing.assert_allclose(along(level), 0.0, rtol=0, atol=0.01)
-
-
-@pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "push_pull", "force_display"])
-def test_a_queued_raise_ends_at_once_when_the_method_has_lost_its_blister_meanwhile(method):
-    done = finish(queue(begin(control={"method": method}), ALONG, Brush.RAISE), 1.0)
-    assert done.finished_strokes == 1
-    assert np.abs(relief(done)).max() < 0.05  # push_pull listens by small moves
-
-
-def test_level_fills_a_valley_that_it_crosses_by_a_bend():
     # Under a slanting view the pointer moves aside on the floor of a valley, and back when it comes out.
     way: Places = [(0.0, -24.0), (0.0, -15.0), (-8.0, -5.0), (-8.0, 6.0), (0.0, 14.0), (0.0, 24.0)]
     valley = form(begin_bed("paper", 25, 25), ALONG, Brush.LOWER, 4.0)
@@ -136,6 +126,13 @@ def test_level_fills_a_valley_that_it_crosses_by_a_bend():
     apart = np.min([np.hypot(1e3 * bed.x - x, 1e3 * bed.y - y) for x, y in trace], axis=0)
     # Within the flat top of the blister, 6 mm.
     assert np.abs(leveled.ravel()[apart < 6.0]).max() < 0.01
+
+
+@pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "push_pull", "force_display"])
+def test_a_queued_raise_ends_at_once_when_the_method_has_lost_its_blister_meanwhile(method):
+    done = finish(queue(begin(control={"method": method}), ALONG, Brush.RAISE), 1.0)
+    assert done.finished_strokes == 1
+    assert np.abs(relief(done)).max() < 0.05  # push_pull listens by small moves
 
 
 SPIKE = 8e-3

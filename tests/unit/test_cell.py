@@ -27,10 +27,12 @@ STEPPERS = pytest.mark.parametrize(("stepper", "step"), [("bernoulli", 1e-3), ("
 BALANCE = 0.5e5 * math.pi * 1e-6
 
 
-def test_pressure_is_force_over_area_and_speed_is_flow_over_area_but_for_flow_into_a_stop():
+def test_pressure_is_force_and_speed_flow_over_area_and_reservoirs_move_pins_their_way_alone():
     assert Actuator().pressure(np.array([BALANCE])) == pytest.approx(0.5e5, rel=1e-15)
     flow, height = np.array([1, 1, -1, -1, 1]) * math.pi * 1e-8, np.array([50e-3, 100e-3, 0.0, 100e-3, 0.0])
     assert Actuator().rate(flow, height) == pytest.approx([10e-3, 0.0, 0.0, -10e-3, 10e-3], rel=1e-14)
+    above, below = (one_cell(supply=Supply(*ends)) for ends in ((0.8e5, 0.2e5), (-0.2e5, -0.8e5)))
+    assert find_speeds(above.cell).fall == find_speeds(below.cell).rise == below.fastest == 0.0
 
 
 @pytest.mark.parametrize(
@@ -92,11 +94,6 @@ def test_a_pin_on_its_end_stop_feels_the_indentation_beyond_where_force_begins(s
     m, wanted = contact.exponent, contact.share * contact.stiffness / contact.exponent
     assert run.height[-1, 0] == 0.0
     assert run.force[-1, 0] == pytest.approx(wanted * math.expm1(m * 1.0e-3), rel=1e-9)
-
-
-def test_reservoirs_above_the_air_let_no_pin_fall_and_reservoirs_below_it_none_rise():
-    above, below = (one_cell(supply=Supply(*ends)) for ends in ((0.8e5, 0.2e5), (-0.2e5, -0.8e5)))
-    assert find_speeds(above.cell).fall == find_speeds(below.cell).rise == below.fastest == 0.0
 
 
 def test_a_finger_is_not_missed_by_pins_that_rise_towards_it_as_fast_as_they_can():
@@ -189,7 +186,7 @@ def test_commands_kept_and_the_cut_make_up_the_dead_time_and_steps_fill_the_peri
 TIMES, WEIGHTS = (4e-3, 70e-3, 1.4), (0.08, 0.62, 0.20, 0.10)
 
 
-def test_tension_begins_at_the_offset_follows_the_exponential_and_stiffness_grows_with_it():
+def test_tension_begins_at_the_offset_follows_the_exponential_and_stays_finite():
     contact, depth = Contact(), np.array([0.3e-3, 1e-3, 2.4e-3])
     expected = [250.0 / 2000.0 * (math.exp(2000.0 * x) - 1.0) for x in depth]
     assert contact.tension(depth) == pytest.approx(expected, rel=1e-13)  # rounding
@@ -200,9 +197,6 @@ def test_tension_begins_at_the_offset_follows_the_exponential_and_stiffness_grow
     dx = 1e-7
     low, here, high = contact.tension(np.array([1e-3 - dx, 1e-3, 1e-3 + dx]))
     assert (high - low) / (2 * dx) == pytest.approx(250.0 + 2000.0 * here, rel=1e-7)
-
-
-def test_tension_stays_finite_at_any_depth_and_is_cut_beyond_all_physical_ones():
     most = Contact().tension(np.array([1.0, 1e6]))
     assert np.isfinite(most * most).all()  # sums of squares tell whether all is finite
     assert LARGEST_EXPONENT / Contact().exponent > 0.1  # more than a stroke
@@ -243,10 +237,15 @@ def filtered(own: np.ndarray, first: float, last: float, step: float) -> np.ndar
     return Relaxation().propagator(step) @ np.array([*own, first, 0.5 * (first + last), last])
 
 
-def test_relaxation_is_the_sum_of_equation_12_from_one_to_what_stays():
+def test_relaxation_is_the_sum_of_equation_12_and_what_relaxes_quicker_than_the_step_a_share():
     times = np.array([0.0, 1e-3, 5e-3, 0.1, 1.0, 100.0])
     assert Relaxation().reduced(times) == pytest.approx([reduced(t) for t in times], rel=1e-14)  # rounding
     assert Relaxation().reduced(times[[0, -1]]) == pytest.approx([1.0, 0.08], abs=1e-15)
+    # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at once.
+    quick = Relaxation(times=(1e-9, 1e-9, 1e-9))
+    weights, share = quick.mean_loss_map(5e-3)
+    assert share == pytest.approx(float(quick.shares.sum()), rel=1e-6)
+    assert np.all(np.abs(weights) < 1e-6)
 
 
 @pytest.mark.parametrize("slope", [0.0, 3.0])
@@ -302,14 +301,6 @@ def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step):
     foreseen = weights @ [*own, first] + share * 0.5 * (first + last)
     # Rounding: what a filter gains in a step of 1 µs is a difference of numbers a million times larger.
     assert foreseen == pytest.approx(quad(lost_at, 0.0, step, epsrel=1e-12)[0] / step, rel=1e-9)
-
-
-def test_what_relaxes_quicker_than_the_step_is_a_share_of_the_tension():
-    # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at once.
-    quick = Relaxation(times=(1e-9, 1e-9, 1e-9))
-    weights, share = quick.mean_loss_map(5e-3)
-    assert share == pytest.approx(float(quick.shares.sum()), rel=1e-6)
-    assert np.all(np.abs(weights) < 1e-6)
 
 
 @pytest.mark.parametrize("duration", [40e-3, 60e-3, 100e-3])

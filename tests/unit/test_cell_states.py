@@ -77,15 +77,6 @@ def test_the_neighbors_of_a_following_cell_become_its_blister_and_its_edge(low, 
     assert {Mode(int(m)) for m in modes[[low < distance(c) < high for c in range(BED.count)]]} == {mode}
 
 
-def test_a_critical_cell_is_given_up_after_the_time_out():
-    measured, memory, periods = seen({}, {MIDDLE: Mode.CRITICAL}), Patch(felt=True), 0
-    while measured.mode[MIDDLE] == Mode.CRITICAL:
-        memory, orders = CONTROL.command(memory, measured)
-        measured.mode[:] = orders.mode
-        periods += 1
-    assert periods * CONTROL.period == pytest.approx(CONTROL.parameters.critical_time, abs=CONTROL.period)
-
-
 def test_only_critical_cells_count_their_periods_and_giving_up_the_last_one_or_a_far_jump_are_losses():
     measured = seen({MIDDLE + 1: 0.02}, {MIDDLE: Mode.CRITICAL, MIDDLE + 1: Mode.FORCE_FOLLOW})
     measured.own[0] = 1.0
@@ -232,7 +223,13 @@ def test_a_cell_goes_where_the_arrows_of_the_figure_point_and_nowhere_else(condi
         assert follow_arrows(modes, BY_PLACE, holds)[0] == drawn.get(mode, mode), mode
 
 
-def test_of_two_arrows_from_one_mode_the_later_wins():
+def test_of_two_arrows_the_later_wins_and_a_critical_cell_is_given_up_after_the_time_out():
     both = ("below_critical_trigger", "above_critical_trigger")
     holds = {name: np.array([name in both]) for name in CONDITIONS}
     assert follow_arrows(np.array([Mode.CRITICAL], np.int8), BY_FORCE, holds)[0] == Mode.FORCE_FOLLOW
+    measured, memory, periods = seen({}, {MIDDLE: Mode.CRITICAL}), Patch(felt=True), 0
+    while measured.mode[MIDDLE] == Mode.CRITICAL:
+        memory, orders = CONTROL.command(memory, measured)
+        measured.mode[:] = orders.mode
+        periods += 1
+    assert periods * CONTROL.period == pytest.approx(CONTROL.parameters.critical_time, abs=CONTROL.period)

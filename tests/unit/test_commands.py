@@ -67,15 +67,12 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
 
 
-def test_the_table_is_aligned_in_the_units_people_read_with_a_dash_for_what_was_not_found():
+def test_the_table_has_a_dash_for_what_was_not_found_and_every_panel_a_bar_for_every_method():
     found = {name: dict.fromkeys(RUN_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
     assert len({len(line) for line in table(found)}) == 1
     rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
     assert ["lag_max", "mm", "2.5"] in rows
     assert ["rfd", "N", "–"] in rows
-
-
-def test_every_panel_has_a_bar_for_every_method():
     found = {name: dict.fromkeys(RUN_METRICS, 1.0) for name in (*BOTH, "third")}
     forces = {name: ([0.0, 1.0], [0.0, 0.4], [np.nan, 0.4]) for name in found}
     figure = comparison(found, forces, "scene")

@@ -54,15 +54,7 @@ def test_a_dome_is_one_boss_with_the_area_and_volume_of_the_cap(arrangement):
     assert (dome.crests, dome.crest_length) == ((), 0.0)
 
 
-def test_a_slope_along_the_crest_counts_in_its_length():
-    (boss,) = features(formed(lambda x, y: ridge(x, y) / 6.0 * (9.0 + x / 2.0)))
-    span = boss.crests[0][-1] - boss.crests[0][0]
-    # From 3 mm high at one end to 15 mm at the other: along the slope it is longer than in plan.
-    assert boss.crest_length >= np.linalg.norm(span) - 1e-9
-    assert abs(span[2]) > 0.4 * abs(span[0])
-
-
-def test_a_crease_is_measured_as_the_boss_it_mirrors_and_listed_in_millimeters():
+def test_a_crease_is_measured_as_the_boss_it_mirrors_and_a_slope_counts_in_the_crest():
     (up,), (down,) = (features(formed(lambda x, y, way=way: way * ridge(x, y))) for way in (1.0, -1.0))
     assert (up.kind, down.kind, down.name) == ("boss", "crease", "crease_1")
     figures = ("volume", "extreme", "crest_length")
@@ -70,6 +62,11 @@ def test_a_crease_is_measured_as_the_boss_it_mirrors_and_listed_in_millimeters()
     head, row = make_table([up])
     assert head == ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
     assert (*row[:2], row[4]) == ("boss_1", "ridge", "6.00")
+    (boss,) = features(formed(lambda x, y: ridge(x, y) / 6.0 * (9.0 + x / 2.0)))
+    span = boss.crests[0][-1] - boss.crests[0][0]
+    # From 3 mm high at one end to 15 mm at the other: along the slope it is longer than in plan.
+    assert boss.crest_length >= np.linalg.norm(span) - 1e-9
+    assert abs(span[2]) > 0.4 * abs(span[0])
 
 
 def test_features_are_numbered_by_volume_bosses_first():
@@ -81,7 +78,7 @@ def test_features_are_numbered_by_volume_bosses_first():
     assert features(formed(lambda x, y: 0.0 * x)) == []
 
 
-def test_features_are_measured_from_the_surface_as_it_was():
+def test_features_are_measured_from_the_surface_as_it_was_and_put_it_right():
     bed = formed(ridge)
     before = LEVEL + bed.position @ (0.1, 0.2)
     moved = Formed.of(bed.position, before + bed.raised, before, 0.0, 0)
@@ -89,6 +86,11 @@ def test_features_are_measured_from_the_surface_as_it_was():
     # Squares may be cut along their other diagonal, which moves the surface within them.
     assert other.volume == pytest.approx(one.volume, rel=1e-3)
     np.testing.assert_array_equal(other.pins, one.pins)
+    # What is formed is what was there, plus the boss, minus the crease, but for the rim below the threshold.
+    bed = formed(lambda x, y: ridge(x, y - 8.0) - ridge(x, y + 8.0, height=4.0))
+    boss, crease = features(bed, Finding(threshold=1e-6))
+    # A pin stands for 1 mm²; along the outline the skin is straight where the sum over pins has a corner.
+    assert boss.volume - crease.volume == pytest.approx(bed.raised.sum() * 1e-6, rel=5e-3)
 
 
 @pytest.mark.parametrize(("smallest", "count"), [(1, 2), (2, 1), (9, 1), (10, 0)])
@@ -142,14 +144,6 @@ def test_bodies_follow_the_skin_that_is_asked_for(skin):
     # Top and bottom of every point are the skin now and before.
     assert mesh.bounds[0, 2] == pytest.approx(LEVEL, abs=1e-12)
     assert mesh.bounds[1, 2] == pytest.approx(LEVEL + fine.extreme, abs=1e-12)
-
-
-def test_a_boss_and_a_crease_put_the_former_surface_right():
-    # What is formed is what was there, plus the boss, minus the crease, but for the rim below the threshold.
-    bed = formed(lambda x, y: ridge(x, y - 8.0) - ridge(x, y + 8.0, height=4.0))
-    boss, crease = features(bed, Finding(threshold=1e-6))
-    # A pin stands for 1 mm²; along the outline the skin is straight where the sum over pins has a corner.
-    assert boss.volume - crease.volume == pytest.approx(bed.raised.sum() * 1e-6, rel=5e-3)
 
 
 #: Pitch in mm; three of a kind that no ridge here fits to.

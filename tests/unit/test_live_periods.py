@@ -139,16 +139,13 @@ def pose(x: float = 0.0, z: float = 0.05) -> Floats:
     return np.array([[x, 0.0, z, *LEVEL]])
 
 
-def test_the_way_begins_where_the_finger_was_and_ends_where_it_is():
+def test_the_way_goes_from_where_the_finger_was_to_where_it_is_and_stays_where_one_can_be():
     start, end = pose(), np.array([[0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.0]])
     path = interpolate_path(start, end, 7)
     assert path.shape == (8, 1, 7)
     assert np.array_equal(path[0], start)
     np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
     np.testing.assert_allclose(np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16)
-
-
-def test_a_finger_stays_where_a_finger_can_be():
     places = ([0.0, 0.0, -50.0], [1e9, -1e9, 1e9], [0.01] * 3)
     found = [clamp_pose(np.array([*place, *LEVEL]), 0.1)[:3].tolist() for place in places]
     assert found == [[0.0, 0.0, 0.0], [100.0, -100.0, 100.0], [0.01] * 3]

@@ -376,7 +376,7 @@ def test_components_and_items_stand_where_lib3mf_puts_them(tmp_path):
     assert volume == pytest.approx(4 * 5 * 7 * 11 / 6, rel=1e-5)
 
 
-def test_a_part_that_another_one_names_is_read(tmp_path):
+def test_a_part_that_another_one_names_is_read_and_supports_and_what_is_not_built_are_left_away(tmp_path):
     # As programs that prepare prints write it: each object in a part of its own.
     path = packed(
         tmp_path / "parts.3mf",
@@ -386,9 +386,6 @@ def test_a_part_that_another_one_names_is_read(tmp_path):
         one=f'<object id="7">{MESH}</object>',
     )
     np.testing.assert_allclose(read(path).vertices, PLACES + np.array([100.0, 0.0, 0.0]))
-
-
-def test_supports_and_objects_that_are_not_built_are_left_away(tmp_path):
     kinds = enumerate(("model", "support", "solidsupport", "model"), 1)
     resources = "".join(f'<object id="{number}" type="{kind}">{MESH}</object>' for number, kind in kinds)
     build = "".join(f'<item objectid="{number}"/>' for number in (1, 2, 3))

@@ -167,12 +167,19 @@ def test_in_short_several_fingertips_stand_two_in_a_row_below_and_none_over_anot
     assert (one[1] == two[1] > three[1], two[0] - one[0] > 70.0, one[0] == three[0]) == (True, True, True)
 
 
-def test_a_curve_shows_the_window_alone_and_nothing_that_is_no_number() -> None:
+def test_a_curve_shows_its_window_alone_and_the_set_point_is_the_dashed_line_at_its_height() -> None:
     time, box = np.arange(11.0), Box(100.0, 50.0, 200.0, 40.0, DARK)
     value = np.where(time == 7.0, np.nan, time)
     points = scale_curve(time, value, (5.0, 10.0), (0.0, 10.0), box)
     np.testing.assert_allclose(points[:, 0], [100.0, 140.0, 220.0, 260.0, 300.0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(points[:, 1], [70.0, 74.0, 82.0, 86.0, 90.0], rtol=0, atol=1e-9)
+    picture = draw(session(set_point=0.25))
+    (dashed,) = (line for line in picture.lines if line.dashed)
+    low, high = (line.points[0, 1] for line in picture.lines[:2])
+    share = (dashed.points[0, 1] - low) / (high - low)
+    axis = next(words.text for words in picture.words if re.fullmatch(r"0\.\d+ N", words.text))
+    top = float(axis.removesuffix(" N"))
+    assert share == pytest.approx(0.25 / top, rel=1e-9)
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
@@ -183,16 +190,6 @@ def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> 
     assert ends[1] >= low + span - slack
     # A step of the axis at most a quarter of the span, and at both ends less than one step more.
     assert ends[1] - ends[0] <= 1.5 * span + slack
-
-
-def test_the_set_point_is_the_dashed_line_at_its_height() -> None:
-    picture = draw(session(set_point=0.25))
-    (dashed,) = (line for line in picture.lines if line.dashed)
-    low, high = (line.points[0, 1] for line in picture.lines[:2])
-    share = (dashed.points[0, 1] - low) / (high - low)
-    axis = next(words.text for words in picture.words if re.fullmatch(r"0\.\d+ N", words.text))
-    top = float(axis.removesuffix(" N"))
-    assert share == pytest.approx(0.25 / top, rel=1e-9)
 
 
 #: Balls of 10 pixels as a window of 1000 pixels shows them, whose numbers have a radius of 9.5.

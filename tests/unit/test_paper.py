@@ -305,13 +305,21 @@ def at(bare: Session, x: float, y: float) -> NDArray[np.bool_]:
     return place
 
 
-def test_the_flank_asked_for_is_that_of_the_method_s_own_profile() -> None:
+def test_the_flank_asked_for_is_that_of_the_profile_and_the_claim_names_the_sections_missed() -> None:
     # 12 mm beside the ridge. Method I: flat to 6, down at 15 mm. Method II: flat to 3, down at 12 mm
     # from the outermost cell under the finger; a disc of 16 cells reaches 3 (sqrt(16/pi) - 0.5) mm.
     reach = 3.0 * (np.sqrt(16.0 / np.pi) - 0.5)
     for method, count, share in ((METHODS[0], 8, 3.0 / 9.0), (METHODS[1], 16, reach / 9.0)):
         one = session(method, count)
         assert asked_for(one)[at(one, 0, -9)][0] == pytest.approx(RIDGE * share, rel=1e-9)
+    one, two = session(METHODS[0], 8), session(METHODS[1], 16)
+    over = asked_for(two)
+    over[at(two, 12, 21)] = -4e-3
+    claim = relief(Results(session={METHODS[0]: formed(one, asked_for(one)), METHODS[1]: formed(two, over)}))
+    assert claim.verdict == "holds in part"
+    assert "Method II misses along the valley:" in claim.why
+    both = {METHODS[0]: formed(one, asked_for(one)), METHODS[1]: formed(two, asked_for(two))}
+    assert relief(Results(session=both)).verdict == "holds"
 
 
 def missed(bare: Session, over: Floats) -> list[str]:
@@ -354,14 +362,3 @@ def test_a_raised_rim_is_no_mound_and_a_crease_with_a_hump_no_valley(bare: Sessi
     over = asked_for(bare)
     over[at(bare, 12, 21)] = -4e-3
     assert "along the valley" in missed(bare, over)
-
-
-def test_the_claim_names_the_sections_that_are_missed() -> None:
-    one, two = session(METHODS[0], 8), session(METHODS[1], 16)
-    over = asked_for(two)
-    over[at(two, 12, 21)] = -4e-3
-    claim = relief(Results(session={METHODS[0]: formed(one, asked_for(one)), METHODS[1]: formed(two, over)}))
-    assert claim.verdict == "holds in part"
-    assert "Method II misses along the valley:" in claim.why
-    both = {METHODS[0]: formed(one, asked_for(one)), METHODS[1]: formed(two, asked_for(two))}
-    assert relief(Results(session=both)).verdict == "holds"

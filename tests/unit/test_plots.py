@@ -98,7 +98,7 @@ def test_the_session_shows_force_set_point_and_the_chosen_cells_over_one_time(se
     assert 30 in plots.session_cells(case)
 
 
-def test_a_set_point_of_each_cell_is_drawn_as_their_number_changes():
+def test_a_set_point_is_drawn_of_each_cell_and_without_one_neither_it_nor_a_deviation():
     case = drag()
     case["mode"][:] = Mode.REST
     case["mode"][50:100, :5] = Mode.FORCE_FOLLOW
@@ -107,9 +107,6 @@ def test_a_set_point_of_each_cell_is_drawn_as_their_number_changes():
     expected = np.repeat([np.nan, 0.2, 0.12], [50, 50, 101])
     np.testing.assert_allclose(force.get_lines()[1].get_ydata(), expected, rtol=1e-12)  # rounding
     assert "set point 0.04 N a cell" in [text.get_text() for text in force.get_legend().get_texts()]
-
-
-def test_a_method_without_a_set_point_has_neither_it_nor_a_deviation_in_the_picture():
     figure = plots.session_figure(drag(), None)
     force, told = axes(figure, "force"), axes(figure, "figures")
     assert [line.get_label() for line in force.get_lines()] == ["total force"]

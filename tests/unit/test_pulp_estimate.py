@@ -40,10 +40,14 @@ def observe(forces: Floats, expected: Floats) -> Floats:
     return np.array(found)
 
 
-def test_the_tension_of_a_press_is_found_from_its_force() -> None:
+def test_the_tension_of_a_press_is_found_and_its_underside_as_uncertain_as_the_force() -> None:
     forces, own = history(lambda t: 1.5e-3 * np.minimum(t / 0.2, 1.0), 100)
     # The tension is taken as linear within 5 ms, while it grows exponentially; a filter takes 4 ms.
     assert observe(forces, own) == pytest.approx(own[1:], rel=0.01, abs=2e-3)
+    depth, step = np.array([0.5e-3, 2e-3]), 1e-8
+    slope = CONTACT.share * (CONTACT.tension(depth + step) - CONTACT.tension(depth - step)) / (2.0 * step)
+    _, deviation = PULP.find_underside(np.zeros(2), CONTACT.tension(depth), 1e-3)
+    assert deviation == pytest.approx(1e-3 / slope, rel=1e-6)
 
 
 def test_pulp_relieved_faster_than_it_relaxes_keeps_the_expected_tension() -> None:
@@ -65,13 +69,6 @@ def test_a_predicted_force_is_the_one_that_comes() -> None:
     lost = PULP.predict_loss(pulp)
     found = PULP.predict_force(np.array([depth(42 * PERIOD)]), lost)
     assert found == pytest.approx(forces[42], rel=0.01)
-
-
-def test_an_underside_is_as_uncertain_as_its_force_over_the_stiffness() -> None:
-    depth, step = np.array([0.5e-3, 2e-3]), 1e-8
-    slope = CONTACT.share * (CONTACT.tension(depth + step) - CONTACT.tension(depth - step)) / (2.0 * step)
-    _, deviation = PULP.find_underside(np.zeros(2), CONTACT.tension(depth), 1e-3)
-    assert deviation == pytest.approx(1e-3 / slope, rel=1e-6)
 
 
 # From force to height: the top whose predicted forces add up, and the heights ahead of the fingertip

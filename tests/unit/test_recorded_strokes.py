@@ -39,7 +39,7 @@ def test_a_replay_presses_along_the_whole_stroke_the_same_each_time() -> None:
     np.testing.assert_array_equal(heights(play(PointerStroke(moves=ALONG))), heights(session))
 
 
-def test_symmetry_strength_and_line_are_those_of_the_tool() -> None:
+def test_ctrl_symmetry_strength_and_line_are_those_of_the_tool() -> None:
     line = PointerStroke(moves=((0.0, 9e-3, -6e-3), (0.3, 9e-3, 6e-3)), path="line", symmetry="x")
     deep = 1e3 * (40e-3 - heights(play(line)).reshape(11, 15))
     half = 1e3 * (40e-3 - heights(play(replace(line, strength=0.5))).reshape(11, 15))
@@ -47,9 +47,6 @@ def test_symmetry_strength_and_line_are_those_of_the_tool() -> None:
     # The second image is pressed beside the first one.
     assert deep[5, 4] == pytest.approx(deep[5, 10], abs=0.6)
     assert half[5, 10] < deep[5, 10] - 1.0
-
-
-def test_ctrl_inverts_the_brush() -> None:
     kinds = [PointerStroke(brush=name, ctrl=True).kind for name in ("lower", "raise", "level")]
     assert kinds == [Brush.RAISE, Brush.LOWER, Brush.LEVEL]
     assert PointerStroke(ctrl=True).amount == 15e-3

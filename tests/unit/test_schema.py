@@ -30,11 +30,14 @@ def test_an_empty_file_is_a_whole_scene_that_presses_once_below_the_rest_height(
     assert resolve({"trajectory": {"waypoints": points}}).simulation.duration == 0.7
 
 
-def test_quantities_may_be_written_with_a_unit_or_as_whole_numbers() -> None:
+def test_quantities_may_have_a_unit_and_a_hexagonal_bed_shares_the_force_among_more_cells() -> None:
     scene = resolve({"relaxation": {"times": ["4 ms", 0.07, "1.4 s"]}, "fluid": {"density": 900}})
     # The product of number and unit is rounded once.
     assert scene.section("relaxation").times == pytest.approx((4e-3, 0.07, 1.4), rel=1e-15)
     assert isinstance(scene.fluid.density, float)
+    bed = {"layout": {"arrangement": "hexagonal"}}
+    assert resolve(bed).section("contact").share == 0.29
+    assert resolve({**bed, "contact": {"share": 0.3}}).section("contact").share == 0.3
 
 
 @pytest.mark.parametrize("preset", ["fast", "viscous"])
@@ -46,12 +49,6 @@ def test_a_preset_changes_what_it_says_unless_the_file_does_and_nothing_else(pre
         assert changed.section(name) == wanted
     scene = resolve({"preset": "viscous", "fluid": {"viscosity": 1e-6}})
     assert (scene.fluid.viscosity, scene.fluid.density) == (1e-6, 908.0)
-
-
-def test_a_hexagonal_bed_shares_the_force_among_more_cells_unless_the_file_says_so() -> None:
-    bed = {"layout": {"arrangement": "hexagonal"}}
-    assert resolve(bed).section("contact").share == 0.29
-    assert resolve({**bed, "contact": {"share": 0.3}}).section("contact").share == 0.3
 
 
 @pytest.mark.parametrize(

@@ -67,15 +67,12 @@ def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
     assert (heights(sculpting.restore(session, None, pose())) == 40e-3).all()
 
 
-def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:
+def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effect() -> None:
     session = Hand().press(started())
     other = resolve({"layout": SIZES, "control": {"method": "plastic"}})
     later, said = sculpting.begin_session(8, "Copy", other, pose(), session.snapshot)
     assert np.array_equal(heights(later), heights(session))
     assert "heights were taken up" in said
-
-
-def test_a_gain_that_is_changed_takes_effect_and_nothing_jumps() -> None:
     hand = Hand()
     session = hand.move(started(), [(0.0, 38.0)] * 10)
     assert sculpting.change_scene(session, resolve({"layout": SIZES}))[0] is session
@@ -113,14 +110,11 @@ def test_a_finger_far_below_the_floor_or_far_away_does_no_harm() -> None:
     assert heights(session).min() >= 0.0
 
 
-def test_a_step_too_long_to_halve_has_no_error_estimate() -> None:
+def test_a_step_too_long_to_halve_has_no_estimate_and_parts_that_do_not_go_together_are_refused() -> None:
     table = {"simulation": {"control_period": "1 s"}, "layout": SIZES, "control": "absent"}
     session, _ = sculpting.begin_session(7, "Bed", resolve(table), pose())
     session = sculpting.advance(session, pose(), 0.0, 9)
     assert sculpting.advance(session, pose(z=39.0), 2.0, 9).errors is None
-
-
-def test_scenes_whose_parts_do_not_go_together_are_refused() -> None:
     table = {"layout": SIZES, "control": {"method": "shape_display", "amplitude": "1 m"}}
     with pytest.raises(DigiclayError, match="amplitude"):
         sculpting.change_scene(started(), resolve(table))

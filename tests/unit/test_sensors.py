@@ -280,7 +280,7 @@ def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(inexact, mo
     assert read.min() == 0.0 < read.max()
 
 
-def test_the_last_estimate_is_held_while_the_valve_is_shut_or_the_pin_at_its_stop() -> None:
+def test_the_last_estimate_is_held_while_the_valve_is_shut_at_a_stop_or_of_a_bed_at_rest() -> None:
     true, read = watched(scene(), lambda period: 0.5 if period < 60 else 0.0)
     # Five time constants of the valve, and the dead time, after period 60 it is shut.
     assert true[-1] - true[64] > 0.05, "the force does not change"
@@ -290,6 +290,10 @@ def test_the_last_estimate_is_held_while_the_valve_is_shut_or_the_pin_at_its_sto
     # reservoir, 157 mN. It rises the millimeter in 15 periods.
     away = [{**point, "position": [0, 0, 0.15]} for point in AWAY]
     assert watched(scene(away, actuator={"rest_height": 99e-3}), lambda period: 0.8)[1].max() < 1e-3
+    # Its valves are shut, and stay shut: there is nothing to tell the force from.
+    history = run(resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})).history
+    assert history["total_force"].max() > 1.0
+    assert np.ptp(history["height"]) == 0.0
 
 
 def loading(flow: float, opening: float) -> float:
@@ -299,7 +303,7 @@ def loading(flow: float, opening: float) -> float:
     return cell.actuator.area**2 * flow / (PERIOD * conductance)
 
 
-def test_a_coarse_height_costs_no_more_than_a_step_of_flow_and_late_readings_are_those_of_before() -> None:
+def test_coarse_late_or_noisy_heights_cost_the_observer_what_the_flow_says() -> None:
     def read(**inexact: float) -> Floats:
         return watched(scene(sensors={"observer": "valve", **inexact}), down_and_up)[1]
 
@@ -308,9 +312,6 @@ def test_a_coarse_height_costs_no_more_than_a_step_of_flow_and_late_readings_are
     error = np.abs(read(height_step=1e-6) - exact)[known]
     assert 0.05 * loading(1e-6, 0.4) < error.max() <= loading(1e-6, 0.4)
     np.testing.assert_array_equal(read(delay=3)[3:], exact[:-3])
-
-
-def test_noise_of_the_heights_is_noise_of_two_readings() -> None:
     exact, noisy = (
         watched(scene(sensors={"observer": "valve", "height_noise": noise}), lambda period: 0.4)[1]
         for noise in (0.0, 1e-7)
@@ -335,10 +336,3 @@ def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_
                 after.append(own.copy())
         results.append(np.array(after))
     np.testing.assert_array_equal(results[1], results[0])
-
-
-def test_a_bed_at_rest_does_not_feel_the_finger() -> None:
-    # Its valves are shut, and stay shut: there is nothing to tell the force from.
-    history = run(resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})).history
-    assert history["total_force"].max() > 1.0
-    assert np.ptp(history["height"]) == 0.0

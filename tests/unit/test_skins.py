@@ -143,7 +143,7 @@ def test_a_bed_without_bridges_has_the_volume_of_its_prisms(arrangement):
     assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(prisms, rel=1e-12)
 
 
-def test_squares_that_meet_at_a_corner_are_joined_by_a_bridge():
+def test_squares_that_meet_at_a_corner_are_joined_and_differences_no_file_can_hold_make_no_wall():
     bed = formed([50, 40, 40, 50], 2, 2)
     made = make_parts(bed)
     assert len(made.corner) == 10  # nine and one more: the middle is two
@@ -152,9 +152,6 @@ def test_squares_that_meet_at_a_corner_are_joined_by_a_bridge():
     high = {0, 3}
     met = made.twin >= 0
     assert any({int(p), int(o)} == high for p, o in zip(made.pin[met], made.pin[made.twin[met]], strict=True))
-
-
-def test_differences_no_file_can_hold_make_no_wall():
     heights = 40.0 + np.array([0.0, 1e-6, 2e-5, 0.0, 5.0, 5.0])
     vertices, faces, _ = make_pins_solid(formed(heights, 2, 3))
     corners = vertices[faces].astype(np.float32)

@@ -231,7 +231,7 @@ def test_the_mouse_pulls_a_place_behind_it(place: Place, mouse: Place, string: f
     assert pull(place, mouse, string) == pytest.approx(pulled, rel=1e-12, abs=1e-15)
 
 
-def test_a_ring_keeps_its_radius_and_is_closed() -> None:
+def test_a_ring_keeps_its_radius_and_is_closed_and_a_laid_path_is_let_go() -> None:
     points = lay_ring((2e-3, -1e-3), (2e-3, 9e-3))
     np.testing.assert_allclose(np.linalg.norm(points - [2e-3, -1e-3], axis=1), 10e-3, rtol=1e-12)
     np.testing.assert_allclose(points[0], points[-1], atol=1e-15)
@@ -239,9 +239,6 @@ def test_a_ring_keeps_its_radius_and_is_closed() -> None:
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= 1e-3 + 1e-12
     # Without a radius it is a place.
     np.testing.assert_array_equal(lay_ring((1e-3, 2e-3), (1e-3, 2e-3)), [[1e-3, 2e-3]])
-
-
-def test_a_laid_path_is_let_go() -> None:
     stroke = lay_path(start(3, 0.0, 0.0, 4e-3), lay_line((0.0, 0.0), (30e-3, 40e-3)))
     assert not stroke.held
     assert [one.depth for one in stroke.samples] == [4e-3, 4e-3]
@@ -277,13 +274,17 @@ def test_the_orientation_of_an_image_is_that_of_the_ellipsoids_image_and_near_to
         assert np.trace(there @ own.T) >= 0.8, "it turns by no more than some 90 degrees"
 
 
-def test_a_turn_ends_at_its_aim_and_is_no_faster_than_its_angle() -> None:
+def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim() -> None:
     aim, turn, angles = -lean_finger(UPRIGHT, (0.5, 0.0)), UPRIGHT, []
     for _ in range(6):
         before, turn = turn, turn_toward(turn, aim, 0.1)
         angles.append(2.0 * np.arccos(min(1.0, abs(before @ turn))))
     np.testing.assert_allclose(angles, [0.1] * 5 + [0.0], atol=1e-7)
     np.testing.assert_allclose(matrix(turn), matrix(aim), atol=1e-12)
+    stroke = draw(start(1, 0.0, 0.0, 4e-3), 0.02, 0.0, 4e-3, lean=(0.8, 0.0))
+    down = pressed(path(release(stroke))[1])
+    turned = 2.0 * np.arccos(np.clip(np.abs((down[1:, 3:] * down[:-1, 3:]).sum(1)), 0.0, 1.0))
+    assert 0.5 * motion.TURN * PERIOD < turned.max() <= motion.TURN * PERIOD * (1.0 + 1e-6)
 
 
 @pytest.mark.parametrize("name", ["none", "both", "three turns"])
@@ -302,13 +303,6 @@ def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name: 
         side = down[np.hypot(down[:, 0] - x, down[:, 1] - y) < 5e-3]
         assert len(side) > 10
         np.testing.assert_allclose(side[:, 3:], np.broadcast_to(wanted, (len(side), 4)), atol=1e-9)
-
-
-def test_a_pen_that_is_jerked_turns_the_pressed_finger_no_faster_than_a_hand() -> None:
-    stroke = draw(start(1, 0.0, 0.0, 4e-3), 0.02, 0.0, 4e-3, lean=(0.8, 0.0))
-    down = pressed(path(release(stroke))[1])
-    turned = 2.0 * np.arccos(np.clip(np.abs((down[1:, 3:] * down[:-1, 3:]).sum(1)), 0.0, 1.0))
-    assert 0.5 * motion.TURN * PERIOD < turned.max() <= motion.TURN * PERIOD * (1.0 + 1e-6)
 
 
 def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean() -> None:

@@ -174,13 +174,17 @@ def fit(*said: str, settings: tuple[Setting, ...] = ()) -> list[Range]:
     return fit_ranges([read_range(one) for one in said], find("slow_press"), settings)
 
 
-def test_values_are_as_the_parameter_has_them() -> None:
+def test_a_parameter_is_given_once_with_the_values_it_can_have() -> None:
     rows, stroke = fit("layout.rows=11:15", "valve.stroke=20 um:40 um")
     # Every whole number of a range has an equal share, and stays one in SI.
     words = [rows.find_word(share) for share in (0.0, 0.19, 0.21, 0.5, 0.79, 0.81, 1.0)]
     assert words == ["11", "11", "12", "13", "14", "15", "15"]
     assert repr(rows.convert("12")) == "12"
     assert (stroke.convert("30 um"), stroke.si) == (pytest.approx(30e-6, rel=1e-15), "m")
+    with pytest.raises(ParameterError, match="must be given once"):
+        fit("layout.pitch=1e-3:2e-3", "layout.pitch=2e-3:3e-3")
+    with pytest.raises(ParameterError, match="must not be given to --set as well"):
+        fit("layout.pitch=1e-3:2e-3", settings=(Setting("layout.pitch", "0.003"),))
 
 
 @pytest.mark.parametrize(
@@ -205,13 +209,6 @@ def test_what_is_no_range_of_the_parameter_is_refused_with_key_rule_and_value(sa
     with pytest.raises(DigiclayError) as error:
         fit(said)
     assert str(error.value).startswith(rule)
-
-
-def test_a_parameter_is_given_once() -> None:
-    with pytest.raises(ParameterError, match="must be given once"):
-        fit("layout.pitch=1e-3:2e-3", "layout.pitch=2e-3:3e-3")
-    with pytest.raises(ParameterError, match="must not be given to --set as well"):
-        fit("layout.pitch=1e-3:2e-3", settings=(Setting("layout.pitch", "0.003"),))
 
 
 def test_a_file_that_is_wrong_by_itself_is_told_first(tmp_path: Path) -> None:

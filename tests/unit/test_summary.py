@@ -363,7 +363,7 @@ def test_a_ridge_has_its_height_over_the_path_at_each_pin() -> None:
     np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
 
 
-def test_pins_the_finger_did_not_go_on_from_a_press_without_travel_and_no_rows_do_not_count() -> None:
+def test_pins_the_finger_did_not_go_on_from_no_travel_no_rows_and_what_follows_a_loss_do_not_count() -> None:
     # Of the 21 pins the last four are less than 11 mm before the end of the way.
     final = np.where(LINE > 18.5e-3, 90e-3, 50e-3)
     found = errors(final)
@@ -373,9 +373,6 @@ def test_pins_the_finger_did_not_go_on_from_a_press_without_travel_and_no_rows_d
     still = np.tile(TIP[100], (50, 1))
     assert summary.measure_ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
     assert errors(np.full(21, 50e-3), rows=~ALL).size == 0
-
-
-def test_going_on_after_the_finger_was_lost_does_not_count() -> None:
     # Shaping stops in the middle, and goes on 12 mm later.
     rows = ALL.copy()
     rows[100:140] = False

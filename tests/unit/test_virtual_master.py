@@ -166,19 +166,16 @@ def test_a_fingertip_is_lost_after_the_loss_time(phase: Phase, count: int, after
     assert (memory.phase, memory.losses) == after
 
 
-def test_a_fingertip_that_is_felt_is_shaped_with_also_without_a_loss_time() -> None:
-    method, memory = make_system(Layout(15, 15), control=VirtualMaster(loss_time=0.0)).controller, master()
-    memory, _ = method.locate(memory, touched((0, 0, 0.3)))
-    assert (memory.phase, memory.height > 45e-3) == (Phase.SHAPING, True)
-
-
-def test_a_fingertip_felt_again_in_time_is_not_lost_and_later_is_a_new_one() -> None:
+def test_a_fingertip_felt_in_time_also_without_a_loss_time_is_not_lost_and_later_is_a_new_one() -> None:
     waiting = alone(master(felt=44e-3), 9)
     assert waiting.felt == 44e-3 < waiting.height  # where the fingertip was felt last
     memory, _ = control().locate(waiting, touched((0, 0, 0.4)))
     assert alone(memory, 10).losses == 0
     memory, _ = control().locate(alone(master(), 11), touched((3, 3, 0.1)))
     assert (memory.phase, memory.losses) == (Phase.SPRING, 1)
+    method, memory = make_system(Layout(15, 15), control=VirtualMaster(loss_time=0.0)).controller, master()
+    memory, _ = method.locate(memory, touched((0, 0, 0.3)))
+    assert (memory.phase, memory.height > 45e-3) == (Phase.SHAPING, True)
 
 
 # Cell of the master
@@ -279,12 +276,15 @@ def test_cells_of_the_blister_are_commanded_to_its_profile(profile: str) -> None
     assert orders.target[inside] == pytest.approx(expected, abs=1e-10)
 
 
-def test_targets_stay_within_the_stroke_and_outside_the_blister_as_they_are() -> None:
+def test_targets_stay_within_the_stroke_and_outside_the_blister_whose_next_cells_are_the_edge() -> None:
     outside, seen = np.hypot(BED.x, BED.y) > 15.1e-3, bed()
     seen.target[outside] = 47e-3
     assert np.all(created(master(), seen)[1].target[outside] == 47e-3)
     high = bed()._replace(height=np.full(BED.count, 0.13))
     assert created(master(height=100e-3, edge=130e-3), high)[1].target.max() == 100e-3
+    distance = np.hypot(BED.x - BESIDE["x"], BED.y - BESIDE["y"])
+    ring = (distance > 15e-3) & (distance < 18.5e-3)
+    assert np.array_equal(created(master(**BESIDE), bed())[1].mode == Mode.EDGE, ring)
 
 
 @pytest.mark.parametrize(("phase", "mode"), [(Phase.SHAPING, Mode.FORCE_FOLLOW), (Phase.SPRING, Mode.SPRING)])
@@ -292,12 +292,6 @@ def test_cells_under_the_fingertip_show_the_phase(phase: Phase, mode: Mode) -> N
     seen = bed()
     seen.force[at(0, 0)] = 0.1
     assert created(master(phase=phase), seen)[1].mode[at(0, 0)] == mode
-
-
-def test_cells_just_outside_are_the_edge() -> None:
-    distance = np.hypot(BED.x - BESIDE["x"], BED.y - BESIDE["y"])
-    ring = (distance > 15e-3) & (distance < 18.5e-3)
-    assert np.array_equal(created(master(**BESIDE), bed())[1].mode == Mode.EDGE, ring)
 
 
 @pytest.mark.parametrize(
@@ -314,15 +308,12 @@ def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_sid
     assert len(set(modes)) == 1
 
 
-def test_at_rest_the_edge_height_is_the_mean_of_the_whole_ring() -> None:
+def test_the_edge_height_is_the_mean_of_the_whole_ring_at_rest_and_of_that_ahead_while_moving() -> None:
     seen = bed()
     seen.height[BED.x > 0] += 2e-3
     seen.height[BED.x < 0] -= 1e-3
     ring = np.abs(np.hypot(BED.x - BESIDE["x"], BED.y - BESIDE["y"]) - 16.75e-3) < 1.75e-3
     assert created(master(**BESIDE), seen)[0].edge == pytest.approx(seen.height[ring].mean(), abs=1e-16)
-
-
-def test_while_moving_only_the_ring_ahead_gives_the_edge_height_or_none_leaves_it() -> None:
     seen = bed()
     seen.height[BED.x < -0.1e-3] = 60e-3  # the finished ridge
     assert created(master(1.0, 0.0), seen)[0].edge == pytest.approx(40e-3, abs=1e-16)

@@ -62,12 +62,9 @@ def test_a_client_that_answers_no_ping_is_closed_and_leaves_the_fingertip(monkey
     assert link.counts["poses"] == 2
 
 
-def test_a_client_beyond_the_limit_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_client_beyond_the_limit_is_told_and_one_silent_before_the_token_closed(monkeypatch):
     monkeypatch.setattr(websocket_door, "MOST_CLIENTS", 0)
     assert asyncio.run(connect(make_link(), REQUEST.encode())).startswith(b"HTTP/1.1 503")
-
-
-def test_a_client_that_is_silent_before_the_token_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(websocket_door, "OPENING", 0.1)
     link = make_link()
     assert asyncio.run(connect(link)) == b""

@@ -19,11 +19,13 @@ def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen: Seen, name:
     assert (np.abs(risen - 15.0) < 2.0).mean() >= 0.95
 
 
-def test_ctrl_makes_raise_lower_and_level_fills_a_valley_that_it_crosses(seen: Seen) -> None:
+def test_ctrl_lowers_level_fills_a_valley_the_header_smooths_and_a_click_with_shift_forms_a_line(seen):
     assert (up(seen, "lowered")[12, COLUMNS] < -1.0).mean() >= 0.95
     assert up(seen, "lowered")[12, 12] < -1.0
     # The pin in the middle of the crossing, and its neighbors along the stroke.
     np.testing.assert_allclose(up(seen, "leveled")[10:15, 12], 0.0, rtol=0, atol=1.5)
+    assert up(seen, "by brush")[ABOVE] < 0.4e3 * SPIKE
+    assert up(seen, "line")[4, 3:22].max() < -1.0
 
 
 def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen: Seen) -> None:
@@ -53,8 +55,3 @@ def test_what_is_taken_back_is_as_before(seen: Seen, name: str, before: str, tol
     np.testing.assert_allclose(up(seen, name), up(seen, before), rtol=0, atol=tolerance)
     assert seen[name]["sessions"] == 1
     assert np.abs(up(seen, "inverted") - up(seen, "raised")).max() > 10.0
-
-
-def test_the_brush_of_the_header_smooths_without_shift_and_shift_with_a_click_forms_a_line(seen):
-    assert up(seen, "by brush")[ABOVE] < 0.4e3 * SPIKE
-    assert up(seen, "line")[4, 3:22].max() < -1.0

@@ -154,14 +154,11 @@ def _differ(case: str, difference: Floats) -> dict[str, Any]:
     return {"case": case, "difference": float(np.abs(difference).max())}
 
 
-def test_strokes_are_even_along_their_paths_and_leave_no_spikes() -> None:
+def test_strokes_are_even_leave_no_spikes_and_come_out_alike_where_they_are_drawn_alike() -> None:
     for case in list_reliefs():
         assert case["rms"] <= 0.1e-3, case
         assert case["most"] <= 0.3e-3, case
         assert case["spike"] <= 0.2e-3, case
-
-
-def test_what_is_drawn_alike_comes_out_alike() -> None:
     for case in list_differences():
         # The band of the valves is half a micrometer, on either side.
         assert case["difference"] <= 1.0e-6, case

@@ -68,14 +68,11 @@ def test_a_click_on_an_object_selects_it_and_one_beside_it_presses(seen: Seen, n
     assert seen[name]["bare"] == before + 1
 
 
-def test_pins_that_are_seen_are_pressed_through_xray_and_on_the_way_behind_an_object(seen: Seen) -> None:
+def test_pins_that_are_seen_are_pressed_through_xray_behind_an_object_and_in_each_quarter(seen: Seen) -> None:
     assert seen["xray"]["covered selected"] == []
     assert seen["xray"]["bare"] == seen["camera"]["bare"] + 2
     # 24 mm to either side of the middle, 3 mm a pin; the fingertip presses 4 mm deep.
     assert np.max(seen["drawn under"][4:21]) < 40.0 - 1.0
-
-
-def test_in_a_quad_view_each_quarter_sees_for_itself_and_a_click_says_what_hides_the_bed(seen: Seen) -> None:
     found = seen["quarters"]
     assert (found["count"], found["top covered"], found["top bare"]) == (4, [False], [True])
     assert seen["reported"].count("Cube hides the bed here") == 3  # in three views

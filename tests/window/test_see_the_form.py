@@ -32,10 +32,12 @@ def test_the_bed_is_whole_from_above_too_after_the_view_is_turned(seen: Seen) ->
     assert 0.0 <= bottom < top <= height
 
 
-def test_alt_s_shows_the_skin_and_the_pins_again_and_a_session_the_skin(seen: Seen) -> None:
+def test_alt_s_shows_skin_or_pins_a_session_the_skin_and_a_bed_far_away_is_a_skin(seen: Seen) -> None:
     shown = [seen[name]["form"] for name in ("alt s", "alt s again", "pressed on the skin")]
     assert shown == ["skin", "automatic", "skin"]
     assert seen["pressed on the skin"]["lowest"] < seen["selected"]["lowest"] - 1e-3
+    shown = [seen[name]["skin"] for name in ("near", "between", "far", "between again", "back")]
+    assert shown == [False, False, True, True, False]
 
 
 def test_no_pin_has_an_outline_unless_pins_are_chosen_and_selected(seen: Seen) -> None:
@@ -47,14 +49,11 @@ def test_no_pin_has_an_outline_unless_pins_are_chosen_and_selected(seen: Seen) -
     assert len(selected[0]) == 1
 
 
-def test_the_overlay_does_not_cover_the_bed(seen: Seen) -> None:
+def test_the_overlay_covers_no_bed_with_all_details_beside_an_open_sidebar_either(seen: Seen) -> None:
     left, bottom, right, top = seen["overlay"]
     from_left, from_bottom, to_right, to_top = seen["bed"]
     assert right - left > 100.0
     assert right <= from_left or left >= to_right or top <= from_bottom or bottom >= to_top
-
-
-def test_the_bed_gives_way_to_the_details_of_the_overlay_beside_an_open_sidebar(seen: Seen) -> None:
     assert seen["covered"] == [0, 0]
 
 
@@ -62,8 +61,3 @@ def test_the_text_at_the_cursor_can_be_off_while_its_ring_is_drawn(seen: Seen) -
     shown, off = seen["texts"]
     assert any("Lower" in text for text in shown)
     assert not any(off)
-
-
-def test_a_bed_far_away_is_a_skin_and_between_the_limits_what_it_was(seen: Seen) -> None:
-    shown = [seen[name]["skin"] for name in ("near", "between", "far", "between again", "back")]
-    assert shown == [False, False, True, True, False]

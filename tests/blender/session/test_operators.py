@@ -122,11 +122,8 @@ def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed: Any, monkeypa
     assert running.last_message() == f"The session of Digital Clay ended: {said[0]}"
 
 
-def test_without_a_session_there_is_nothing_to_go_on_with() -> None:
+def test_without_a_session_nothing_goes_on_and_blender_lists_modal_operators() -> None:
     assert not bpy.ops.digiclay.session_go_on.poll()
-
-
-def test_blender_lists_the_modal_operators_of_a_window() -> None:
     # The session looks them up in every version that is supported.
     assert "modal_operators" in bpy.types.Window.bl_rna.properties
 
