@@ -126,6 +126,8 @@ def apply(
     for thing in moving:
         thing.animation_data_clear()
         thing.rotation_mode = "QUATERNION"
+        for constraint in thing.constraints:
+            constraint.mute = True
     for row, poses in enumerate(moments.pose if tips else ()):
         bridge.place_fingertips(bed, poses, fingers, numbers)
         for thing in moving:

@@ -314,6 +314,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     np.testing.assert_array_equal(exact(pair), formed)
     bpy.ops.digiclay.take_export(filepath=str(tmp_path / "pair.toml"))
     assert len(load(tmp_path / "pair.toml").fingers) == 2
+    fingertips_of(pair)[2].constraints.new("COPY_LOCATION").target = pair  # that leads it elsewhere now
     assert bpy.ops.digiclay.bake(source="TAKE") == {"FINISHED"}
     take = takes.read(pair)
     bpy.context.scene.frame_set(20)
