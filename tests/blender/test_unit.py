@@ -168,6 +168,19 @@ def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_se
     np.testing.assert_array_equal(bridge.pose(fingertip_of(bed)), at)
 
 
+@pytest.mark.parametrize("hung", [False, True], ids=["on its bed", "on nothing"])
+def test_a_copy_of_a_bed_has_a_fingertip_though_the_first_one_was_deleted(hung):
+    bed = added()
+    if hung:
+        select(fingertip_of(bed))
+        bpy.ops.object.parent_clear(type="CLEAR_KEEP_TRANSFORM")
+        done("Clear Parent")
+    delete(fingertip_of(bed))
+    copy = duplicate(bed)
+    assert fingertip_of(bed) is None
+    assert fingertip_of(copy).parent == copy
+
+
 def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state():
     bed, clock = added(), Clock()
     started(bed)

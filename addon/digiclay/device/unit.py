@@ -288,7 +288,7 @@ def _duplicate(thing: Any, parent: Any, owner: Any) -> Any:
     made.parent = parent
     if thing.parent is None or ROLE not in thing.parent:  # it stands on its bed as the other one on its own
         made.matrix_parent_inverse.identity()
-        home: Any = owner_of(thing)
+        home: Any = owner_of(thing) or parent
         made.matrix_basis = home.matrix_world.inverted() @ thing.matrix_world
     for collection in owner.users_collection:
         collection.objects.link(made)
