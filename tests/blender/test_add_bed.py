@@ -72,9 +72,11 @@ def test_a_preset_of_the_user_s_own_is_taken_and_another_method_brings_its_own_g
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 9), (6, 6)])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
 def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows, columns, method):
-    scene = make_scene("paper", Layout(rows=rows, columns=columns), method)
-    assert scene.blister.radius <= max(rows, columns) * 3e-3 / 2 * (1 + 1e-9)
-    assert scene.blister.flat_radius < scene.blister.radius < scene.blister.edge_radius
+    bed = add(rows=rows, columns=columns, method="elastic")
+    bed.digiclay.chosen_method = method
+    for scene in (make_scene("paper", Layout(rows=rows, columns=columns), method), properties.scene_of(bed)):
+        assert scene.blister.radius <= max(rows, columns) * 3e-3 / 2 * (1 + 1e-9)
+        assert scene.blister.flat_radius < scene.blister.radius < scene.blister.edge_radius
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 2.5])
@@ -92,7 +94,8 @@ def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale)
 
 @pytest.mark.parametrize("name", BEDS)
 def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name):
-    scene, wanted = properties.scene_of(add(bed=name)), BEDS[name]
+    bed = add(bed=name)
+    scene, wanted = properties.scene_of(bed), BEDS[name]
     assert (scene.layout.rows, scene.layout.columns) == (wanted.rows, wanted.columns)
     assert scene.layout.pitch == pytest.approx(wanted.pitch, rel=1e-12)
     paper = resolve({})
@@ -102,6 +105,9 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name):
     assert [size / of_paper for size, of_paper in sizes] == pytest.approx([wanted.share] * 2, rel=1e-9)
     assert scene.actuator.bore <= scene.layout.pitch
     assert (scene.preset, scene.method) == (wanted.preset, wanted.method)
+    bed.digiclay.chosen_method = "cell_states"  # another method's blister is in proportion too
+    other, usual = properties.scene_of(bed).blister, resolve({"control": {"method": "cell_states"}}).blister
+    assert other.radius == pytest.approx(wanted.share * usual.radius, rel=1e-6)  # 32 bits
 
 
 def test_beds_for_a_person_are_made_for_hands_and_one_that_a_script_does_not_name_is_the_paper_s():

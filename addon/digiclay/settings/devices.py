@@ -238,6 +238,13 @@ def _poses(bed: Any) -> Any | None:
         return None
 
 
+def suit_blister(settings: Any) -> None:
+    """Have the blister of a method, made for the paper's fingertip, suit that of a bed, and the bed."""
+    finger = read_finger(find_first(settings.id_data))
+    settings.blister_suits = 0.0
+    _scale_blister(settings, Fingertip() if settings.blister_follows else finger, finger)
+
+
 def _scale_blister(settings: Any, before: Fingertip, after: Fingertip) -> None:
     """Scale the blister with the width of the fingertip, no wider than the bed."""
     # One that the bed has limited remembers the width of the fingertip that it suits, so that a palm and then

@@ -101,6 +101,7 @@ def take_blister(settings: Any, context: Any) -> None:
     if values is not None:
         kind = import_parameters("blister", "")
         fill(settings.blister, kind, list_quantities(kind), values)
+        devices.suit_blister(settings)
 
 
 def take_arrangement(layout: Any, context: Any) -> None:
