@@ -14,6 +14,7 @@ from digiclay.core.session.take import Take, from_bytes, make_take, play, to_byt
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import Running
 from digiclay.settings.devices import make_scene
+from digiclay.strokes.nominal import find_nominal
 from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, Image, lay_path, make_images
 
 from tests.hand import finish, heights
@@ -117,6 +118,7 @@ def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(metho
 ONE, LOWER, RAISE = "virtual_master", Brush.LOWER, Brush.RAISE
 X, TURNED_X = make_images("X"), make_images("X", center=(0.7e-3, -0.4e-3), angle=0.4)
 STEEP = line((-7.7, -6.4), (7.7, 6.4))
+RAYS = make_images("RADIAL", 12, (1.1e-3, -0.7e-3))
 #: As a hand draws along an axis: up to 1.4 mm beside it.
 WAVE = np.column_stack([0.9 + 0.5 * np.sin(np.linspace(0, 9, 30)), np.linspace(-9, 9, 30)])
 
@@ -157,8 +159,15 @@ MEETING = {
     "from another axis, turned": (ONE, LOWER, line((9, 6), (1, -8)), TURNED_X, 1.4),
     "across the axis both go on": (ONE, LOWER, line((-18, -9), (18, 9)), X, 1.15),
     "across the axis, raised": (ONE, RAISE, STEEP, X, 1.15),
-    "from the axis one follows": ("hybrid", RAISE, line((0, -9), (18, 9)), X, 1.6),
-    "rays follow each other": ("hybrid", RAISE, line((0, 0), (18, 4)), make_images("RADIAL", 4), 3.0),
+    "from the axis one begins at its end": ("hybrid", RAISE, line((0, -9), (18, 9)), X, 1.15),
+    "all rays from the middle but one do": (
+        "hybrid",
+        RAISE,
+        line((0, 0), (18, 4)),
+        make_images("RADIAL", 4),
+        1.15,
+    ),
+    "so with Method I, about another place": (ONE, LOWER, line((2, 1), (18, -6)), RAYS, 1.15),
     "rays towards the middle": (ONE, LOWER, line((12, 1), (1, 0)), make_images("RADIAL", 6), 1.2),
     "lines that pass each other": (ONE, LOWER, line((-10, 1), (10, 1)), make_images("RADIAL", 3), 1.3),
     "many": ("hybrid", RAISE, line((24, 0), (24, 1)), make_images("RADIAL", 24), 1.1),
@@ -203,10 +212,24 @@ def test_no_fingertip_lifts_again_for_another_one_that_is_down() -> None:
 
 
 def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick() -> None:
-    path, images = line((-10, 1), (10, 1)), make_images("RADIAL", 3)
-    *_, one = follow_to_the_end(queue(begin(), path, images), 1)
-    *_, other = follow_to_the_end(queue(begin(), path, images), 16)
-    np.testing.assert_array_equal(one, other)
+    for path, images in ((line((-10, 1), (10, 1)), make_images("RADIAL", 3)), (line((2, 1), (18, -6)), RAYS)):
+        *_, one = follow_to_the_end(queue(begin(), path, images), 1)
+        *_, other = follow_to_the_end(queue(begin(), path, images), 16)
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("drawn", [0, 12, 29])
+def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn: int) -> None:
+    path = line((2, 1), (18, -6))
+    session = queue(begin("hybrid"), path[: drawn + 1], RAYS, RAISE, held=True)
+    for _ in range(40):  # as far as the hand has drawn
+        session = sculpting.follow_finger(session, session.poses, 8)
+    session = sculpting.change_stroke(session, 1, partial(lay_path, points=1e-3 * path))
+    laid = session.strokes[0]
+    session, force, _ = follow_to_the_end(session)
+    assert force < 0.6
+    nominal = find_nominal(laid, sculpting.find_device(session), np.full(COUNT**2, 40e-3))
+    np.testing.assert_allclose(heights(session), nominal.height, rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize("fingers", [1, 10])

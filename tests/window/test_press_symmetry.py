@@ -45,6 +45,8 @@ def test_twelve_images_on_a_large_bed_take_the_periods_of_one(seen: Seen) -> Non
     # While the hand is slower than the fingertip, the session waits for it.
     for name, alone in (("2", "1"), ("6", "1"), ("12", "1"), ("2 beside", "1 beside")):
         assert seen["timed"][name][0] <= 1.15 * seen["timed"][alone][0] + 16
+    # Those that begin at their ends do so when the hand lets go, at 1.6 times that of one if it is slow.
+    assert seen["timed"]["12 rays"][0] <= 1.6 * seen["timed"]["1 ray"][0]
 
 
 def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_one(seen: Seen) -> None:

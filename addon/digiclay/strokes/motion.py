@@ -8,7 +8,8 @@ draw the fingertip after them. No Blender in here.
 
 Each image of a path has a fingertip, as far as there are any, and all go at once, side by side as well. None
 comes down where a method would take it for another one: the one of the later image lifts, and waits above
-until the other one is away; where images coincide, or nearly so all along, one of them is gone along.
+until the other one is away, or the hand lets go: then it goes along from the end, if it is free there. The
+valves leave the same surface either way. Where images coincide, or nearly so all along, one is gone along.
 
 A brush that raises presses until the blister starts, and rises to its height there. Every brush then goes
 along at its height, up and down over what is formed.
@@ -74,6 +75,8 @@ UNEVEN = 0.5e-3
 #: so near to what another one goes along, it leaves that to the valves; so near, in pitches, it is the same.
 #: Where two meet none lifts: beside the blister of another one pins then run away upwards.
 APART, MERGED, SAME = 1.0, 0.6, 0.5
+#: Brushes of which each place of a path leaves the same, whichever way it is gone along.
+BOTH_WAYS = (Brush.LOWER, Brush.RAISE)
 #: Phases in which it touches, or is about to.
 DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
 
@@ -242,7 +245,8 @@ def _follow_once(
     busy = [next((part for part in parts[first::count] if not part.left), None) for first in range(count)]
     at = {part.image: poses[part.image % count] for part in busy if part}
     for image, pose in sorted(at.items()):
-        part = alter(parts[image], samples=stroke.samples, held=stroke.held)
+        samples = stroke.samples[::-1] if parts[image].backward else stroke.samples
+        part = alter(parts[image], samples=samples, held=stroke.held)
         # One that waits lets pass whoever is down: none has to lift again from the clay.
         others = parts if part.phase == YIELDING else parts[:image]
         down = [at[one.image] for one in others if one.image in at and one.phase in DOWN]
@@ -264,14 +268,22 @@ def _yield(
 ) -> Stroke:
     """Return the stroke along an image, lifted where an earlier one is too near, of fingertips that are down.
 
-    Above, it comes as far along its path as it coincides with what an earlier one has gone along.
+    Above, it comes as far along its path as it coincides with what an earlier one has gone along. One that
+    still waits when the hand has let go begins at the end of its path, if it is free there.
     """
+    earlier = [other for other in earlier if other.backward == part.backward]
     least = APART * max(device.finger.length, device.finger.width)
     near = any(math.dist(pose[:2], other[:2]) < least for other in down)
     if near and part.phase == PRESSING:
         return replace(part, phase=YIELDING, standing=None, climb=0.0, pace=0.0)
     if part.phase != YIELDING or pose[2] < find_safe(part, device, now) - NEAR:
         return part
+
+    fixed = part.held or part.backward or part.accumulate or part.brush not in BOTH_WAYS
+    if near and part.tracking and not fixed:
+        taken = [*(other[:2].tolist() for other in down), *(other.place(-1) for other in earlier)]
+        if all(math.dist(part.place(-1), place) >= least for place in taken):
+            return replace(part, samples=part.samples[::-1], reached=0, backward=True, phase=ABOVE)
 
     def is_same(other: Stroke, index: int, apart: float = SAME * device.grid.layout.pitch) -> bool:
         return math.dist(part.place(index), other.place(index)) < apart

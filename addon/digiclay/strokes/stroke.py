@@ -167,6 +167,8 @@ class Stroke:
     held: bool = True
     #: The stroke along each image alone, while fingertips go along several at once.
     parts: tuple[Stroke, ...] = ()
+    #: Whether this image is gone along from the end of the path: near its beginning there was another one.
+    backward: bool = False
     #: What the fingertip does.
     phase: int = WAITING
     #: Index of the image that the fingertip is at, and of the sample it is at, or past.
@@ -208,11 +210,11 @@ class Stroke:
     def ahead(self) -> tuple[Floats, ...]:
         """Places fingertips have yet to come to, (k, 2), m: along each image that is not finished."""
         path = [(sample.x, sample.y) for sample in self.samples]
-        left = {part.image: part.reached for part in self.parts if not part.left}
-        left = left or {self.image: self.reached, **dict.fromkeys(range(self.image + 1, len(self.images)), 0)}
+        left = {part.image: (part.reached, part.backward) for part in self.parts if not part.left}
+        later = dict.fromkeys(range(self.image + 1, len(self.images)), (0, False))
         return tuple(
-            np.array([self.images[image].place(*place) for place in path[reached:]])
-            for image, reached in left.items()
+            np.array([self.images[image].place(*place) for place in path[:: -1 if backward else 1][reached:]])
+            for image, (reached, backward) in (left or {self.image: (self.reached, False), **later}).items()
         )
 
     @property
