@@ -94,15 +94,12 @@ def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(step
         stiff.replayed(EASY, stepper, 20e-3, 20e-3)
 
 
-def test_the_cases_reach_what_they_are_there_for() -> None:
+def test_the_cases_reach_what_they_are_for_and_a_pin_on_an_end_stop_is_as_exact_as_any() -> None:
     assert [name for name in CASES if not np.abs(stiff.commands_of(name)).max() > 0.0] == []
     # e^(m x) = 1e12 is a force of f_d b/m 1e12 = 4e10 N on a pin.
     deep = "press to e^(m x) = 1e12"
     assert stiff.largest_force(deep) > 0.34 * 250.0 / 2000.0 * 1e12
     assert 1e-9 < np.abs(stiff.commands_of("openings of 1e-9")).max() < 1e-7
-
-
-def test_a_pin_pressed_onto_an_end_stop_is_integrated_as_exactly_as_any() -> None:
     # 0.9 µm at 1 ms, as in the easy case; 44 µm where the mean force is that of a pin that goes on.
     name = "all at the lower end stop"
     exact = stiff.replayed(name, "runge_kutta_4", 1e-4, stiff.PERIOD)

@@ -70,12 +70,18 @@ def test_what_the_zip_leaves_out_exists_and_no_module_of_it_imports_that_at_once
     assert [name for name, text in modules() if at_once.search(text)] == []
 
 
-def test_the_manifest_has_texts_tags_and_a_website_that_the_platform_takes() -> None:
+def test_the_manifest_has_what_the_platform_takes_and_every_copyright_a_year_and_a_name() -> None:
     texts = [MANIFEST["tagline"], *MANIFEST["permissions"].values()]
     assert [text for text in texts if not is_short(text)] == []
     assert "Blender" not in MANIFEST["name"]
     assert {"Sculpt", "Physics"} <= set(MANIFEST["tags"]) <= TAGS
     assert MANIFEST["website"] == f"https://extensions.blender.org/add-ons/{MANIFEST['id']}/"
+    lines = MANIFEST["copyright"]
+    assert [line for line in lines if not re.fullmatch(r"\d{4}(-\d{4})? \S.*", line)] == []
+    # The bundled wheel is of others: the platform asks that they are named.
+    bundled = (ROOT / "requirements" / "extension.txt").read_text(encoding="utf-8")
+    assert re.findall(r"^([\w-]+)==", bundled, re.MULTILINE) == ["trimesh"]
+    assert any("Michael Dawson-Haggerty" in line for line in lines)
 
 
 def test_every_license_has_its_text_and_manifest_package_and_samples_name_the_same() -> None:
@@ -90,15 +96,6 @@ def test_every_license_has_its_text_and_manifest_package_and_samples_name_the_sa
     pages = [PACKAGE / "sample_shapes" / name / "README.md" for name in ("", "shapes", "sessions")]
     assert all("CC0-1.0" in page.read_text(encoding="utf-8") for page in pages)
     assert not any("License:\nGPL" in page.read_text(encoding="utf-8") for page in pages)
-
-
-def test_every_holder_of_a_copyright_has_a_year_and_a_name() -> None:
-    lines = MANIFEST["copyright"]
-    assert [line for line in lines if not re.fullmatch(r"\d{4}(-\d{4})? \S.*", line)] == []
-    # The bundled wheel is of others: the platform asks that they are named.
-    bundled = (ROOT / "requirements" / "extension.txt").read_text(encoding="utf-8")
-    assert re.findall(r"^([\w-]+)==", bundled, re.MULTILINE) == ["trimesh"]
-    assert any("Michael Dawson-Haggerty" in line for line in lines)
 
 
 def find_refused(text: str) -> set[str]:

@@ -159,15 +159,12 @@ def test_every_metric_of_a_ridge_is_that_of_the_run_alone() -> None:
         assert None not in (found.metrics[name] for name in METRICS)
 
 
-def test_pins_pressed_onto_their_end_stops_come_to_what_they_come_to_alone() -> None:
+def test_pins_on_end_stops_and_relaxed_pulp_come_to_what_they_come_to_alone() -> None:
     method = ("control.method=elastic", "control.stiffness=5")
     low = [sample("tap", f"actuator.rest_height={rest}", *method) for rest in ("1e-3", "1.5e-3")]
     for found in assert_all_as_alone([moved(one, 0.0, -40e-3) for one in low], errors=True):
         pressed = found.history["force"] > 0.0
         assert found.history["height"][pressed].min() == 0.0
-
-
-def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
     points = tuple(
         Waypoint(time=time, position=(0.0, 0.0, z))
         for time, z in ((0.0, 41e-3), (0.2, 38e-3), (0.3, 60e-3), (0.5, 60e-3), (0.7, 38e-3), (0.9, 60e-3))

@@ -161,7 +161,7 @@ def queue_smooth(
     return let_go(session, number)
 
 
-def test_a_smooth_stroke_takes_down_a_spike_without_a_touch_from_close_above_the_pins():
+def test_a_smooth_stroke_takes_down_a_spike_from_above_and_a_short_one_waits_for_its_pins():
     session, above = queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0)), []
     while session.strokes:
         session = go_on(session, 1)
@@ -171,9 +171,6 @@ def test_a_smooth_stroke_takes_down_a_spike_without_a_touch_from_close_above_the
     assert 0.0 < min(above) < SPIKE
     weaker = finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0), 0.1))
     assert risen(session, 0.0, 0.0) + 1e-3 < risen(weaker, 0.0, 0.0) < SPIKE - 1e-3
-
-
-def test_a_short_stroke_waits_for_its_pins():
     session, number = queue_stroke(spiked((0.0, 0.0)), 0.0, 0.0, 4e-3, brush=Brush.SMOOTH)
     session = change_stroke(session, number, lambda one: replace(draw(one, 0.0, 0.0, 4e-3), held=False))
     done = finish(session)

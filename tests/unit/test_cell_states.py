@@ -90,11 +90,17 @@ def test_only_critical_cells_count_their_periods_and_giving_up_the_last_one_or_a
     assert CONTROL.locate(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))[0].losses == 1
 
 
-def test_the_blister_stands_a_rise_above_its_following_cells_and_falls_off_to_the_edge():
+def test_the_blister_falls_off_to_the_edge_and_a_cell_behind_the_finger_is_frozen():
     target = ordered(seen({MIDDLE: 0.1}))[1].target
     assert target[MIDDLE + 1] == pytest.approx(REST + 1e-3, abs=1e-12)
     # 9 mm from the cell: a third of the way down the cone from 3 to 12 mm is left.
     assert target[MIDDLE + 3] == pytest.approx(REST + 1e-3 / 3.0, abs=1e-9)
+    modes = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE - 3: Mode.BLISTER}
+    measured = seen({MIDDLE: 0.04}, modes)
+    measured.target[MIDDLE - 3] = 47e-3
+    memory, _ = CONTROL.locate(Patch(x=-2e-3, heading=Heading(-2e-3), felt=True), measured)
+    _, orders = CONTROL.command(memory, measured)
+    assert (orders.mode[MIDDLE - 3], orders.target[MIDDLE - 3]) == (Mode.FROZEN, 47e-3)
 
 
 @pytest.mark.parametrize(("low", "expected"), [(1e-3, 0.0), (99.5e-3, 0.1)])
@@ -105,15 +111,6 @@ def test_the_blister_stays_within_the_stroke(low, expected):
     measured.height[MIDDLE] = 0.1 + 5e-3 if expected else -5e-3
     target = CONTROL.command(Patch(felt=True, edge=low), measured)[1].target
     assert target[MIDDLE + 1] == expected
-
-
-def test_a_cell_behind_a_traveling_finger_is_frozen_at_its_command():
-    modes = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE - 3: Mode.BLISTER}
-    measured = seen({MIDDLE: 0.04}, modes)
-    measured.target[MIDDLE - 3] = 47e-3
-    memory, _ = CONTROL.locate(Patch(x=-2e-3, heading=Heading(-2e-3), felt=True), measured)
-    _, orders = CONTROL.command(memory, measured)
-    assert (orders.mode[MIDDLE - 3], orders.target[MIDDLE - 3]) == (Mode.FROZEN, 47e-3)
 
 
 @pytest.mark.parametrize("toward", [(1.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (0.6, 0.8)])

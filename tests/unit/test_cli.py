@@ -144,7 +144,7 @@ def test_export_writes_the_surface_of_a_run_in_a_unit_at_an_instant_and_refuses_
     refused(["export", "my"], "cannot be read as a run's history")
 
 
-def test_describe_tells_what_is_left_out_and_counts_cells_periods_and_bytes(capsys):
+def test_describe_counts_cells_periods_and_bytes_and_lists_every_parameter_with_its_meaning(capsys):
     main(["describe", "my.toml", "--set", "conduit=absent"])
     out = capsys.readouterr().out
     lines = [line.split() for line in out.splitlines()]
@@ -152,6 +152,12 @@ def test_describe_tells_what_is_left_out_and_counts_cells_periods_and_bytes(caps
     # Height, three filters, the valve, two commands on their way, target, force: 9 float64.
     counts = ("3 x 4 = 12 cells", "20 control periods", "9 rows", "72 bytes")
     assert [part for part in counts if part not in out] == []
+    assert main(["describe", "tap", "--parameters", "--set", "layout.pitch=3.5 mm"]) == 0
+    text = capsys.readouterr().out
+    parts = {"layout": Layout, "actuator": Actuator, "control": VirtualMaster}
+    names = [f"{section}.{name} = " for section, part in parts.items() for name in list_quantities(part)]
+    assert [name for name in names if name not in text] == []
+    assert "layout.pitch = 0.0035 m\n    distance of neighboring cells in a row; above 0; P\n" in text
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["describe"], ["export"], ["render"], ["paper"]])
@@ -354,12 +360,3 @@ def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide
     said = described(capsys, "supply.low=0")
     assert ", 0 mm/s down" in said["free speed"]
     assert "floor: never" in said["refill"]
-
-
-def test_every_parameter_is_listed_with_its_value_and_meaning(capsys):
-    assert main(["describe", "tap", "--parameters", "--set", "layout.pitch=3.5 mm"]) == 0
-    text = capsys.readouterr().out
-    parts = {"layout": Layout, "actuator": Actuator, "control": VirtualMaster}
-    names = [f"{section}.{name} = " for section, part in parts.items() for name in list_quantities(part)]
-    assert [name for name in names if name not in text] == []
-    assert "layout.pitch = 0.0035 m\n    distance of neighboring cells in a row; above 0; P\n" in text

@@ -267,7 +267,7 @@ def test_every_vertex_knows_height_force_and_mode_and_the_base_that_it_belongs_t
             np.testing.assert_array_equal(mode == NO_PIN, height == height.min())
 
 
-def test_all_of_a_pins_top_has_the_values_of_that_pin():
+def test_all_of_a_pins_top_has_its_values_and_a_skin_of_too_many_points_is_refused():
     place, steps = uneven().position, np.random.default_rng(4).permutation(168)
     (body,) = make_bodies(Formed.of(place, 0.04 + 1e-4 * steps, 0.04, steps / 100.0, 0), Model(kind="pins"))
     over = body.values["mode"] != NO_PIN
@@ -275,6 +275,10 @@ def test_all_of_a_pins_top_has_the_values_of_that_pin():
     # Each height is that of one pin, and its force is a hundredth of the steps it is up.
     up = np.rint((body.vertices[over, 2] - 0.04) / 1e-4)
     np.testing.assert_allclose(body.values["force"][over], up / 100.0, rtol=0.0, atol=1e-12)
+    place = make_grid(Layout(rows=400, columns=400)).positions
+    bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
+    with pytest.raises(ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"):
+        make_bodies(bed, Model(resolution=40))
 
 
 @pytest.mark.parametrize(("kind", "parts"), [("surface", 1), ("solid", 3), ("pins", 1)])
@@ -288,13 +292,6 @@ def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
         mine = middle[body.group == number]
         assert len(mine) > 20
         assert np.linalg.norm(mine[:, :2] - (x, 0.0), axis=1).max() < 12e-3
-
-
-def test_a_skin_of_too_many_points_is_refused_before_it_is_made():
-    place = make_grid(Layout(rows=400, columns=400)).positions
-    bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
-    with pytest.raises(ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"):
-        make_bodies(bed, Model(resolution=40))
 
 
 @pytest.mark.parametrize(

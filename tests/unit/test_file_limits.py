@@ -82,10 +82,17 @@ def test_a_text_without_an_end_is_not_gone_over_again_and_again(tmp_path, quote)
     assert refused(lambda: read_table(tmp_path / "my.toml"))
 
 
-def test_a_scene_file_beyond_all_sizes_is_not_read(tmp_path):
+def test_a_scene_or_array_beyond_all_sizes_or_for_another_bed_is_not_read(tmp_path):
     with (tmp_path / "hole.toml").open("wb") as file:
         file.truncate(LARGEST + 1)  # takes no room on the disk
     assert "hole.toml must have at most 128 MB (got 128 MB)." in refused(lambda: load(tmp_path / "hole.toml"))
+    many = np.broadcast_to(np.float32(0.0), (20_000, 20_000))
+    with pytest.raises(ParameterError, match=r"at most 128 million heights .got x.npy: 20000 x 20000"):
+        make_height_map("x.npy", many)
+    np.save(tmp_path / "large.npy", np.zeros((1000, 1000)))
+    bed = make_grid(Layout(2, 2, 3e-3))
+    path = str(tmp_path / "large.npy")
+    assert "2 x 2 cells" in refused(lambda: read_values("shape", path, bed, 0.0, 1.0, "m"))
 
 
 def history(folder: Path, **arrays: np.ndarray) -> Path:
@@ -207,13 +214,3 @@ def test_an_array_that_promises_more_than_there_is_is_refused(tmp_path, content)
     assert "heights.npy" in refused(lambda: read_shape(Shape(file=str(path))))
     bed = make_grid(Layout(2, 2, 3e-3))
     assert "heights.npy" in refused(lambda: read_values("shape", str(path), bed, 0.0, 1.0, "m"))
-
-
-def test_an_array_of_too_many_heights_or_for_another_bed_is_not_read(tmp_path):
-    many = np.broadcast_to(np.float32(0.0), (20_000, 20_000))
-    with pytest.raises(ParameterError, match=r"at most 128 million heights .got x.npy: 20000 x 20000"):
-        make_height_map("x.npy", many)
-    np.save(tmp_path / "large.npy", np.zeros((1000, 1000)))
-    bed = make_grid(Layout(2, 2, 3e-3))
-    path = str(tmp_path / "large.npy")
-    assert "2 x 2 cells" in refused(lambda: read_values("shape", path, bed, 0.0, 1.0, "m"))

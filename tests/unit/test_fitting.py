@@ -84,13 +84,20 @@ def test_the_relief_goes_from_the_foot_over_the_rise_to_the_strokes_end_or_is_tr
     assert cells.too_low + cells.too_high == 0
 
 
-def test_placed_a_shape_stands_where_its_coordinates_say():
+def test_placed_a_shape_stands_where_it_says_and_heights_of_a_scene_as_they_are():
     solid = trimesh.creation.box((12.5, 12.5, 10.0))
     solid.apply_translation((9.0, -6.0, 48.0))
     raised = table(laid(mesh(solid), fit="placed"))
     assert set(np.unique(raised).tolist()) == {0.0, 13.0}  # its top is at 53 mm, the bed at 40 mm
     row, column = np.nonzero(raised)
     assert (row.min(), row.max(), column.min(), column.max()) == (2, 6, 13, 17)
+    heights = np.linspace(-1e-3, 0.11, BED.count)
+    # 32 bits: half of 2^-24 of 0.1 m at most.
+    assert np.abs(unpack(pack(heights), BED) - heights).max() <= 4e-9
+    cells = fit_given(Shape(file="Suzanne", heights=pack(heights)), BED, Actuator())
+    assert np.abs(cells.heights - np.clip(heights, 0.0, STROKE)).max() <= 4e-9
+    assert cells.too_low == np.count_nonzero(heights < -1e-9) > 0
+    assert cells.describe().startswith("Suzanne: heights from 0.0 to 100.0 mm")
 
 
 def test_what_leaves_the_stroke_is_clipped_and_counted_and_overhangs_are_told():
@@ -148,16 +155,6 @@ BESIDE = (
 def test_what_cannot_be_laid_onto_the_bed_is_refused(what, known, said):
     with pytest.raises(ParameterError, match=re.escape(said)):
         laid(what, **known)
-
-
-def test_heights_in_a_scene_come_out_as_they_went_in_and_are_displayed_as_they_are():
-    heights = np.linspace(-1e-3, 0.11, BED.count)
-    # 32 bits: half of 2^-24 of 0.1 m at most.
-    assert np.abs(unpack(pack(heights), BED) - heights).max() <= 4e-9
-    cells = fit_given(Shape(file="Suzanne", heights=pack(heights)), BED, Actuator())
-    assert np.abs(cells.heights - np.clip(heights, 0.0, STROKE)).max() <= 4e-9
-    assert cells.too_low == np.count_nonzero(heights < -1e-9) > 0
-    assert cells.describe().startswith("Suzanne: heights from 0.0 to 100.0 mm")
 
 
 @pytest.mark.parametrize(

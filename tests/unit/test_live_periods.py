@@ -171,7 +171,7 @@ def test_a_recording_keeps_each_surface_once_under_its_own_number_and_drops_what
     assert (again.orders.rows[-1, 0], len(again.surfaces)) == (1.0, 2)
 
 
-def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it_along():
+def test_a_trace_has_no_more_than_its_rows_goes_back_with_time_and_has_each_cells_set_point():
     trace, line = recent_trace.start(PERIOD), [0.0] * 8
     for time in range(5 * ROWS):
         trace = recent_trace.extend(trace, [[float(time), *line]])
@@ -179,6 +179,14 @@ def test_a_trace_never_holds_more_than_its_rows_and_time_that_goes_back_takes_it
     assert recent_trace.start(1e-4).every * 1e-4 * ROWS >= 10.0  # seconds
     trace = recent_trace.extend(recent_trace.start(PERIOD), [[float(time), *line] for time in range(10)])
     assert recent_trace.extend(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
+    *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
+    held, asked = state.active, SetPoint(0.04, per_cell=True)
+    held.mode[:] = Mode.REST
+    assert np.isnan(recent_trace.sample(SYSTEM, state, None, ())[2])
+    assert np.isnan(recent_trace.sample(SYSTEM, state, asked, ())[2])
+    held.mode[:3] = Mode.FORCE_FOLLOW
+    assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding
 
 
 def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays_picked_its_past():
@@ -197,17 +205,6 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays
     assert other.pins == (9, corner)
     assert np.isnan(other.heights[0, 0])
     assert other.heights[0, 1] == trace.heights[0, 1]
-
-
-def test_a_set_point_of_each_cell_is_traced_as_their_number_changes():
-    press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
-    *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
-    held, asked = state.active, SetPoint(0.04, per_cell=True)
-    held.mode[:] = Mode.REST
-    assert np.isnan(recent_trace.sample(SYSTEM, state, None, ())[2])
-    assert np.isnan(recent_trace.sample(SYSTEM, state, asked, ())[2])
-    held.mode[:3] = Mode.FORCE_FOLLOW
-    assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding
 
 
 def watched(scene: Scene, finger: Floats) -> tuple[State, list[Errors]]:

@@ -94,7 +94,7 @@ def test_an_obj_that_makes_no_sense_is_refused(tmp_path, text, said):
         read(obj(tmp_path, text))
 
 
-def test_the_materials_of_an_obj_and_the_picture_of_a_ply_are_not_opened(tmp_path):
+def test_bytes_beside_a_gltf_are_read_and_materials_and_pictures_are_not_opened(tmp_path):
     # A pipe that has no writer: reading it would wait for ever.
     os.mkfifo(tmp_path / "pipe")
     text = "mtllib pipe ../../../dev/zero\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -103,6 +103,10 @@ def test_the_materials_of_an_obj_and_the_picture_of_a_ply_are_not_opened(tmp_pat
     head = b"comment TextureFile pipe\nelement vertex"
     path.write_bytes(path.read_bytes().replace(b"element vertex", head))
     assert len(read(path).faces) == 320
+    (tmp_path / "a folder").mkdir()
+    path = gltf(tmp_path, with_uri("a%20folder/bytes.bin"))
+    (tmp_path / "bytes.bin").rename(tmp_path / "a folder" / "bytes.bin")
+    np.testing.assert_array_equal(read(path).vertices, PLACES)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -224,13 +228,6 @@ def test_strips_and_fans_are_cut_into_triangles(tmp_path, mode, corners):
 
     wanted = {5: [[0, 1, 2], [1, 3, 2], [2, 3, 0]], 6: [[0, 1, 2], [0, 2, 3]]}[mode]
     np.testing.assert_array_equal(read(gltf(tmp_path, change)).faces, wanted)
-
-
-def test_bytes_in_a_folder_beside_the_gltf_are_read(tmp_path):
-    (tmp_path / "a folder").mkdir()
-    path = gltf(tmp_path, with_uri("a%20folder/bytes.bin"))
-    (tmp_path / "bytes.bin").rename(tmp_path / "a folder" / "bytes.bin")
-    np.testing.assert_array_equal(read(path).vertices, PLACES)
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period, swi
     assert limit.fall * (1.0 + 1e-9) <= speed.min() < 0.45 * limit.fall
 
 
-def test_pins_are_in_the_mode_blister_until_they_have_arrived_and_then_hold_or_rest() -> None:
+def test_pins_are_in_the_mode_blister_until_they_arrive_and_are_driven_home_by_the_method() -> None:
     system = bed(method="absent")
     rest = system.cell.actuator.rest_height
     state = heighten(system, np.where(system.grid.x < 0.0, 4e-3, 0.0))
@@ -92,6 +92,14 @@ def test_pins_are_in_the_mode_blister_until_they_have_arrived_and_then_hold_or_r
     *_, state = simulate_path(system, state, stay_away(60), make_orders(0, 0.0, 0.0, 0.0, RADIUS))
     formed = np.abs(state.row(system.rows.target) - rest) > BAND
     np.testing.assert_array_equal(state.mode(), np.where(formed, Mode.HOLD, Mode.REST))
+    system = bed()
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    *_, state = simulate_path(system, state, stay_away(5), make_orders(5, 0.0, 0.0, 0.0, RADIUS, 0))
+    target = state.row(system.rows.target)
+    assert np.abs(state.row(0) - target).max() > 1e-3
+    *_, state = simulate_path(system, state, stay_away(300))
+    # Method I comes to a height like 1/t.
+    assert np.abs(state.row(0) - target).max() < 0.2e-3
 
 
 def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
@@ -127,17 +135,6 @@ def test_every_method_lets_its_pins_be_smoothed_and_keeps_them_if_it_keeps_heigh
         smoothed = state.row(0)
         *_, state = simulate_path(system, state, stay_away(100))
         assert np.abs(state.row(0) - smoothed).max() <= 2.0 * BAND
-
-
-def test_pins_that_a_stroke_leaves_in_motion_are_driven_home_by_the_method() -> None:
-    system = bed()
-    state = heighten(system, make_spike_and_ridge(system.grid))
-    *_, state = simulate_path(system, state, stay_away(5), make_orders(5, 0.0, 0.0, 0.0, RADIUS, 0))
-    target = state.row(system.rows.target)
-    assert np.abs(state.row(0) - target).max() > 1e-3
-    *_, state = simulate_path(system, state, stay_away(300))
-    # Method I comes to a height like 1/t.
-    assert np.abs(state.row(0) - target).max() < 0.2e-3
 
 
 def test_periods_without_an_order_or_with_locks_that_are_gone_are_those_of_the_method_alone() -> None:

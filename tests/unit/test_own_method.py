@@ -113,15 +113,12 @@ CHEAT = f"""{OPEN.replace("SoftPad", "Cheat")}
 """
 
 
-def test_nothing_a_method_is_shown_leads_to_the_bed(here: Path) -> None:
+def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_valve(here: Path) -> None:
     write_method(here, f"{OPEN}        return memory, orders\n")
     write_method(here, CHEAT, "cheat.py")
     honest, cheat = (run(small(load_method(word))) for word in ("pad.py:SoftPad", "cheat.py:Cheat"))
     for key, values in honest.history.items():
         np.testing.assert_array_equal(cheat.history[key], values, key)
-
-
-def test_openings_are_limited_to_those_of_a_valve(here: Path) -> None:
     heights = []
     for number, opening in enumerate((-3, -1, 0, 1, 3)):
         orders = f"return memory, Orders(opening=np.full(cells.height.size, {opening}))"

@@ -65,10 +65,14 @@ def test_the_same_scene_gives_the_same_history_bit_for_bit_or_less_of_it(result:
     assert run(scene(fingertip="absent")).summary().endswith("real time), no contact")
 
 
-def test_without_control_no_valve_opens_and_there_is_no_force_to_deviate_from() -> None:
+def test_without_control_no_force_is_deviated_from_and_what_fits_into_no_memory_is_refused() -> None:
     done = run(scene(control="absent"))
     assert (done.metrics["rfd"], done.metrics["set_point"]) == (None, None)
     assert np.ptp(done.history["height"]) == 0.0
+    # 20 million cells over a year at 200 Hz: 3e18 bytes fit nowhere.
+    endless = scene(layout={"rows": 4000, "columns": 5000}, simulation={"duration": 1e6})
+    with pytest.raises(ParameterError, match="free memory"):
+        run(endless)
 
 
 def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
@@ -90,13 +94,6 @@ def test_a_stopped_session_keeps_what_was_computed_and_is_marked_incomplete(resu
     assert np.array_equal(cut.history["height"], result.history["height"][:11])
     assert (cut.incomplete, cut.metrics["incomplete"]) == (True, True)
     assert not stopped_after(40).incomplete  # with its last period
-
-
-def test_a_session_that_cannot_fit_in_memory_is_refused() -> None:
-    # 20 million cells over a year at 200 Hz: 3e18 bytes fit nowhere.
-    endless = scene(layout={"rows": 4000, "columns": 5000}, simulation={"duration": 1e6})
-    with pytest.raises(ParameterError, match="free memory"):
-        run(endless)
 
 
 def fill(folder: Path, word: str) -> None:

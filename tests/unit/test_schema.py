@@ -20,7 +20,7 @@ from digiclay.core.scene.schema import (
 from digiclay.core.scene.toml_table import PRESETS, format_scene, resolve
 
 
-def test_an_empty_file_is_a_whole_scene_that_presses_once_below_the_rest_height() -> None:
+def test_an_empty_file_is_a_whole_scene_that_presses_once_and_a_written_one_names_everything() -> None:
     scene = resolve({})
     assert (scene.layout.rows, scene.layout.pitch, scene.valve.orifice_diameter) == (25, 3e-3, 0.5e-3)
     assert tuple(name for name in SECTIONS if scene.section(name) is None) == UNASKED
@@ -28,6 +28,10 @@ def test_an_empty_file_is_a_whole_scene_that_presses_once_below_the_rest_height(
     assert 0.0 < min(point.position[2] for point in scene.section("trajectory").waypoints) < 0.03
     points = [{"time": 0, "position": [0, 0, 0.05]}, {"time": 0.7, "position": [0, 0, 0.05]}]
     assert resolve({"trajectory": {"waypoints": points}}).simulation.duration == 0.7
+    scene = resolve({name: {} for name in UNASKED})
+    tables = tomllib.loads(format_scene(scene))
+    missing = [(name, key) for name in PARTS for key in vars(scene.section(name)) if key not in tables[name]]
+    assert missing == []
 
 
 def test_quantities_may_have_a_unit_and_a_hexagonal_bed_shares_the_force_among_more_cells() -> None:
@@ -151,13 +155,6 @@ SCENES: dict[str, dict[str, Any]] = {
 def test_a_scene_written_as_a_file_reads_back_as_an_equal_one(table: dict[str, Any]) -> None:
     scene = resolve(table, "some name")
     assert resolve(tomllib.loads(format_scene(scene))) == scene
-
-
-def test_a_written_scene_names_every_parameter() -> None:
-    scene = resolve({name: {} for name in UNASKED})
-    tables = tomllib.loads(format_scene(scene))
-    missing = [(name, key) for name in PARTS for key in vars(scene.section(name)) if key not in tables[name]]
-    assert missing == []
 
 
 def scene(folder: Path, text: str, **settings: str) -> Scene:

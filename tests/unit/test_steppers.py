@@ -85,20 +85,6 @@ def test_no_size_overflows_and_no_load_pulls(exponent: float, slip: float, decay
         assert met[0] <= 1e-9
 
 
-def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper() -> None:
-    # It leaves the pins. Its way is a parabola, its mean `bow` above its chord and its middle 1.5 times that.
-    # The valves are open to the high reservoir; a bend of the way without load would take the pins far down.
-    cases = [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)]
-    exponent, lift, bow, deepest = np.array(cases).T
-    one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
-    cell, openings = one_cell().cell, np.ones((1, 4))
-    pressure = cell.supply.pressure(openings)
-    paths = exponent, 9.0 * one, bow, lift
-    start = closed_form.StepStart(cell, openings, pressure, weights, *paths, relaxed=one, idle=loaded)
-    rise, _, _ = closed_form.find_loaded_path(2000.0, 1e6, 1.0, start)
-    np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
-
-
 @dataclass(frozen=True)
 class Setter(Explicit):
     height: float | None
@@ -127,13 +113,24 @@ def put(
     return driven[0], force
 
 
-def test_a_cell_thrown_off_is_given_up_the_others_are_moved_on_and_the_force_is_that_of_the_end() -> None:
+def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_it_comes() -> None:
     alone = {"step": 1e-3, "fingertip": None, "contact": None}
     height, _ = put(Setter(None, (10.0, 1e-3)), [], [0.04, 0.04], **alone)
     np.testing.assert_allclose(height, [np.inf, 0.045], rtol=1e-12)
     # 1 mm deep at the end of the period: f_d b/m (e^(m x) - 1), and no contact at the start.
     _, force = put(Setter(39e-3), [[41e-3], [38e-3]], [40e-3], step=5e-3)
     assert force[0] == pytest.approx(0.34 * 250.0 / 2000.0 * np.expm1(2.0), rel=1e-9)
+    # It leaves the pins. Its way is a parabola, its mean `bow` above its chord and its middle 1.5 times that.
+    # The valves are open to the high reservoir; a bend of the way without load would take the pins far down.
+    cases = [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)]
+    exponent, lift, bow, deepest = np.array(cases).T
+    one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
+    cell, openings = one_cell().cell, np.ones((1, 4))
+    pressure = cell.supply.pressure(openings)
+    paths = exponent, 9.0 * one, bow, lift
+    start = closed_form.StepStart(cell, openings, pressure, weights, *paths, relaxed=one, idle=loaded)
+    rise, _, _ = closed_form.find_loaded_path(2000.0, 1e6, 1.0, start)
+    np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -105,14 +105,11 @@ def test_without_a_set_point_there_is_none_and_no_deviation_from_it():
     }  # fmt: skip
 
 
-def test_shaping_wants_contact_and_a_cell_that_follows_the_force():
+def test_shaping_wants_contact_and_a_follower_and_a_loss_is_a_gap_between_two_contacts():
     case = history(np.array([0.4, 0.4, 0.0]), np.arange(3.0))
     case["mode"][:] = Mode.REST
     case["mode"][:, 4] = Mode.FORCE_FOLLOW, Mode.SPRING, Mode.FORCE_FOLLOW
     np.testing.assert_array_equal(summary.sum_cells(case).shaping, [True, False, False])
-
-
-def test_the_contact_loss_is_the_share_of_the_gap_between_first_and_last_contact():
     touching = ((TIME >= 2.0) & (TIME <= 4.0)) | ((TIME >= 5.0) & (TIME <= 7.0))
     # 1 s of 5; the gap is 199 rows of 5 ms, and the ends of the window 2 half rows more.
     assert summary.compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
@@ -121,18 +118,6 @@ def test_the_contact_loss_is_the_share_of_the_gap_between_first_and_last_contact
         assert summary.compute_contact_loss_share(range(len(force)), force) == pytest.approx(
             share, rel=ROUNDING
         )
-
-
-def test_the_lag_is_the_distance_from_finger_to_force_centroid():
-    place = np.array([[0.0, 0.0], [0.004, 0.0]])
-    fingertip = np.tile([0.001, 0.004, 0.05, 1.0, 0.0, 0.0, 0.0], (3, 1))
-    force = np.array([[0.1, 0.3], [0.0, 0.0], [0.4, 0.0]])
-    # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
-    case = {"position": place, "force": force, "total_force": force.sum(axis=1)}
-    sums = summary.sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
-    np.testing.assert_allclose(
-        summary.measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING
-    )
 
 
 #: 9 pins of 9 mm² raised by 3 and 1 mm and sunk by 1 mm; differences of heights lose three digits.
@@ -391,13 +376,22 @@ HISTORY = {
 }
 
 
-def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
+def test_the_surface_counts_cells_by_force_and_the_lag_is_that_of_their_centroid():
     # 0.3 N at 51 mm and 0.1 N at 53 mm: 51.5 mm, over a finger at 50 mm.
     assert summary.measure_surface_under(summary.sum_cells(HISTORY), TIP[:2]) * 1e3 == pytest.approx(
         [1.5], rel=1e-9
     )
     nothing = {**HISTORY, "force": np.zeros((2, 2)), "total_force": np.zeros(2)}
     assert summary.measure_surface_under(summary.sum_cells(nothing), TIP[:2]).size == 0
+    place = np.array([[0.0, 0.0], [0.004, 0.0]])
+    fingertip = np.tile([0.001, 0.004, 0.05, 1.0, 0.0, 0.0, 0.0], (3, 1))
+    force = np.array([[0.1, 0.3], [0.0, 0.0], [0.4, 0.0]])
+    # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
+    case = {"position": place, "force": force, "total_force": force.sum(axis=1)}
+    sums = summary.sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
+    np.testing.assert_allclose(
+        summary.measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING
+    )
 
 
 def of_two(places: tuple[float, float], force: dict[int, float], own: tuple[float, float]) -> dict[str, Any]:
@@ -437,9 +431,7 @@ def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_a
 
 
 def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low() -> None:
-    given = of_two(
-        (-5e-3, 8e-3), {1: 0.1, 2: 0.2, 4: 0.3}, (0.1, 0.5)
-    )  # the second pin is 5 and 8 mm from them
+    # The second pin is 5 and 8 mm from them.
     given = of_two((-5e-3, 8e-3), {1: 0.1, 2: 0.2, 4: 0.3}, (0.1, 0.5))
     given["fingertip"][:, 1, 2] = 35e-3
     given["height"] += [0.0, 41e-3, 40e-3, 0.0, 36e-3]

@@ -75,7 +75,7 @@ def test_a_replay_from_rest_or_a_formed_bed_ends_in_the_same_state_bit_for_bit()
     assert not replayed(replace(take, poses=poses))
 
 
-def test_bytes_bring_a_take_back_as_it_was_and_damaged_ones_are_refused_in_one_line() -> None:
+def test_bytes_bring_a_take_and_its_orders_back_and_damaged_ones_are_refused_in_one_line() -> None:
     _, take, _ = taken()
     data = to_bytes(take)
     back = from_bytes(data)
@@ -84,6 +84,14 @@ def test_bytes_bring_a_take_back_as_it_was_and_damaged_ones_are_refused_in_one_l
     for harmed in (data[:-50], b"", b"no take"):
         with pytest.raises(OutputError, match="The take is damaged"):
             from_bytes(harmed)
+    data, plain = to_bytes(ordered_take()), to_bytes(replace(ordered_take(), orders=None))
+    assert [int(np.load(io.BytesIO(one))["version"]) for one in (data, plain)] == [4, 2]
+    assert "orders" not in np.load(io.BytesIO(plain))  # older versions read it
+    back = from_bytes(data)
+    assert back.orders is not None
+    np.testing.assert_array_equal(back.orders.rows, ORDERS.rows)
+    np.testing.assert_array_equal(back.orders.surfaces, (SURFACE,))
+    assert (replayed(back), replayed(from_bytes(plain))) == (True, False)
 
 
 def test_a_finer_step_moves_heights_by_less_than_the_integrations_error() -> None:
@@ -157,17 +165,6 @@ def change_file(take: Take, **parts: object) -> bytes:
     written, arrays = io.BytesIO(), {**np.load(io.BytesIO(to_bytes(take))), **parts}
     np.savez(written, **{name: array for name, array in arrays.items() if array is not None})
     return written.getvalue()
-
-
-def test_bytes_bring_orders_back_as_version_4_and_a_take_without_is_version_2() -> None:
-    data, plain = to_bytes(ordered_take()), to_bytes(replace(ordered_take(), orders=None))
-    assert [int(np.load(io.BytesIO(one))["version"]) for one in (data, plain)] == [4, 2]
-    assert "orders" not in np.load(io.BytesIO(plain))  # older versions read it
-    back = from_bytes(data)
-    assert back.orders is not None
-    np.testing.assert_array_equal(back.orders.rows, ORDERS.rows)
-    np.testing.assert_array_equal(back.orders.surfaces, (SURFACE,))
-    assert (replayed(back), replayed(from_bytes(plain))) == (True, False)
 
 
 def test_a_take_of_version_3_whose_orders_have_no_verb_is_replayed_bit_for_bit() -> None:

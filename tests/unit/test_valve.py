@@ -95,7 +95,15 @@ def test_the_drops_of_valve_and_conduit_add_up(gap: str, power: int) -> None:
     assert np.all(flow < law.valve.flow(MESH, DROPS))
 
 
-def test_a_conduit_without_length_changes_nothing_and_behind_a_wide_valve_it_is_all() -> None:
+def test_the_resistance_is_that_of_a_parabolic_profile_and_behind_a_wide_valve_it_is_all() -> None:
+    fluid, conduit = Fluid(), Conduit()
+    edge, gradient = conduit.diameter / 2.0, 1e5 / conduit.length
+
+    def ring(r: float) -> float:
+        return gradient * (edge**2 - r**2) / (4.0 * fluid.dynamic_viscosity) * 2.0 * math.pi * r
+
+    # The integrand is a cubic: quadrature is exact but for rounding.
+    assert conduit.resistance(fluid) == pytest.approx(1e5 / quad(ring, 0.0, edge)[0], rel=1e-12)
     valve = make_orifice(WIDE, THIN)
     without = OrificeAndConduit(valve, 0.0)
     assert without.flow(MESH, DROPS) == pytest.approx(valve.flow(MESH, DROPS), rel=1e-14)  # rounding
@@ -105,17 +113,6 @@ def test_a_conduit_without_length_changes_nothing_and_behind_a_wide_valve_it_is_
     # 200 mm against 0.8 mm: the valve's resistance is (1/250)^4 of the conduit's, some 1e-9.
     drop = np.array([1e2, 1e4, 1e5])
     assert wide.flow(np.ones(3), drop) * wide.resistance == pytest.approx(drop, rel=1e-6)
-
-
-def test_the_resistance_is_that_of_a_parabolic_profile() -> None:
-    fluid, conduit = Fluid(), Conduit()
-    edge, gradient = conduit.diameter / 2.0, 1e5 / conduit.length
-
-    def ring(r: float) -> float:
-        return gradient * (edge**2 - r**2) / (4.0 * fluid.dynamic_viscosity) * 2.0 * math.pi * r
-
-    # The integrand is a cubic: quadrature is exact but for rounding.
-    assert conduit.resistance(fluid) == pytest.approx(1e5 / quad(ring, 0.0, edge)[0], rel=1e-12)
 
 
 def test_the_drop_between_reservoir_and_load_moves_the_pin() -> None:

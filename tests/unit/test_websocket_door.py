@@ -53,15 +53,6 @@ async def press_elsewhere(link: DoorLink) -> None:
             await asyncio.sleep(0.01)
 
 
-def test_a_client_that_answers_no_ping_is_closed_and_leaves_the_fingertip(monkeypatch):
-    monkeypatch.setattr(websocket_door, "PING", 0.1)
-    monkeypatch.setattr(door_link, "LEASE", 1e9)  # nobody else may by silence alone
-    link = make_link()
-    sent = REQUEST.encode() + frame_message(pack_pose(POSE))
-    assert UNANSWERED in asyncio.run(connect(link, sent))
-    assert link.counts["poses"] == 2
-
-
 def test_a_client_beyond_the_limit_is_told_and_one_silent_before_the_token_closed(monkeypatch):
     monkeypatch.setattr(websocket_door, "MOST_CLIENTS", 0)
     assert asyncio.run(connect(make_link(), REQUEST.encode())).startswith(b"HTTP/1.1 503")
@@ -71,13 +62,19 @@ def test_a_client_beyond_the_limit_is_told_and_one_silent_before_the_token_close
     assert link.counts["clients"] == 0
 
 
-def test_a_client_that_floods_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_client_that_floods_or_answers_no_ping_is_closed_and_leaves_the_fingertip(monkeypatch):
     monkeypatch.setattr(websocket_door, "FLOOD", 2)
     monkeypatch.setattr(door_link, "LEASE", 1e9)  # the fingertip is another's by the close alone
     link = make_link()
     sent = asyncio.run(connect(link, REQUEST.encode() + 3 * frame_message(pack_pose(POSE))))
     assert b"more than 2 messages a second" in sent
     assert (link.counts["floods"], link.counts["poses"]) == (1, 3)
+    monkeypatch.setattr(websocket_door, "PING", 0.1)
+    monkeypatch.setattr(door_link, "LEASE", 1e9)  # nobody else may by silence alone
+    link = make_link()
+    sent = REQUEST.encode() + frame_message(pack_pose(POSE))
+    assert UNANSWERED in asyncio.run(connect(link, sent))
+    assert link.counts["poses"] == 2
 
 
 def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
