@@ -50,17 +50,7 @@ def test_the_tension_of_a_press_is_found_and_its_underside_as_uncertain_as_the_f
     assert deviation == pytest.approx(1e-3 / slope, rel=1e-6)
 
 
-def test_pulp_relieved_faster_than_it_relaxes_keeps_the_expected_tension() -> None:
-    depth = lambda t: np.where(t < 0.5, 1.5e-3, 0.8e-3)  # noqa: E731
-    forces, own = history(depth, 104)
-    assert forces[-1] == 0.0
-    assert own[-1] > 0.3
-    # Expected a little too large: it is at most the tension at which there would be a force.
-    assert observe(forces, own)[-1] == pytest.approx(own[-1], rel=1e-9)
-    assert observe(forces, np.full(own.size, 9.0))[-1] < 2.0
-
-
-def test_a_predicted_force_is_the_one_that_comes() -> None:
+def test_a_predicted_force_comes_and_relieved_pulp_keeps_the_expected_tension() -> None:
     depth = lambda t: 1.0e-3 + 3e-3 * (t - 0.2)  # noqa: E731
     forces, own = history(lambda t: np.maximum(depth(t), 0.0), 42)
     pulp = np.zeros((4, 1))
@@ -69,6 +59,13 @@ def test_a_predicted_force_is_the_one_that_comes() -> None:
     lost = PULP.predict_loss(pulp)
     found = PULP.predict_force(np.array([depth(42 * PERIOD)]), lost)
     assert found == pytest.approx(forces[42], rel=0.01)
+    depth = lambda t: np.where(t < 0.5, 1.5e-3, 0.8e-3)  # noqa: E731
+    forces, own = history(depth, 104)
+    assert forces[-1] == 0.0
+    assert own[-1] > 0.3
+    # Expected a little too large: it is at most the tension at which there would be a force.
+    assert observe(forces, own)[-1] == pytest.approx(own[-1], rel=1e-9)
+    assert observe(forces, np.full(own.size, 9.0))[-1] < 2.0
 
 
 # From force to height: the top whose predicted forces add up, and the heights ahead of the fingertip

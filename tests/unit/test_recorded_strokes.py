@@ -52,7 +52,7 @@ def test_ctrl_symmetry_strength_and_line_are_those_of_the_tool() -> None:
     assert PointerStroke(ctrl=True).amount == 15e-3
 
 
-def test_a_stroke_has_its_own_fingertip_and_the_bed_has_its_own_again_after_it() -> None:
+def test_a_stroke_has_its_own_fingertip_and_a_brush_without_its_blister_is_refused() -> None:
     begun = begin()
     first, *_, last = play_strokes(begun, (PointerStroke(width=6e-3, moves=ALONG),))
     sessions = [first, last]
@@ -61,9 +61,6 @@ def test_a_stroke_has_its_own_fingertip_and_the_bed_has_its_own_again_after_it()
     blisters = [one.scene.blister.radius for one in sessions]
     assert blisters[0] == pytest.approx(3 / 8 * begun.scene.blister.radius)
     assert sessions[-1].scene == begun.scene
-
-
-def test_a_brush_without_its_blister_is_refused_in_one_line() -> None:
     with pytest.raises(StateError, match=r"^Stroke 1 \(raise\) needs a method with a blister\.$"):
         list(play_strokes(begin(method="elastic"), (PointerStroke(brush="raise"),)))
 

@@ -17,7 +17,7 @@ from tests.hand import SCENE, SIZES, Hand, heights, pose, started
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
 
-def test_a_paused_session_stands_still_and_goes_on_without_catching_up() -> None:
+def test_a_paused_session_goes_on_without_catching_up_and_gestures_kept_do_not_grow() -> None:
     hand = Hand()
     session = replace(hand.move(started(), [(0.0, 39.0)] * 5), paused=True)
     before = session.state.period
@@ -25,6 +25,11 @@ def test_a_paused_session_stands_still_and_goes_on_without_catching_up() -> None
     assert (session.state.period, session.clock.factor) == (before, 0.0)
     session = hand.move(replace(session, paused=False), [(0.0, 39.0)] * 2)
     assert session.state.period <= before + 7
+    hand, session = Hand(), started()
+    assert sculpting.rewind(session) is session  # there is none yet
+    for _ in range(sculpting.GESTURES + 3):
+        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
+    assert len(session.gestures) == sculpting.GESTURES
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-6])
@@ -44,14 +49,6 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
     assert len(again.gestures) == 2
     back = sculpting.rewind(sculpting.rewind(again))
     assert (heights(back) == 40e-3).all()
-
-
-def test_gestures_kept_do_not_grow_in_number() -> None:
-    hand, session = Hand(), started()
-    assert sculpting.rewind(session) is session  # there is none yet
-    for _ in range(sculpting.GESTURES + 3):
-        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
-    assert len(session.gestures) == sculpting.GESTURES
 
 
 def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
@@ -101,13 +98,6 @@ def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
         tracemalloc.stop()
     # A state kept for a gesture more or less, of at most 20: 25 kB each.
     assert floors[-1] - floors[0] < 100_000
-
-
-def test_a_finger_far_below_the_floor_or_far_away_does_no_harm() -> None:
-    hand, session = Hand(), started()
-    session = hand.move(session, [(0.0, -1e9), (1e12, -1e9), (0.0, 1e9), (0.0, 46.0)])
-    assert np.isfinite(heights(session)).all()
-    assert heights(session).min() >= 0.0
 
 
 def test_a_step_too_long_to_halve_has_no_estimate_and_parts_that_do_not_go_together_are_refused() -> None:
@@ -186,7 +176,11 @@ def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is
     assert session.recording is None
 
 
-def test_fingertips_keep_their_poses_by_number_and_new_ones_have_others() -> None:
+def test_fingertips_keep_their_poses_by_number_and_far_below_the_floor_do_no_harm() -> None:
     had, others = np.arange(14.0).reshape(2, 7), -np.ones((3, 7))
     matched = sculpting.match_poses(had, (2, 5), others, (1, 5, 2))
     np.testing.assert_array_equal(matched, [others[0], had[1], had[0]])
+    hand, session = Hand(), started()
+    session = hand.move(session, [(0.0, -1e9), (1e12, -1e9), (0.0, 1e9), (0.0, 46.0)])
+    assert np.isfinite(heights(session)).all()
+    assert heights(session).min() >= 0.0
