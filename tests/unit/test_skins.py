@@ -315,17 +315,6 @@ def test_inside_the_bed_it_is_the_skin_of_the_exports(kind: str) -> None:
     np.testing.assert_allclose(inside[cut, cut], known, rtol=0, atol=1e-12)
 
 
-def test_a_membrane_is_level_over_the_end_of_a_pin() -> None:
-    instant = at_rest(2, 3)
-    cap = instant.actuator.bore / 2
-    lattice = make_lattice(instant, 4)
-    height = rough(instant)
-    skin = interpolate(lattice, height, "membrane")
-    for pin, place in enumerate(instant.position):
-        over = (np.abs(lattice.place - place) <= cap + 1e-12).all(axis=1) & ~lattice.sunk
-        np.testing.assert_allclose(skin[over], height[pin], rtol=0, atol=ROUNDING)
-
-
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 5), (5, 1), (2, 2)])
 def test_the_smallest_beds_have_a_skin_too(rows: int, columns: int) -> None:
     lattice = make_lattice(at_rest(rows, columns), 4)
