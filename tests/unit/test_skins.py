@@ -174,17 +174,6 @@ def covered(formed: Formed, skin: str, parts: int) -> SurfaceGrid:
     return fit_skin(formed, skin, parts, CAP)
 
 
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("skin", SKINS)
-@pytest.mark.parametrize("parts", [1, 5])
-def test_a_skin_passes_through_every_pin_top_to_a_micrometer(skin, arrangement, parts):
-    formed = bed(arrangement)
-    sheet = covered(formed, skin, parts)
-    assert len(sheet.position) == (6 * parts + 1) * (8 * parts + 1)
-    np.testing.assert_allclose(sheet.position[sheet.pins], formed.position, rtol=0.0, atol=ROUNDING)
-    np.testing.assert_allclose(sheet.height[sheet.pins], formed.height, rtol=0.0, atol=1e-6)
-
-
 def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
     formed = bed()
     sheet = covered(formed, "bilinear", 4)
