@@ -51,12 +51,6 @@ def test_shifted_rows_are_joined_by_the_shorter_diagonal_whatever_the_heights():
     assert sides.max() < 1.2 * 3e-3
 
 
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (5, 1), (2, 2), (4, 7), (7, 4)])
-def test_rows_and_columns_are_found_from_the_positions(shape, arrangement):
-    assert find_grid_shape(pins(*shape, arrangement)) == shape
-
-
 def test_pins_that_do_not_fill_their_rows_are_refused():
     with pytest.raises(ParameterError, match=r"^Surface\.position must fill rows of 4 pins \(got 11 pins"):
         find_grid_shape(pins(3, 4)[:-1])
