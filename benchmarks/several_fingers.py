@@ -84,6 +84,13 @@ CASES: dict[str, list[Way]] = {
         for d, at in ((d, (-0.8 * d, 5 + 0.6 * d, DOWN - 1)) for d in (15, 12, 10))
     },
     **{f"approach and part, {d}": list(meet(d, 20.0, 47.0)) for d in (12, 9, 6)},
+    **{
+        f"lands over the rim beside one, {d}": [
+            [*land(0, 62 - d), (3.0, 0, 62 - d, PRESSED)],
+            [(0.0, 3, 62, 43.0), (0.5, 3, 62, 43.0), (1.0, 3, 62, PRESSED), (3.0, 3, 62, PRESSED)],
+        ]
+        for d in (12, 11)
+    },
     **{f"pinch, pull up, {d}": list(meet(d, 14.0, UP)) for d in (20, 16, 12)},
     **{
         f"crossing, {d}": [

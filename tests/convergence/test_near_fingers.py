@@ -15,6 +15,9 @@ from benchmarks.several_fingers import TURN, make_scene, measure_near
         ("virtual_master", "crossing, 11", TURN, 1.1),
         ("virtual_master", "approach and part, 6", TURN, 1.1),
         ("virtual_master", "up beside down, 18", TURN, 1.1),
+        # What it presses is within reach of the one beside it, whose underside is far above.
+        ("virtual_master", "lands over the rim beside one, 11", TURN, 1.1),
+        ("virtual_master", "lands over the rim beside one, 12", 0.0, 1.1),
         ("hybrid", "parallel, 12", TURN, 1.1),
         ("hybrid", "crossing, 11", TURN, 1.1),
         ("hybrid", "up beside down, 18", TURN, 1.1),

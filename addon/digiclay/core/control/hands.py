@@ -90,8 +90,7 @@ class HandControl:
         if pressed.size:
             height = touched.height[pressed]
             under = self._predict_under(memory, touched.quadratic_basis.take(pressed, 1), height)
-            if self._predicts:
-                under[under > height + REACHED] = np.inf
+            under[under > height + REACHED] = np.inf
             owner = self._find_new(touched, pressed, find_lowest(under))
             divided = touched.cells[pressed], owner
         located = self.locate_each(memory.fingers, touched, pressed, owner, under)
