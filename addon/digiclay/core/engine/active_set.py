@@ -40,9 +40,6 @@ class Selection:
     fastest: Any
     """No pin rises faster, m/s; a number or (b,)."""
 
-    #: How much farther than it must the set goes, in pitches, so that it serves for some periods.
-    margin = 1.0
-
     #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
     larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
     smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
@@ -51,6 +48,11 @@ class Selection:
     def kept(self) -> int:
         """Control periods for which a set is kept."""
         return max(KEPT, int(LASTS / np.max(self.period)))
+
+    @property
+    def margin(self) -> Any:
+        """How much farther than it must the set goes, so that it serves for some periods, m."""
+        return self.grid.layout.pitch
 
     @property
     def rise(self) -> Any:
@@ -90,8 +92,8 @@ class Selection:
     ) -> ActiveSet:
         """Return the set that follows another one, without its rows; no pin top is higher than `top`, m."""
         peak = self.smaller(top + self.rise, self.cell.actuator.stroke)
-        margin = self.margin * self.grid.layout.pitch
-        reach, control = widen_disc(_reach(window, peak), margin), widen_disc(control, margin)
+        reach = widen_disc(_reach(window, peak), self.margin)
+        control = widen_disc(control, self.margin)
         cells, near = self.pick(active, moving, reach, control)
         return replace(
             active, cells=cells, near=near, reach=reach, control=control, peak=peak, until=period + self.kept

@@ -28,6 +28,9 @@ LONGER = 8
 #: How far pins may rise until a set is made anew, m, at least as far as they can in two periods: the less,
 #: the fewer cells a fingertip may touch.
 RISE = 3e-3
+#: How far a fingertip may go until a set is made anew, m, at least a pitch: fast strokes cross a narrow one
+#: in a few periods.
+ROOM = 2.25e-3
 #: Moves cells that several fingers press: heights (g,), openings and commands (l, g), filters (r, c, g),
 #: undersides at the period's instants (p, c, g), fingers (c, g); returns heights, filters, forces (c, g), N.
 PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, Floats, Floats]]
@@ -37,8 +40,10 @@ PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, 
 class HandSelection(Selection):
     """Selection of the active cells of a bed under f fingertips, one disc each: arrays (f,)."""
 
-    #: Fingertips cross a pitch in a few periods; a set takes longer to make than one does.
-    margin = 1.5
+    @property
+    def margin(self) -> Any:
+        """How much farther than it must the set goes, m."""
+        return max(ROOM, self.grid.layout.pitch)
 
     @cached_property
     def kept(self) -> int:
