@@ -30,14 +30,14 @@ WAVE = ((-27.0, -9.0), (-9.0, 12.0), (9.0, -12.0), (27.0, 9.0))
 LOADS = {"alone": (30, 0.0), "few redraws": (4, 0.0), "a load": (30, 0.15)}
 
 
-def draw(blender: Any, *paths: tuple[tuple[float, float], ...]) -> Any:
+def draw(blender: Any, *paths: tuple[tuple[float, float], ...], then: str = "") -> Any:
     words = []
     for path in paths:
         places = [on_the_screen(blender, *place) for place in path]
         words += [to(places[0], 0.02), "mousedown 1"]
         words += [drag(start, end, DURATION / (len(places) - 1), RATE) for start, end in pairwise(places)]
         words += ["mouseup 1"]
-    return hand(*words)
+    return hand(*words, then)
 
 
 def drawn(blender: Any, *paths: Any) -> Iterator[float | None]:
@@ -84,9 +84,8 @@ def queue(blender: Any) -> Iterator[float | None]:
 
 def haste(blender: Any) -> Iterator[float | None]:
     loop = blender.part("live.loop").LOOP
-    for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.1 key Escape")):
-        yield from drawn(blender, *LINES)
-        yield from done(blender, hand(keys))
+    for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.05 key Escape")):
+        yield from done(blender, draw(blender, *LINES, then=keys))
         yield from blender.until(lambda: not loop.in_haste)
         note(blender, name)
         blender.SEEN[name]["left"] = len(blender.session().strokes)

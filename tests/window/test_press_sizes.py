@@ -27,7 +27,7 @@ def test_the_session_goes_on_with_the_size_that_is_set(seen, name, size, toleran
     assert np.ptp(found) < 1e-3
     assert seen[name]["blister"] == pytest.approx(15.0 / 16.0 * seen[name]["size"], rel=1e-5)
     assert seen[name]["sessions"] == 1
-    assert seen[name]["period"] > seen["begun"]["period"]
+    assert seen["deeper"]["period"] > seen[name]["period"]
 
 
 def test_depth_and_strength_have_keys_of_their_own(seen: Seen) -> None:
