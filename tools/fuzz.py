@@ -112,7 +112,7 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
     for _ in range(chance.integers(1, 4)):
         spoil(chance, made)
     if chance.random() < 0.2:
-        # The same finger as one or two in a list; the physics refuses two.
+        # The same finger none, one or two times in a list.
         own = {section: made.pop(section) for section in FINGER_SECTIONS if section in made}
         made[FINGERS] = [own] * int(chance.integers(0, 3)) if chance.random() < 0.9 else odd(chance, [own])
     return made
