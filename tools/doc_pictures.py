@@ -149,6 +149,29 @@ def draw_series(folder: Path) -> None:
     save_jpeg(shown, "batch.jpg")
 
 
+def draw_shapes(folder: Path) -> None:
+    """Draw every sample shape as a bed of 49 x 49 pins shows it."""
+    import matplotlib.pyplot as plt
+    from digiclay.core.model.actuator import Actuator
+    from digiclay.core.model.layout import Layout, make_grid
+    from digiclay.core.shapes.fitting import fit_shape, list_shapes
+    from digiclay.core.shapes.request import Shape
+    from digiclay.plots.bed import draw_relief
+
+    bed, names = make_grid(Layout(rows=49, columns=49, pitch=2e-3)), list_shapes()
+    figure = plt.figure(figsize=(15, 9.4))
+    for number, name in enumerate(names):
+        left, below = number % 5 / 5, (2 - number // 5) / 3
+        axes = figure.add_axes((left, below, 0.2, 0.33), projection="3d", computed_zorder=False)
+        heights = fit_shape(Shape(file=name, rise=16e-3), bed, Actuator()).heights
+        area = (left + 0.004, below + 0.01, left + 0.196, below + 0.29)
+        draw_relief(axes, {"position": bed.positions, "height": heights[None]}, area)
+        figure.text(left + 0.1, below + 0.28, name, ha="center", fontsize=15)
+    drawn = folder / "drawn.png"
+    figure.savefig(drawn, dpi=80)
+    save_jpeg(drawn, "shapes.jpg", 85)
+
+
 def set_up_scene() -> None:
     """Set up an empty scene with a camera that looks down on the bed from the front left."""
     import bpy
@@ -210,6 +233,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "film.jpg": draw_film,
     "batch.jpg": draw_series,
     "export.jpg": draw_export,
+    "shapes.jpg": draw_shapes,
     **{f"{name}.jpg": partial(draw_hands, name=name) for name in HANDS},
     "two_hands.webp": draw_hand_film,
     "hand_forces.png": draw_hand_forces,
