@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.cli import main
+from digiclay.commands import compare as compare_command
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
 from digiclay.commands.compare import table
@@ -55,7 +56,8 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     said = [line for line in lines if "the contact law does not hold" in line]
     assert [line.split(":")[0] for line in said] == ["virtual_master"]
     folder = here / "my_compare"
-    assert sorted(path.name for path in folder.iterdir()) == ["compare.png", "metrics.json"]
+    files = ["compare.png", "comparison.json", "metrics.json", "points"]
+    assert sorted(path.name for path in folder.iterdir()) == files
     known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["methods"]
     assert list(known) == BOTH[::-1]
     assert list(known["cell_states"]) == list(RUN_METRICS)
@@ -65,6 +67,35 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     # The setting reached both, and is asked of each cell that follows: of one at least, of all 121 at most.
     assert known["virtual_master"]["set_point"] == 0.03
     assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
+
+
+def read_times(folder: Path) -> dict[str, float]:
+    """Return how long each method took, which no other run takes to the last digit."""
+    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    return {name: metrics["run_time"] for name, metrics in known.items()}
+
+
+def test_a_comparison_goes_on_after_a_stop_and_gives_way_to_another_one_only_with_overwrite(
+    here, capsys, monkeypatch
+):
+    (here / "my.toml").write_text(PRESS, encoding="utf-8")
+    command = ["compare", "my.toml", "--methods", ",".join(BOTH), "--out", OUT]
+    with monkeypatch.context() as patched:
+        stop_before(patched, compare_command, "run", before=1)
+        assert main(command) == 130
+    assert capsys.readouterr().out.startswith("Stopped: 1 of 2 methods are done and kept in first run. ")
+    (point,) = (here / OUT / "points").iterdir()
+    first = json.loads(point.read_text(encoding="utf-8"))["figures"]["run_time"]
+    assert main(command) == 0
+    times = read_times(here / OUT)
+    assert (list(times), times[BOTH[0]]) == (BOTH, first)
+    assert main(command) == 0  # nothing is left to run
+    assert read_times(here / OUT) == times
+    other = [*command, "--set", "control.force_setpoint=0.03"]
+    assert main(other) == 2
+    assert "holds another comparison (virtual_master, cell_states, digiclay" in capsys.readouterr().err
+    assert main([*other, "--overwrite"]) == 0
+    assert not set(read_times(here / OUT).values()) & set(times.values())
 
 
 def test_the_table_has_a_dash_for_what_was_not_found_and_every_panel_a_bar_for_every_method():
@@ -85,13 +116,17 @@ def test_the_table_has_a_dash_for_what_was_not_found_and_every_panel_a_bar_for_e
 OUT = "first run"
 
 
-def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, number: int = signal.SIGINT) -> None:
-    """Send Ctrl-C, or another signal, when a command comes to a step."""
+def stop_before(
+    monkeypatch: pytest.MonkeyPatch, module: Any, name: str, number: int = signal.SIGINT, before: int = 0
+) -> None:
+    """Send Ctrl-C, or another signal, when a command comes to a step; `before`: how often it may before."""
     step: Callable[..., Any] = getattr(module, name)
+    passed = iter(range(before))
 
     def interrupted(*given: Any, **known: Any) -> Any:
         assert signal.getsignal(number) is not signal.SIG_DFL  # it would end the tests
-        signal.raise_signal(number)
+        if next(passed, None) is None:
+            signal.raise_signal(number)
         return step(*given, **known)
 
     monkeypatch.setattr(module, name, interrupted)

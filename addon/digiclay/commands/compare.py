@@ -1,18 +1,21 @@
 """``digiclay compare``: metrics of several control methods on the same input."""
 
 import argparse
-import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
+
+from .. import __version__
 from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
-from ..core.files.run_folder import check_folder, find_name, write_folder
+from ..core.files.run_folder import MARK, find_name, format_json, write_whole
 from ..core.metrics.metric_table import SPEEDS
 from ..core.metrics.summary import find_worst_finger, sum_cells
 from ..core.model.control_interface import find_set_point
@@ -20,13 +23,15 @@ from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import RUN_METRICS, run
+from ..core.studies.axes import Point, Record
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
+from ..core.studies.sweep_plan import Folder, hash_points, open_points
 from ..plugins.method_loader import find_installed, is_file_word
 from .arguments import METHOD, QUIET, add_scene, command, load_by_option, say, settings_of
 from .outside import SUITE, find_beside, refuse_absent
 from .progress import Bar
 from .progress import table as aligned
-from .stop import allow_interrupt, refuse_without
+from .stop import STOPPED, allow_interrupt, refuse_without
 
 EXAMPLES = """\
 examples:
@@ -38,12 +43,14 @@ examples:
   digiclay compare --suite --quick --methods virtual_master,hybrid --out look
 
 The folder holds compare.png and metrics.json; docs/metrics.md defines the metrics. That of --suite
-holds index.html, the tables league.csv, trajectories.csv and results.csv, and points/, a small file
-for each finished trial; after Ctrl-C the same command continues (docs/suite.md).
+holds index.html and the tables league.csv, trajectories.csv and results.csv (docs/suite.md). Both
+hold points/, a small file for each finished method or trial: after Ctrl-C the same command continues.
 """
 #: Units people read: factor and name.
 READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, "")}
 Metrics = dict[str, float | None]
+#: Figures and notes of a record.
+NOTED = ("figures", "beyond_a_finger")
 #: Methods where none are named.
 DEFAULT = ("virtual_master", "cell_states")
 #: Options that need --suite.
@@ -88,7 +95,7 @@ OPTIONS = {
     ),
     "--speed": "also the largest tracking speeds",
     "--out DIR": (Path, "folder; default: SCENE_compare in the working folder"),
-    "--overwrite": "replace an older folder at the end",
+    "--overwrite": "replace another comparison in the folder",
     "--quiet": QUIET,
 }  # fmt: skip
 
@@ -110,41 +117,89 @@ def carry_out(arguments: argparse.Namespace) -> int:
         raise OutputError("The following arguments are required: SCENE, or --suite.")
     path, methods = find(arguments.scene), _list_methods(_list_words(arguments, DEFAULT))
     out: Path = arguments.out or Path(f"{find_name(path)}_compare")
-    check_folder(out, overwrite=arguments.overwrite)
     refuse_without("digiclay compare", "plots", "matplotlib")
+    settings = settings_of(arguments)
+    scenes = [load(path, [*settings, Setting(METHOD, name, "--methods")]) for name in methods]
+    points = [
+        Point(number, (name,), replace(scene, recorder=Recorder()))
+        for number, (name, scene) in enumerate(zip(methods, scenes, strict=True))
+    ]
+    records: dict[int, Record] = {}
+    try:
+        with allow_interrupt(), _open_folder(out, points, arguments) as folder:
+            records |= folder.read_records()
+            for point in points:
+                if point.index not in records:
+                    record = _measure(point, arguments)
+                    folder.keep(point, (METHOD,), record)
+                    records[point.index] = record
+            every = {point.words[0]: records[point.index] for point in points}
+            notes = _write(out, scenes[0], every, speed=arguments.speed)
+    except KeyboardInterrupt:
+        if not records:
+            raise
+        kept = f"{len(records)} of {len(points)} methods are done and kept in {out}"
+        say(arguments, f"Stopped: {kept}. The same command goes on from there.")
+        return STOPPED
+    say(arguments, *table({name: record["figures"] for name, record in every.items()}), *notes)
+    return 0
+
+
+def _open_folder(
+    out: Path, points: Sequence[Point], arguments: argparse.Namespace
+) -> AbstractContextManager[Folder]:
+    """Open the folder of a comparison, see `open_points`; with --overwrite another one in it is removed."""
+    methods = [point.words[0] for point in points]
+    plan = {"digiclay": __version__, "methods": methods, "speed": arguments.speed}
+
+    def describe(there: Mapping[str, Any]) -> str:
+        return f"{', '.join(there['methods'])}, digiclay {there['digiclay']}"
+
+    def accept(there: Mapping[str, Any], folder: Folder) -> bool:
+        if arguments.overwrite:
+            folder.clear()
+        return bool(arguments.overwrite)
+
+    return open_points(out, "comparison", {**plan, "scenes": hash_points(points)}, describe, accept)
+
+
+def _measure(point: Point, arguments: argparse.Namespace) -> Record:
+    """Run a method; return its figures, the force over time, N, and what else the files hold of it."""
+    scene, method = point.scene, point.words[0]
+    assert scene is not None  # values go together, or nothing was begun
+    with Bar(sys.stderr, method, scene.simulation.control_period, quiet=arguments.quiet) as bar:
+        done = run(scene, progress=bar)
+    worst = find_worst_finger(done.history, scene.set_point)
+    wanted = find_set_point(scene.set_point, sum_cells(worst).following)
+    asked = np.where(np.isnan(wanted), None, wanted)  # type: ignore[call-overload]  # JSON has no NaN
+    return {
+        "figures": done.figures | (_speeds(scene) if arguments.speed else {}),
+        "forces": [worst["time"].tolist(), worst["total_force"].tolist(), asked.tolist()],
+        "beyond_a_finger": done.metrics.get("beyond_a_finger", ""),
+        "fingers": done.metrics.get("fingers"),
+    }
+
+
+def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool) -> list[str]:
+    """Write the table and the picture of all methods' records; return the lines to print below the table."""
     from ..plots.figure import save
     from ..plots.sweep import comparison
 
-    settings = settings_of(arguments)
-    scenes = {name: load(path, [*settings, Setting(METHOD, name, "--methods")]) for name in methods}
-    measured: dict[str, Metrics] = {}
-    forces: dict[str, tuple[Any, Any, Any]] = {}
-    beyond: dict[str, str] = {}
-    each: dict[str, list[Metrics]] = {}
-    with allow_interrupt(), write_folder(out, overwrite=arguments.overwrite) as folder:
-        for method, scene in scenes.items():
-            with Bar(sys.stderr, method, scene.simulation.control_period, quiet=arguments.quiet) as bar:
-                done = run(replace(scene, recorder=Recorder()), progress=bar)
-            measured[method] = done.figures | (_speeds(scene) if arguments.speed else {})
-            worst = find_worst_finger(done.history, scene.set_point)
-            wanted = find_set_point(scene.set_point, sum_cells(worst).following)
-            forces[method] = worst["time"], worst["total_force"], wanted
-            beyond[method] = done.metrics.get("beyond_a_finger", "")
-            each |= {method: done.metrics["fingers"]} if "fingers" in done.metrics else {}
-        units = {name: metric.unit for name, metric in {**RUN_METRICS, **SPEEDS}.items()}
-        content = {"scene": scene.name, "methods": measured, "units": units, "beyond_a_finger": beyond}
-        content |= {"fingers": each} if each else {}
-        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-        (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
-        several = len(scene.fingers) > 1
-        called = "force of the worst finger" if several else "total force"
-        save(comparison(measured, forces, scene.name, called), folder / "compare.png")
+    several = len(scene.fingers) > 1
+    measured, beyond = ({name: each[key] for name, each in every.items()} for key in NOTED)
+    units = {name: metric.unit for name, metric in {**RUN_METRICS, **SPEEDS}.items()}
+    content = {"scene": scene.name, "methods": measured, "units": units, "beyond_a_finger": beyond}
+    if several:
+        content["fingers"] = {name: each["fingers"] for name, each in every.items()}
+    write_whole(out / MARK, format_json(content))
+    forces = {name: tuple(np.array(each["forces"], np.float64)) for name, each in every.items()}
+    called = "force of the worst finger" if several else "total force"
+    save(comparison(measured, forces, scene.name, called), out / "compare.png")
     notes = [f"{method}: {words}" for method, words in beyond.items() if words]
     alone = ", the first of the fingers alone" if several else ""
-    notes += [f"Followed{alone}: {Criterion()}."] if arguments.speed else []
+    notes += [f"Followed{alone}: {Criterion()}."] if speed else []
     notes += [f"Of {len(scene.fingers)} fingers the worst; metrics.json has each."] if several else []
-    say(arguments, *table(measured), *notes, f"written to {out}")
-    return 0
+    return [*notes, f"written to {out}"]
 
 
 def _list_words(arguments: argparse.Namespace, default: Sequence[str]) -> list[tuple[str, str]]:

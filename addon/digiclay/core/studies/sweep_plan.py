@@ -51,6 +51,11 @@ class Folder:
         values = dict(zip(keys, point.words, strict=True))
         write_whole(self.path / POINTS / f"{point.index:06d}.json", format_json({"values": values, **record}))
 
+    def clear(self) -> None:
+        """Remove the files of all points."""
+        for path in self.path.glob(f"{POINTS}/*.json"):
+            path.unlink()
+
 
 def hash_points(points: Sequence[Point]) -> str:
     """Return a number that identifies the scenes of points, without the comments of their files."""
