@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import DivergenceError, ParameterError
 from digiclay.core.batch.packing import describe_structure
-from digiclay.core.batch.run_together import measure_together, run_together
+from digiclay.core.batch.run_together import begin_play, measure_together, play_all, run_together
 from digiclay.core.control.methods import METHODS
+from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.metrics.metric_table import METRICS
 from digiclay.core.model.trajectory import Waypoint
+from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference
 from digiclay.core.session.run_scene import Result, run
@@ -88,6 +90,21 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
     known = [sample(STACKABLE[method], f"control.method={method}", *device) for device in devices]
     scenes = [moved(one, 0.7e-3 * i, -0.2e-3 * i, 0.5 + 0.05 * i, 0.3) for i, one in enumerate(known)]
     assert_all_as_alone(scenes, errors=True)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_batch_has_no_more_active_cells_than_one_of_its_runs_alone(method: str) -> None:
+    # Its margin is narrower, since it makes its set anew for all runs as soon as one needs it.
+    scene = sample(STACKABLE[method], f"control.method={method}", "recorder=absent", "simulation.duration=0.4")
+    system, count = assemble(scene), 4
+    states = periods(system, scene.trajectories(), begin(system), scene.periods)
+    alone = [(len(state.active.cells), state.active.near) for state in states]
+    play = begin_play(dict.fromkeys(range(count), scene), dict.fromkeys(range(count), system))
+    plays = play_all(play, dict.fromkeys(range(count), scene.periods), None)
+    batch = [(len(now.play.state.active.cells), now.play.state.active.near) for now in plays]
+    active, near = np.sum(alone, axis=0)
+    assert 0 < active
+    assert (np.sum(batch, axis=0) <= (active, near)).all()
 
 
 CHANGES = {

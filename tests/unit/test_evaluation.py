@@ -159,6 +159,10 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
             id="with noise and without it are two structures",
         ),
         pytest.param(
+            ("control.force_setpoint=0.2:0.5:4",), "control.method=hybrid", False, [], [[0], [1], [2], [3]],
+            "4 points one at a time: a batch of hybrid takes as long", id="Method III",
+        ),
+        pytest.param(
             TRIGGERS, "control.method=cell_states", False, [[0, 1, 2, 4, 5]], [[3]], None,
             id="values that do not go together",
         ),

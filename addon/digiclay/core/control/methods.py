@@ -62,6 +62,8 @@ class Method:
     """Whether its cells go back to the height they had at rest."""
     by_set: bool = False
     """Whether its orders for a cell depend on which other cells are active; see `System.by_set`."""
+    batched: bool = True
+    """Whether a batch of its runs takes less time than they take one by one."""
     digest: str = ""
     """Identifies the code of a method that is no part of this package; empty: it is."""
 
@@ -97,7 +99,7 @@ METHODS: dict[str, Method] = {
     "push_pull": Method("control.push_pull", "PushPull", by_set=True),
     "force_display": Method("control.displays", "ForceDisplay", recovers=True),
     "shape_display": Method("control.displays", "ShapeDisplay"),
-    "hybrid": Method("control.hybrid", "Hybrid", {}),
+    "hybrid": Method("control.hybrid", "Hybrid", {}, batched=False),
 }
 
 #: What has been added to this process, see `add_method`; a .blend keeps the names of these.

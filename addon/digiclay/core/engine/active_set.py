@@ -40,6 +40,8 @@ class Selection:
     fastest: Any
     """No pin rises faster, m/s; a number or (b,)."""
 
+    #: The margin of a set, in pitches.
+    margin_pitches: ClassVar[float] = 1.0
     #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
     larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
     smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
@@ -50,9 +52,9 @@ class Selection:
         return max(KEPT, int(LASTS / np.max(self.period)))
 
     @property
-    def margin(self) -> Any:
+    def margin(self) -> float:
         """How much farther than it must the set goes, so that it serves for some periods, m."""
-        return self.grid.layout.pitch
+        return self.margin_pitches * self.grid.layout.pitch
 
     @property
     def rise(self) -> Any:

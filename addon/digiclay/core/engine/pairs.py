@@ -41,7 +41,7 @@ class HandSelection(Selection):
     """Selection of the active cells of a bed under f fingertips, one disc each: arrays (f,)."""
 
     @property
-    def margin(self) -> Any:
+    def margin(self) -> float:
         """How much farther than it must the set goes, m."""
         return max(ROOM, self.grid.layout.pitch)
 

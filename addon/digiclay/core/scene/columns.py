@@ -113,7 +113,7 @@ class PaddedSelection(Selection):
     left out, so it does no harm that they are not.
     """
 
-    margin = 0.5
+    margin_pitches = 0.5
     larger, smaller = np.maximum, np.minimum
 
     def join(self, control: Any) -> Discs | None:

@@ -10,6 +10,7 @@ from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
 from ..batch.packing import Findings, describe_structure
 from ..batch.run_together import measure_together
+from ..control.methods import find_method
 from ..metrics.metric_table import ERRORS, METRICS, RUN
 from ..scene.schema import Scene
 from ..session.accuracy import describe_bends, make_reference
@@ -93,9 +94,10 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
         if point.scene is None:
             alone.append(point)
             continue
-        if len(point.scene.fingers) != 1:
+        reason = _find_reason(point.scene)
+        if reason:
             alone.append(point)
-            why["they do not have a single finger"] += 1
+            why[reason] += 1
             continue
         try:
             judge = describe_structure(make_reference(point.scene), findings) if errors else None
@@ -119,6 +121,13 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
     doubts = Counter(describe_bends(point.scene) for point in points if errors and point.scene)
     notes = tuple(f"{_count(doubts[text], 'point')} with errors as told {text}" for text in doubts if text)
     return Bundles(tuple(batches), tuple((point,) for point in alone), (*_explain(why), *notes))
+
+
+def _find_reason(scene: Scene) -> str:
+    """Return why a run stands in no batch; empty: it may."""
+    if len(scene.fingers) != 1:
+        return "they do not have a single finger"
+    return "" if find_method(scene.method).batched else f"a batch of {scene.method} takes as long"
 
 
 def _limit_runs(scene: Scene | None) -> int:
