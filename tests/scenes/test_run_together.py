@@ -95,7 +95,8 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
 @pytest.mark.parametrize("method", METHODS)
 def test_a_batch_has_no_more_active_cells_than_one_of_its_runs_alone(method: str) -> None:
     # Its margin is narrower, since it makes its set anew for all runs as soon as one needs it.
-    scene = sample(STACKABLE[method], f"control.method={method}", "recorder=absent", "simulation.duration=0.4")
+    settings = f"control.method={method}", "recorder=absent", "simulation.duration=0.4"
+    scene = sample(STACKABLE[method], *settings)
     system, count = assemble(scene), 4
     states = periods(system, scene.trajectories(), begin(system), scene.periods)
     alone = [(len(state.active.cells), state.active.near) for state in states]
@@ -103,7 +104,7 @@ def test_a_batch_has_no_more_active_cells_than_one_of_its_runs_alone(method: str
     plays = play_all(play, dict.fromkeys(range(count), scene.periods), None)
     batch = [(len(now.play.state.active.cells), now.play.state.active.near) for now in plays]
     active, near = np.sum(alone, axis=0)
-    assert 0 < active
+    assert active > 0
     assert (np.sum(batch, axis=0) <= (active, near)).all()
 
 
