@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from digiclay.core.session import live_session
 from digiclay.live import handlers
 
 from tests.blender.at_hand import new_bed
@@ -27,3 +28,9 @@ def bed() -> Any:
 def clock() -> Clock:
     """The wall's clock of a test."""
     return Clock()
+
+
+@pytest.fixture(params=[0.0, 1e9], ids=["a period a tick", "a stroke a tick"])
+def machine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a test on the slowest machine and on the fastest: time for strokes, s, in a tick."""
+    monkeypatch.setattr(live_session, "find_spare", lambda *given: request.param)

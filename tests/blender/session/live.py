@@ -1,6 +1,6 @@
 """A small bed, a clock, and a finger: what the tests of live sessions in Blender share."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import bpy
@@ -17,12 +17,23 @@ from digiclay.settings import properties
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
 TICK = 1 / 30
+#: Ticks in which any stroke of a test comes to its end, if each forms a single period.
+MOST_TICKS = 2000
 
 
 class Clock:
     """Ticks as the window's timer does."""
 
     now = 0.0
+
+    def until(self, holds: Callable[[], object]) -> list[tick.Note]:
+        """Tick until something holds; return what there is to tell."""
+        notes = []
+        for _ in range(MOST_TICKS):
+            if holds():
+                return notes
+            notes += self.tick()
+        raise AssertionError("What was waited for did not come")
 
     def tick(self, count: int = 1) -> list[tick.Note]:
         """Tick some times; return what there is to tell."""

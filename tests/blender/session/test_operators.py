@@ -1,5 +1,6 @@
 """The operators of a session, when they decline, and what is selected and modal meanwhile."""
 
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
@@ -128,20 +129,22 @@ def test_without_a_session_nothing_goes_on_and_blender_lists_modal_operators() -
     assert "modal_operators" in bpy.types.Window.bl_rna.properties
 
 
+@pytest.mark.usefixtures("machine")
 def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed: Any, clock: Clock) -> None:
     started(bed)
-    there_and_back = [(-6e-3, 0.0), (6e-3, 0.0)] * 60  # more than a tick forms
+    across = [(-6e-3, 0.0), (6e-3, 0.0)]
     for number in (1, 2):
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)
         running.put(queue_stroke(running.find(bed), -6e-3, 0.0, 4e-3)[0])
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)  # the hand still draws
-        running.put(change_stroke(running.find(bed), number, partial(lay_path, points=there_and_back)))
-        there_and_back = there_and_back[:2]
+        running.put(change_stroke(running.find(bed), number, partial(lay_path, points=across)))
+    running.put(change_stroke(running.find(bed), 1, partial(replace, held=True)))
     loop.LOOP.in_haste = True
-    clock.tick(3)
-    assert running.find(bed).state.row(0).min() < 37e-3 < 39.9e-3 < shown(bed).min()
+    clock.until(lambda: running.find(bed).state.row(0).min() < 37e-3)
+    assert shown(bed).min() > 39.9e-3
     tick.end_haste(bpy.context)
     np.testing.assert_allclose(shown(bed), running.find(bed).state.row(0), rtol=0, atol=FLOAT32)
+    running.put(let_go(running.find(bed), 1))
     assert bpy.ops.digiclay.finish_strokes() == {"FINISHED"}
     assert running.find(bed).strokes == ()
     assert exact(bed).min() < 37e-3

@@ -1,7 +1,6 @@
 """Sessions with several fingertips, which come and go meanwhile: the session goes on with the others."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from digiclay.strokes.stroke import make_images
 
 from tests.blender.at_hand import looked, select
 from tests.blender.session.live import Clock, exact, only_bed, shown, started, waits
+from tests.hand import let_go
 
 #: Where fingertips press, by number: x and y, mm.
 PLACES = {1: (-10.0, -10.0), 2: (10.0, 10.0), 3: (10.0, -10.0)}
@@ -274,6 +274,7 @@ def test_a_session_waits_without_any_fingertip(pair: Any, clock: Clock) -> None:
     waits(pair, clock, words="fingertip is deleted")
 
 
+@pytest.mark.usefixtures("machine")
 @pytest.mark.parametrize("palm", [False, True])
 def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock, palm: bool) -> None:
     hand = parts.make_palm(bpy.context.collection, pair) if palm else pair
@@ -285,14 +286,14 @@ def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock,
     clock.tick(5)
     before = bridge.poses(pair)
     running.put(sculpting.queue_stroke(running.find(pair), -10e-3, -10e-3, 4e-3)[0])
-    clock.tick(10)
+    clock.until(lambda: depth(pair, 1) > 1.0)
     now = bridge.poses(pair)
     np.testing.assert_allclose(now[1], before[1], rtol=0, atol=1e-6)  # Blender's 32 bits
     assert np.abs(now[0] - before[0]).max() > 1e-3
     move(pair, {2: 43.0})  # it waits there for the end of the stroke
     clock.tick(2)
     assert bridge.poses(pair)[1, 2] == pytest.approx(43e-3, abs=1e-6)
-    assert depth(pair, 1) > 1.0 > 0.01 > depth(pair, 2)
+    assert depth(pair, 2) < 0.01
 
 
 def keyframe(pair: Any) -> None:
@@ -331,6 +332,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     assert tops.size > 0
 
 
+@pytest.mark.usefixtures("machine")
 def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair: Any, clock: Clock) -> None:
     started(pair)
     running.put(sculpting.queue_stroke(running.find(pair), 0.0, 0.0, 4e-3)[0])
@@ -377,6 +379,7 @@ def test_the_state_of_two_is_continued_by_three_and_by_one(pair: Any, clock: Clo
     np.testing.assert_array_equal(running.find(pair).state.row(0), formed)
 
 
+@pytest.mark.usefixtures("machine")
 def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, clock, tmp_path):
     started(pair)
     move(pair, {1: 46.0, 2: 46.0})
@@ -384,29 +387,21 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     running.put(sculpting.set_recording(running.find(pair), True))
     images = make_images("RADIAL", 2)
 
-    def draw() -> None:
+    def press_down() -> int:
         session, number = sculpting.queue_stroke(running.find(only_bed()), 14e-3, 8e-3, 3e-3, images)
-        running.put(sculpting.change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
+        running.put(session)
+        clock.until(lambda: (running.find(only_bed()).state.finger_forces() > 0.01).sum() == 2)
+        return number
 
-    def press_down() -> None:
-        for _ in range(60):
-            clock.tick()
-            if (running.find(only_bed()).state.finger_forces() > 0.01).sum() == 2:
-                return
-        raise AssertionError("The fingertips do not press")
-
-    draw()
-    press_down()
+    number = press_down()
     session = running.find(pair)
     assert (len(session.poses), beds.read_numbers(pair)) == (3, (1, 2, 33))
     assert [number for number, _ in views.read_session(pair, session, COLORS).fingers] == [1, 2]
     bpy.ops.ed.undo_push(message="In its middle")
     in_the_middle = shown(pair).copy()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "middle.blend"), copy=True)
-    for _ in range(200):
-        clock.tick()
-        if not running.find(pair).strokes:
-            break
+    running.put(let_go(running.find(pair), number))
+    clock.until(lambda: not running.find(pair).strokes)
     assert (len(running.find(pair).poses), beds.read_numbers(pair)) == (2, (1, 2))
     assert clock.tick() == []
     table = running.find(pair).state.row(0).reshape(13, 13)
@@ -421,7 +416,6 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     assert (session.numbers, len(session.poses), session.strokes) == ((1, 2), 2, ())
     np.testing.assert_allclose(shown(bed), in_the_middle, rtol=0, atol=1e-3)
     # It goes on from there, and stops in the middle of another one.
-    draw()
     press_down()
     handlers.end("was stopped")
     take = takes.read(bed)
