@@ -31,6 +31,7 @@ def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
             words = localize("Fault of the extension: {}: {}", type(error).__name__, one_line(error))
         if step.__name__ == "modal":
             self.give_up(context, words)
+        clear_status()
         self.report({"ERROR"}, words)
         return {"CANCELLED"}
 
@@ -119,14 +120,42 @@ def file_of(pattern: str, *options: str) -> dict[str, Any]:
     }
 
 
-class TimedAction(Action):
-    """Mixin of an action that also goes on by a timer, s, while Blender draws; Esc ends it."""
+def become_modal(operator: Any, context: Any) -> set[str]:
+    """Have Blender hand an operator its events: the last step of a start, nothing may fail after it.
 
-    def begin(self, context: Any, interval: float) -> set[str]:
-        """Become modal, with a timer."""
-        self.timer = context.window_manager.event_timer_add(interval, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+    Blender crashes when an operator ends by another result while its handler is there.
+    """
+    context.window_manager.modal_handler_add(operator)
+    return {"RUNNING_MODAL"}
+
+
+class Modal(Polled):
+    """Mixin of a modal operator, which first does all that may fail."""
+
+    #: Gets ready for events; returns the operator's result where it has ended already.
+    prepare: Callable[..., set[str] | None]
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Prepare, then borrow what `cancel` gives back, then become modal."""
+        self.region = context.region
+        ended = self.prepare(context, event)
+        if ended:
+            return ended
+        self.borrow(context)
+        return become_modal(self, context)
+
+    def borrow(self, context: Any) -> None:
+        """Borrow timers, draw handlers and the like of Blender; nothing here may fail."""
+
+
+class TimedAction(Modal, Action):
+    """Mixin of an action that also goes on by a timer while Blender draws; Esc ends it."""
+
+    #: Between two events of the timer, s.
+    interval: float
+
+    def borrow(self, context: Any) -> None:
+        self.timer = context.window_manager.event_timer_add(self.interval, window=context.window)
 
     def cancel(self, context: Any) -> None:
         """Give back timer and status bar."""
@@ -134,20 +163,17 @@ class TimedAction(Action):
         clear_status()
 
 
-class Drawing(Polled):
+class Drawing(Modal):
     """Mixin of a modal operator that draws in the view in which it was called."""
 
     #: Draws, in each region of each view; given the area in which the operator was called.
     draw_view: Callable[[Any], None]
 
-    def begin(self, context: Any) -> set[str]:
-        """Become modal, and draw from now on."""
-        self.region = context.region
+    def borrow(self, context: Any) -> None:
+        """Draw from now on."""
         self.handler = bpy.types.SpaceView3D.draw_handler_add(
             self.draw_view, (context.area,), "WINDOW", "POST_PIXEL"
         )
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
 
     def end(self, context: Any, *result: str) -> set[str]:
         """Give back status bar and view; return the result."""

@@ -11,7 +11,7 @@ from ..overlay import views
 from ..press import aim
 from ..roles import bed_of
 from ..ui_text import localize
-from .action import Polled, action, clear_status, show_status
+from .action import Modal, action, clear_status, show_status
 from .poll_messages import linked, no_bed, no_pins, no_skin, no_view
 
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
@@ -32,7 +32,7 @@ def pick_pins(bed: Any, pins: Iterable[int]) -> None:
 NO_BED = no_bed.reworded("Select a bed of pins first")
 
 
-class PickPins(Polled, bpy.types.Operator):
+class PickPins(Modal, bpy.types.Operator):
     """Click pins of the active bed to see their heights in the overlay"""
 
     bl_idname = "digiclay.pick_pins"
@@ -40,11 +40,9 @@ class PickPins(Polled, bpy.types.Operator):
     bl_options = {"UNDO"}
     needs = NO_BED, no_view
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def prepare(self, context: Any, event: Any) -> None:
         self.changed = False
         show_status(context, localize(KEYS))
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under a click; any other event is passed to the view."""

@@ -71,14 +71,13 @@ class AdjustMixin(Drawing):
         """Return the change of the number for a pixel."""
         return self.pixel / float(context.preferences.system.ui_scale)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def prepare(self, context: Any, event: Any) -> None:
         """Begin at the place under the mouse; beside a bed, in the middle of the one it is about."""
         bed, self.center = _find_place(context, (event.mouse_region_x, event.mouse_region_y))
         self.uid = bed.session_uid
         self.start = self.value = self.read(bed, brush.tool_settings(context))
         self.before, self.text, self.snapped = event.mouse_x, "", False
         self._show(context)
-        return self.begin(context)
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Follow the mouse or the keyboard, until confirmed or cancelled."""

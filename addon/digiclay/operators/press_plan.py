@@ -24,12 +24,11 @@ class PlaceCenter(Drawing, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = no_tool_in_view, no_finger
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def prepare(self, context: Any, event: Any) -> None:
         """Wait for the press."""
         self.uid, self.center = 0, (0.0, 0.0)
         self.before = brush.read_center(brush.tool_settings(context))
         show_status(context, localize(KEYS))
-        return self.begin(context)
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Place the center by the press, and the axis until the release; the view can be turned meanwhile."""

@@ -35,7 +35,7 @@ from ..strokes.stroke import (
 )
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
-from .action import Drawing, Polled, clear_status, millimeters, show_status
+from .action import Drawing, Modal, Polled, clear_status, millimeters, show_status
 from .poll_messages import no_place, no_tool
 
 #: How far a turn of the wheel takes the surface up, m.
@@ -114,7 +114,7 @@ class PressSettings:
     )  # fmt: skip
 
 
-class Press(PressSettings, Polled, bpy.types.Operator):
+class Press(PressSettings, Modal, bpy.types.Operator):
     """Press the fingertip into the pins under the mouse, and drag it"""
 
     bl_idname = "digiclay.press"
@@ -123,7 +123,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = (no_place,)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def prepare(self, context: Any, event: Any) -> set[str] | None:
         """Begin where the mouse points; beside the bed there is nothing to press."""
         # Shift and Ctrl change the brush for as long as this stroke lasts.
         self.kind = brush.choose_brush(self.brush, event)
@@ -137,7 +137,6 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             return {"CANCELLED"}
         # The hand draws on the surface it has seen when it began, not on pins that give way under it.
         self.uid, self.grid, self.surface = session.uid, target.grid, target.height.copy()
-        self.region = context.region
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
         self.pressure, self.lean = 1.0, (0.0, 0.0)
         self.button = begin_button(event.value, (event.type_prev, event.value_prev))
@@ -155,10 +154,11 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             accumulate=self.accumulate,
         )
         running.put(session)
-        self.timer = loop.time_window(context)
-        context.window_manager.modal_handler_add(self)
         self._show(context)
-        return {"RUNNING_MODAL"}
+        return None
+
+    def borrow(self, context: Any) -> None:
+        self.timer = loop.time_window(context)
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Draw the stroke on; other events are passed to Blender, to turn the view for instance."""
@@ -314,7 +314,7 @@ class PressShape(Drawing, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = (_no_shape,)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def prepare(self, context: Any, event: Any) -> set[str] | None:
         settings: Any = brush.tool_settings(context)
         self.kind = brush.choose_brush(settings.brush, event)
         self.shape = brush.find_path(settings, self.kind)
@@ -325,9 +325,8 @@ class PressShape(Drawing, bpy.types.Operator):
             return NOT_PRESSED
         self.uid, self.grid, self.height = target.bed.session_uid, target.grid, target.height.copy()
         self.start = self.to = float(target.point[0]), float(target.point[1])
-        self.begin(context)
         self._show(context)
-        return {"RUNNING_MODAL"}
+        return None
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Draw the path until the mouse button is released; the view can be turned meanwhile."""
@@ -361,8 +360,8 @@ class PressShape(Drawing, bpy.types.Operator):
         """Show the length or the radius, and draw the path."""
         length = float(np.hypot(self.to[0] - self.start[0], self.to[1] - self.start[1]))
         self.words = localize(SHAPE_KEYS[self.shape], 1e3 * length)
-        show_status(context, self.words)
         ghost.plan(self.uid, _lay_stroke(brush.tool_settings(context), self._lay(), self.kind))
+        show_status(context, self.words)
         self.region.tag_redraw()
 
     def end(self, context: Any, *result: str) -> set[str]:

@@ -31,7 +31,7 @@ from ..settings import properties
 from ..settings.declared import flag, text
 from ..ui_text import localize
 from . import poll_messages as poll
-from .action import Action, Polled, action
+from .action import Action, Modal, Polled, action, become_modal
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
@@ -68,8 +68,7 @@ class LoopMixin(Ticking):
         self.newer = _other_operators(context)
         # Of the window alone: an area that it is started from goes when a view is maximized.
         with context.temp_override(area=None, region=None):
-            context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+            return become_modal(self, context)
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Tick with the timer; pass every other event on."""
@@ -120,21 +119,21 @@ class GoOn(LoopMixin, bpy.types.Operator):
         return self.drive(context)
 
 
-class FinishStrokes(Ticking, bpy.types.Operator):
+class FinishStrokes(Ticking, Modal, bpy.types.Operator):
     """Finish all press strokes at once, without drawing them meanwhile; Esc lets them go on as before"""
 
     bl_idname = "digiclay.finish_strokes"
     bl_label = "Finish Strokes"
     needs = (poll.no_stroke,)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
-        """Have the loop hurry, beside which this one shows the progress and takes Esc."""
+    def prepare(self, context: Any, event: Any) -> None:
         self.whole = _estimate_time()
+
+    def borrow(self, context: Any) -> None:
+        """Have the loop hurry, beside which this one shows the progress and takes Esc."""
         self.timer, loop.LOOP.in_haste = loop.time_window(context), True
         views.stop()  # its curves would have the views drawn
         context.window_manager.progress_begin(0, 100)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """End with the strokes, or at Esc; the loop has every other event."""

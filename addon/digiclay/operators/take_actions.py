@@ -152,9 +152,9 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             (self._system, self._state), self._at = moment, self._at + 1
         self._finish(context)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def prepare(self, context: Any, event: Any) -> None:
         self._begin(context)
-        return self.begin(context, 1.0 / preferences.get(context).redraw_rate)
+        self.interval = 1.0 / preferences.get(context).redraw_rate
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Continue by the wall clock."""
@@ -272,6 +272,7 @@ class Bake(TimedAction, bpy.types.Operator):
 
     bl_idname = "digiclay.bake"
     bl_label = "Bake Session"
+    interval = TICK
     bl_options = {"REGISTER", "UNDO"}
     needs = no_bed, session_runs.reworded("Stop the session on this bed first")
 
@@ -284,15 +285,17 @@ class Bake(TimedAction, bpy.types.Operator):
         for _ in self.work(context):
             pass
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
-        """Take the scene's frames where none are asked for, and begin; work goes on while Blender draws."""
+    def prepare(self, context: Any, event: Any) -> None:
+        """Take the scene's frames where none are asked for; work goes on while Blender draws."""
         if not self.properties.is_property_set("first"):
             self.first = context.scene.frame_start
         if not self.properties.is_property_set("last"):
             self.last = context.scene.frame_end
         self._steps = self.work(context)
+
+    def borrow(self, context: Any) -> None:
+        super().borrow(context)
         context.window_manager.progress_begin(0.0, 100.0)
-        return self.begin(context, TICK)
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Work for a moment, unless the user has had enough."""

@@ -1,0 +1,68 @@
+"""Starts each modal operator with something that fails, and the Press tool with a stamp that is not there."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+
+def list_modal(blender: Any) -> list[str]:
+    return sorted(operator.bl_idname for operator in blender.window().modal_operators)
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    yield from blender.scene_with_bed(rows=25, columns=25)
+    yield from stamp(blender)
+    blender.call(bpy.ops.digiclay.session_stop)
+    blender.event("MOUSEMOVE", "NOTHING", blender.middle())
+    yield None
+    # Blender loses an operator of which it has had a subclass: last.
+    action = blender.part("operators.action")
+    every = [kind for kind in blender.part("operators").CLASSES if issubclass(kind, bpy.types.Operator)]
+    for kind in [kind for kind in every if hasattr(kind, "modal")]:
+        begun = {}
+        if issubclass(kind, action.Modal):
+            begun = start_failing(blender, kind, action)
+        blender.SEEN[kind.bl_idname] = {"modal": issubclass(kind, action.Modal), **begun}
+        yield None
+
+
+def start_failing(blender: Any, kind: type, action: Any) -> dict[str, Any]:
+    """Start an operator with all that it prepares, after which something fails."""
+
+    def prepare(self: Any, context: Any, event: Any) -> None:
+        raise blender.part("core.base.errors").DigiclayError("Something fails.")
+
+    name = f"{kind.bl_idname}_fails"
+    failing = type("Failing", (kind,), {"bl_idname": name, "prepare": prepare, "needs": ()})
+    bpy.utils.register_class(failing)
+    area, _, verb = name.partition(".")
+    try:
+        said = sorted(blender.call(getattr(getattr(bpy.ops, area), verb), "INVOKE_DEFAULT"))
+    except RuntimeError as error:
+        said = [str(error)]
+    left = list_modal(blender)
+    bpy.utils.unregister_class(failing)
+    return {"said": said, "left": left}
+
+
+def stamp(blender: Any) -> Iterator[float | None]:
+    """Press on the bed with a stamp from a file that is not there, then with one that is."""
+    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    settings = blender.part("press.brush").tool_settings(bpy.context)
+    settings.brush, settings.stamp, settings.stamp_file = "STAMP", "FILE", str(blender.OUT / "no.stl")
+    for name, x in (("FILE", -15.0), ("heart", 15.0)):
+        settings.stamp, at = name, blender.on_the_bed(x, 0.0)
+        blender.event("MOUSEMOVE", "NOTHING", at)
+        yield None
+        blender.event("LEFTMOUSE", "PRESS", at)
+        for step in (5, 10, 20, 30):
+            blender.event("MOUSEMOVE", "NOTHING", (at[0] + step, at[1]))
+            yield 0.2
+        blender.SEEN[f"stamp {name}"] = list_modal(blender)
+        blender.event("LEFTMOUSE", "RELEASE", (at[0] + 30, at[1]))
+        yield from blender.rounds(5)
+        if name == "FILE":
+            blender.key("ESC", (at[0] + 30, at[1]))  # the message
+            yield None
+        blender.SEEN[f"stamp {name}, sessions"] = len(blender.sessions())
