@@ -297,10 +297,10 @@ def many_nodes(tree: dict[str, Any]) -> None:
     ],
 )  # fmt: skip
 def test_a_gltf_that_makes_no_sense_is_refused(tmp_path, change, said):
-    began = time.monotonic()
+    began = time.process_time()  # of this process alone: a busy machine takes longer
     with pytest.raises(ParameterError, match=re.escape(said)):
         read(gltf(tmp_path, change))
-    assert time.monotonic() - began < 2.0
+    assert time.process_time() - began < 2.0
 
 
 PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"

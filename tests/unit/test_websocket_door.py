@@ -87,9 +87,11 @@ def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch: pytest
         link.leave("two")  # it did not move the fingertip
         with pytest.raises(FrequentError):
             link.order(POSE, "two")
-        await asyncio.sleep(0.2)
+        monkeypatch.setattr(door_link, "LEASE", 1e-3)
+        link.order(POSE, "one")
+        await asyncio.sleep(0.01)
         link.order(POSE, "two")
         return moved
 
-    monkeypatch.setattr(door_link, "LEASE", 0.1)
+    monkeypatch.setattr(door_link, "LEASE", 1e9)
     assert asyncio.run(take_turns()) == ["one", "one"]
