@@ -46,6 +46,11 @@ def is_edited(context: Any) -> bool:
     return context.mode != "OBJECT" or (bed is not None and bed.mode != "OBJECT")
 
 
+def is_local(thing: Any) -> bool:
+    """Return whether an object is of this file alone: neither linked, nor a library override of what is."""
+    return thing.library is None and thing.override_library is None
+
+
 def is_linked(thing: Any) -> bool:
     """Return whether an object stands in any collection: what is deleted but held by a property does not."""
     return bool(thing.users_collection)

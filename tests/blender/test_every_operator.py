@@ -124,8 +124,13 @@ def call(operator: Any, how: str, settings: dict[str, Any]) -> str:
     return ""
 
 
-@pytest.mark.parametrize("live", [False, True])
-@pytest.mark.parametrize("odd", ODD)
+#: What `test_bed_states.py` has without a session.
+TABLED = {"a bed", "edited", "hidden", "stretched", "mirrored"}
+
+
+@pytest.mark.parametrize(
+    ("odd", "live"), [(odd, live) for odd in ODD for live in (False, True) if live or odd not in TABLED]
+)
 def test_no_operator_fails(file, odd, live, capfd):
     before, said = prepare(file, odd, live), []
     for operator, how, settings in calls(live and odd in FOR_ADDS):

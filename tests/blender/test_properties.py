@@ -37,7 +37,7 @@ def thing(layout: Layout | None = None, fingers: int = 0) -> Any:
     bridge.write_cells(mesh, places.positions, np.zeros(places.count))
     bed = parts.marked(mesh, "Bed", BED, bpy.context.collection)
     for number in range(1, fingers + 1):
-        parts.make_fingertip(bpy.context.collection, bed, number)
+        parts.make_fingertip(bed, number)
     return bed
 
 

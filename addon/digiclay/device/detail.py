@@ -11,7 +11,7 @@ import numpy as np
 
 from ..compat import bpy
 from ..core.base.arrays import Floats
-from ..roles import is_bed
+from ..roles import is_bed, is_local
 from . import view
 from .node_tree import FAR
 
@@ -65,7 +65,7 @@ def _regions(window: Any) -> Iterator[tuple[Any, Any]]:
 
 def _is_automatic(bed: Any) -> bool:
     """Return whether a bed's size in the views decides what is drawn of it."""
-    return bed.library is None and view.can_show_skin(bed) and view.read_form(bed) == "automatic"
+    return is_local(bed) and view.can_show_skin(bed) and view.read_form(bed) == "automatic"
 
 
 def _pitch(bed: Any) -> float:

@@ -43,12 +43,13 @@ NEAREST = "pin"
 WEIGHTS = ("weight low ", "weight high ")
 
 
-def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None = None) -> Any:
-    """Make an object of data (None: an empty), marked with its role."""
+def marked(data: Any, name: str, role: str, *collections: Any, parent: Any | None = None) -> Any:
+    """Make an object of data (None: an empty) in some collections, marked with its role."""
     made = bpy.data.objects.new(name, data)
     made[roles.ROLE] = role
     made.parent = parent
-    collection.objects.link(made)
+    for collection in collections:
+        collection.objects.link(made)
     return made
 
 
@@ -189,18 +190,19 @@ def _write_weights(mesh: Any, step: Pass) -> None:
             made.data.foreach_set("vector", share.astype(np.float32).ravel())
 
 
-def make_fingertip(collection: Any, bed: Any, number: int = 1, palm: Any = None) -> Any:
+def make_fingertip(bed: Any, number: int = 1, palm: Any = None) -> Any:
     """Make a fingertip of a bed, or of a palm on it: an empty that is moved, in it an ellipsoid."""
+    homes = bed.users_collection
     # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
     # of the device, kept in the ellipsoid's scale.
-    made = marked(None, name_fingertip(number), roles.FINGERTIP, collection, parent=palm or bed)
+    made = marked(None, name_fingertip(number), roles.FINGERTIP, *homes, parent=palm or bed)
     hold_fingertip(bed, number, made)
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"
     made.lock_scale = (True, True, True)
     mesh = bridge.mesh("Digital Clay Ellipsoid", primitives.ball())
     mesh.materials.append(None)
-    ball = marked(mesh, mesh.name, roles.ELLIPSOID, collection, parent=made)
+    ball = marked(mesh, mesh.name, roles.ELLIPSOID, *homes, parent=made)
     made[roles.BALL] = ball
     made[roles.OWNED] = ball[roles.OWNED] = True
     lock_in_place(ball)
@@ -232,9 +234,9 @@ def hold_fingertip(bed: Any, number: int, tip: Any) -> None:
         palm[roles.FINGERS[number - 1]], tip[roles.HAND] = tip, palm
 
 
-def make_palm(collection: Any, bed: Any) -> Any:
+def make_palm(bed: Any) -> Any:
     """Make the palm of a hand over a bed: an empty that moves its fingertips as one."""
-    made = marked(None, "Digital Clay Hand", roles.PALM, collection, parent=bed)
+    made = marked(None, "Digital Clay Hand", roles.PALM, *bed.users_collection, parent=bed)
     made[roles.OWNED] = True
     made.empty_display_type, made.empty_display_size = "CUBE", PALM_SIZE * SCALE
     return made

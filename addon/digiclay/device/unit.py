@@ -30,6 +30,7 @@ from ..roles import (
     ellipsoid,
     fingertips_of,
     is_linked,
+    is_local,
     owner_of,
 )
 from ..settings import devices, properties
@@ -115,7 +116,7 @@ def give_fingertip(bed: Any, scene: Scene) -> str:
     if tip is not None and tip.parent == bed:  # deleted: nothing but the bed holds it any more
         _stand(bed, tip)
         return f"{bed.name} got its fingertip back"
-    parts.make_fingertip(bed.users_collection[0], bed)
+    parts.make_fingertip(bed)
     rest = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1])
     bridge.place_fingertips(bed, rest.fingertips, rest.fingers)
     view.hold_parts(bed)
@@ -156,7 +157,7 @@ def follow_selection() -> None:
 def _standing(role: str) -> list[Any]:
     """Return the objects of this file with a role that stand in a collection."""
     every = (thing for thing in bpy.data.objects if thing.get(ROLE) == role)
-    return [thing for thing in every if not thing.library and not thing.override_library and is_linked(thing)]
+    return [thing for thing in every if is_local(thing) and is_linked(thing)]
 
 
 def _tips() -> Iterator[tuple[Any, int, Any]]:
@@ -258,8 +259,8 @@ def _find_palm(bed: Any, name: str) -> Any:
 def _stand(bed: Any, tip: Any) -> None:
     """Have a fingertip, with its ellipsoid and palm, stand where its bed does."""
     for part in (tip, tip.get(BALL), owner_of(tip, PALM)):
-        if part is not None and not is_linked(part):
-            bed.users_collection[0].objects.link(part)
+        for collection in bed.users_collection if part is not None and not is_linked(part) else ():
+            collection.objects.link(part)
 
 
 def _adopt(tip: Any, bed: Any) -> None:

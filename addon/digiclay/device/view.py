@@ -48,7 +48,7 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     bed = parts.marked(cells, cells.name, BED, collection)
     bed.modifiers.new(MODIFIER, "NODES").node_group = _make_tree(instant, lowest)
     for number in range(1, len(instant.fingers) + 1):
-        parts.make_fingertip(collection, bed, number)
+        parts.make_fingertip(bed, number)
     hold_parts(bed)
     bridge.place_fingertips(bed, instant.fingertips, instant.fingers)
     return bed

@@ -8,7 +8,7 @@ from .. import bridge
 from ..bridge import SCALE
 from ..compat import bpy
 from ..core.base.arrays import Flags
-from ..core.base.errors import DigiclayError, OutputError
+from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
 from ..core.mesh_io.export_model import Model
@@ -29,10 +29,6 @@ SHOWN = 1e-7
 
 def read_formed(bed: Any) -> Formed:
     """Return the pins of a bed, and before: as kept, or at rest; DigiclayError when it is no bed."""
-    if any(name not in bed.data.attributes for name in bridge.ATTRIBUTES):
-        raise OutputError(
-            f"{bed.name} has lost the attributes of its pins: press Rebuild in Laboratory > Device."
-        )
     cells = bridge.read_cells(bed.data) | _of_session(bed)
     before: Any = _scene(bed).actuator.rest_height
     if has_reference(bed):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from .. import bridge
 from ..compat import bpy
 from ..core.base.arrays import Floats
-from ..roles import BED, FINGERS, ROLE, bed_of, fingertips_of
+from ..roles import BED, FINGERS, ROLE, bed_of, fingertips_of, is_local
 from ..sessions import running
 from ..sessions.running import TABLE, Running
 from ..ui_text import localize
@@ -80,6 +81,27 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
         if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
             return localize("{} is scaled to nothing: clear its scale to go on", tip.name)
     return ""
+
+
+class Use(Enum):
+    """What an operator does with a bed: measures its pins, changes its settings and parts, or forms it."""
+
+    MEASURE, CHANGE, FORM = range(3)
+
+
+def find_obstacle(context: Any, bed: Any, use: Use) -> str:
+    """Return why the state of a bed does not allow a use of it, or an empty text."""
+    if context.view_layer.objects.get(bed.name) != bed:
+        return localize("The bed is not in this view layer: show its scene or collection first")
+    if use is not Use.MEASURE and not (is_local(bed) and is_local(bed.data)):
+        return localize("The bed is linked from another file: make it local first (Object > Relations)")
+    if use is Use.CHANGE or bed.mode != "OBJECT":
+        return ""
+    layout = bed.digiclay.layout
+    fault = bridge.find_fault(bed.data, layout.rows * layout.columns)
+    if fault:
+        return localize("{}, or press Rebuild in Laboratory > Device", fault)
+    return bridge.find_scale_fault(bed)
 
 
 def active_session(context: Any) -> tuple[Any, Running] | None:

@@ -40,6 +40,10 @@ def start(context: Any, bed: Any) -> list[Note]:
     """Begin a session of a bed from its stored state; raise DigiclayError if settings or scale forbid it."""
     if is_baked(bed):
         raise DigiclayError(f"{bed.name} plays a baked session: free the bake in the Takes panel first.")
+    context.view_layer.update()
+    obstacle = beds.find_obstacle(context, bed, beds.Use.FORM)
+    if obstacle:
+        raise DigiclayError(f"The session of {bed.name} cannot start: {obstacle}.")
     settings, scene, notes = properties.read_stored_settings(bed), properties.scene_of(bed), []
     if bed.data.users > 1:
         bed.data = bed.data.copy()

@@ -33,7 +33,7 @@ from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import to_si
 from ..ui_text import localize
 from .action import Action, FileAction, action, file_of, millimeters
-from .poll_messages import baked, edited, inside_edit, no_bed, session_runs
+from .poll_messages import baked, cannot_change, edited, inside_edit, no_collection, session_runs
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
@@ -108,7 +108,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
     bl_idname = "mesh.digital_clay_add"
     bl_label = "Digital Clay"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-    needs = (inside_edit,)
+    needs = inside_edit, no_collection
 
     bed: choice(
         "Bed", "Number and distance of the pins, and size of fingertip and blister",
@@ -155,7 +155,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
 
 
 @action(
-    "digiclay.rebuild", "Rebuild", no_bed,
+    "digiclay.rebuild", "Rebuild", cannot_change,
     session_runs.reworded("Stop the session first: its pins cannot be exchanged"),
     baked.reworded("Free the bake in the Takes panel first: it moves the pins there are now"),
     edited.reworded("Leave Edit Mode first"),
@@ -236,7 +236,7 @@ def entry(menu: Any, context: Any) -> None:
 
 
 @action(
-    "import_scene.digital_clay_run", "Import Digital Clay Run", bases=(FileAction, Placed),
+    "import_scene.digital_clay_run", "Import Digital Clay Run", no_collection, bases=(FileAction, Placed),
     options=("REGISTER", "UNDO", "PRESET"), **file_of("*.npz", "SKIP_PRESET"),
     row=integer("Row", "Recorded row to show: 0 is the first, -1 the last", default=-1),
 )  # fmt: skip
@@ -251,7 +251,7 @@ class AddSceneAction(Placed, Action):
     """Mixin of operators that add the bed of a scene, as Add > Mesh > Digital Clay does."""
 
     bl_options = {"REGISTER", "UNDO"}
-    needs = (inside_edit,)
+    needs = inside_edit, no_collection
 
     take: flag(
         "Simulate as a Take", "Simulate the session of the scene and keep it as a take, for replay or bake",
@@ -294,7 +294,7 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
 
 
 @action(
-    "digiclay.add_sample", "Digital Clay Sample", inside_edit, bases=(AddSceneAction,),
+    "digiclay.add_sample", "Digital Clay Sample", inside_edit, no_collection, bases=(AddSceneAction,),
     sample=choice(
         "Sample", items=[
             *((f"session:{name}", title(name), "A session") for name in list_samples()),

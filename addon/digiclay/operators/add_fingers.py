@@ -17,7 +17,7 @@ from ..settings.declared import choice
 from ..ui_text import localize
 from .action import action
 from .add_bed import select_only
-from .poll_messages import linked, no_bed
+from .poll_messages import cannot_form
 
 #: Distance that new fingertips keep from others, m: the masters of nearer ones would disturb each other.
 APART = 18e-3
@@ -28,7 +28,7 @@ WRIST = (2e-3, -70e-3)
 BESIDE, STEP = 200e-3, 3e-3
 
 
-@action("digiclay.add_fingertip", "Add Fingertip", no_bed, linked)
+@action("digiclay.add_fingertip", "Add Fingertip", cannot_form)
 def add_fingertip(operator: Any, context: Any) -> None:
     """Add another fingertip to the bed; a running session takes it up"""
     bed = bed_of(context)
@@ -40,7 +40,7 @@ def add_fingertip(operator: Any, context: Any) -> None:
 
 
 @action(
-    "digiclay.add_hand", "Add Hand", no_bed, linked,
+    "digiclay.add_hand", "Add Hand", cannot_form,
     side=choice("Side", "Which hand", items=[("RIGHT", "Right", ""), ("LEFT", "Left", "")]),
 )  # fmt: skip
 def add_hand(operator: Any, context: Any) -> None:
@@ -53,7 +53,7 @@ def add_hand(operator: Any, context: Any) -> None:
     places = np.array(HAND) * mirror
     away = places - np.array(WRIST) * mirror
     x, y = _find_place(bed, places)
-    palm = parts.make_palm(bed.users_collection[0], bed)
+    palm = parts.make_palm(bed)
     palm.location = np.array([x, y, _find_top(bed)]) * bridge.SCALE
     palm.location.z += 2.0 * devices.read_finger(bed.digiclay).height * bridge.SCALE
     context.view_layer.update()
@@ -92,7 +92,7 @@ def _add(bed: Any, places: Floats, palm: Any = None) -> list[Any]:
     made, top = [], _find_top(bed)
     for x, y, heading in places:
         number = parts.find_free_number(bed)
-        tip = parts.make_fingertip(bed.users_collection[0], bed, number, palm)
+        tip = parts.make_fingertip(bed, number, palm)
         devices.give_settings(bed, tip)
         parts.color_fingertip(tip, number, clear=bool(view.read_setting(bed, ARROWS, False)))
         tip.location = np.array([x, y, top + devices.read_finger(tip.digiclay).height]) * bridge.SCALE

@@ -22,9 +22,9 @@ from ..roles import bed_of
 from ..settings.declared import choice, flag, integer
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, action, millimeters
+from .action import Action, Needs, action, millimeters
 from .add_bed import select_only
-from .poll_messages import from_rest, no_surface
+from .poll_messages import cannot_change, cannot_form, from_rest, no_collection, no_surface
 
 MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
 #: Space between the bed and what is put beside it, in widths of the bed.
@@ -41,7 +41,7 @@ def sentence(text: str) -> str:
 class FindingOptions(Action):
     """Criteria of a feature."""
 
-    needs = (no_surface,)
+    needs: Needs = (no_surface,)
 
     threshold: millimeters(
         "Threshold", Finding().threshold, sentence(FINDING["threshold"].doc) + ", in mm",
@@ -114,6 +114,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
     bl_idname = "mesh.digital_clay_make"
     bl_label = "Make Mesh"
     bl_options = {"REGISTER", "UNDO"}
+    needs = no_surface, no_collection
 
     beside: flag("Beside the Bed", "Place the mesh beside the bed instead of on its surface", default=True)
 
@@ -163,13 +164,13 @@ def list_features(operator: Any, context: Any) -> None:
     operator.report({"INFO"}, lines[0])
 
 
-@action("digiclay.keep_surface", "Measure from Here", no_surface)
+@action("digiclay.keep_surface", "Measure from Here", cannot_form, no_surface)
 def keep_surface(operator: Any, context: Any) -> None:
     """Measure features from the current surface"""
     formed_bed.set_reference(chosen_bed(context))
 
 
-@action("digiclay.forget_surface", "Measure from Rest", no_surface, from_rest)
+@action("digiclay.forget_surface", "Measure from Rest", cannot_change, from_rest)
 def forget_surface(operator: Any, context: Any) -> None:
     """Measure features from the bed at rest again"""
     formed_bed.clear_reference(chosen_bed(context))

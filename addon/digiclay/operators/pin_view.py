@@ -12,7 +12,7 @@ from ..press import aim
 from ..roles import bed_of
 from ..ui_text import localize
 from .action import Modal, action, clear_status, show_status
-from .poll_messages import linked, no_bed, no_pins, no_skin, no_view
+from .poll_messages import cannot_change, no_pins, no_skin, no_view
 
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
 
@@ -29,16 +29,13 @@ def pick_pins(bed: Any, pins: Iterable[int]) -> None:
     views.redraw()
 
 
-NO_BED = no_bed.reworded("Select a bed of pins first")
-
-
 class PickPins(Modal, bpy.types.Operator):
     """Click pins of the active bed to see their heights in the overlay"""
 
     bl_idname = "digiclay.pick_pins"
     bl_label = "Pick Pins"
     bl_options = {"UNDO"}
-    needs = NO_BED, no_view
+    needs = cannot_change, no_view
 
     def prepare(self, context: Any, event: Any) -> None:
         self.changed = False
@@ -88,13 +85,13 @@ def _under(screen: Any, event: Any) -> tuple[Any, Any] | tuple[None, None]:
     return None, None
 
 
-@action("digiclay.clear_pins", "Clear", NO_BED, no_pins, options=("UNDO",))
+@action("digiclay.clear_pins", "Clear", cannot_change, no_pins, options=("UNDO",))
 def clear_pins(operator: Any, context: Any) -> None:
     """Remove all picked pins of the active bed"""
     pick_pins(bed_of(context), ())
 
 
-@action("digiclay.skin_toggle", "Toggle Skin", no_bed, linked, no_skin)
+@action("digiclay.skin_toggle", "Toggle Skin", cannot_change, no_skin)
 def toggle_skin(operator: Any, context: Any) -> None:
     """Show the surface of the pins as a skin, or the pins again"""
     bed = bed_of(context)

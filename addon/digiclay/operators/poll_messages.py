@@ -10,12 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .. import bridge, preferences
+from .. import preferences
 from ..compat import bpy
 from ..device import view
 from ..exchange import formed_bed
 from ..live import beds, follow, loop, tick
-from ..live.beds import active_session, blocking_reason
+from ..live.beds import Use, active_session, blocking_reason, find_obstacle
 from ..press import brush
 from ..recorded import takes
 from ..recorded.bake import is_baked
@@ -56,9 +56,14 @@ edited = Need(is_edited, "Go back to Object Mode first")
 # A new bed is an object: it cannot be added inside another object's edit mode.
 inside_edit = edited.reworded("Leave Edit Mode first: the device is an object of its own")
 in_object_mode = Need(lambda context: context.mode == "OBJECT", "This is Object Mode already")
-linked = Need(
-    lambda context: bed_of(context).library or bed_of(context).data.library,
-    "The bed is linked from another file: make it local first (Object > Relations)",
+no_collection = Need(
+    lambda context: (
+        not (
+            context.collection == context.scene.collection  # always shown, and unmarked in a new scene
+            or context.view_layer.active_layer_collection.is_visible
+        )
+    ),
+    "The active collection is hidden: show it, or make another one active",
 )
 baked = Need(
     lambda context: is_baked(bed_of(context)),
@@ -113,12 +118,18 @@ no_gesture = Need(
 )
 
 
+def _allow(use: Use) -> Callable[[Any], str]:
+    """Return the need of a bed whose state allows a use."""
+    return lambda context: no_bed(context) or find_obstacle(context, bed_of(context), use)
+
+
+cannot_measure, cannot_change, cannot_form = map(_allow, Use)
+
+
 def no_surface(context: Any) -> str:
-    """There is no bed, or its pins span no surface."""
+    """There is no bed with pins to be measured, or they span no surface."""
     few = "A bed needs at least 2 x 2 pins to have a surface"
-    return no_bed.reworded("Select a bed of Digital Clay, or its fingertip")(context) or (
-        few if len(bed_of(context).data.vertices) < 4 else ""
-    )
+    return cannot_measure(context) or (few if len(bed_of(context).data.vertices) < 4 else "")
 
 
 def session_waits(context: Any) -> str:
@@ -135,7 +146,7 @@ def nothing_to_reset(context: Any) -> str:
     """The bed is at rest, or its session waits."""
     if active_session(context) is not None:
         return session_waits(context)
-    return no_bed(context) or (
+    return cannot_form(context) or (
         "The bed is at rest already" if beds.read_snapshot(bed_of(context)) is None else ""
     )
 
@@ -160,6 +171,4 @@ def no_finger(context: Any) -> str:
     bed = brush.bed_in_use(context)
     if bed is None or fingertip_of(bed) is None:
         return "Select a bed of Digital Clay, or its fingertip"
-    if bed.library is not None:
-        return "The bed is linked from another file: make it local first"
-    return bridge.find_scale_fault(bed)
+    return find_obstacle(context, bed, Use.FORM)

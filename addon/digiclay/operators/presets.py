@@ -14,7 +14,7 @@ from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
 from ..ui_text import localize
 from .action import Action, action
-from .poll_messages import no_bed, no_own_methods, no_own_preset
+from .poll_messages import cannot_change, no_bed, no_own_methods, no_own_preset
 
 
 class ApplyPreset(Action, bpy.types.Operator):
@@ -23,7 +23,7 @@ class ApplyPreset(Action, bpy.types.Operator):
     bl_idname = "digiclay.preset_apply"
     bl_label = "Apply Digital Clay Preset"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
-    needs = (no_bed,)
+    needs = (cannot_change,)
 
     preset: text("Preset")
 
@@ -71,7 +71,7 @@ class RemovePreset(Action, bpy.types.Operator):
 
     bl_idname = "digiclay.preset_remove"
     bl_label = "Remove Digital Clay Preset"
-    needs = no_bed, no_own_preset
+    needs = cannot_change, no_own_preset
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         return set(context.window_manager.invoke_confirm(self, event))

@@ -14,6 +14,7 @@ from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
+from ..live.beds import Use, find_obstacle
 from ..panels.base import menu
 from ..press import aim, brush, tool
 from ..press.brush import FINGERS
@@ -149,7 +150,8 @@ class AdjustMixin(Drawing):
 def _find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:
     """Return the bed under a pixel of the region and the place there, m; or the bed in use and its middle."""
     target = aim.find_target(context, xy)
-    if target is not None and fingertip_of(target.bed) is not None and target.bed.library is None:
+    tip = target and fingertip_of(target.bed)
+    if target is not None and tip is not None and not find_obstacle(context, target.bed, Use.FORM):
         return target.bed, target.point
     bed: Any = brush.bed_in_use(context)
     height = bridge.read_cells(bed.data)["height"]

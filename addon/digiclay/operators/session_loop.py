@@ -261,9 +261,8 @@ class Session(LoopMixin, Action, bpy.types.Operator):
     bl_idname = "digiclay.session"
     bl_label = "Start Session"
     needs = (
-        poll.no_bed,
+        poll.cannot_form,
         poll.session_runs.reworded("A session runs on this bed already: Esc stops it"),
-        poll.linked,
         poll.baked,
         poll.no_window,
     )

@@ -16,7 +16,7 @@ from ..settings.declared import choice, number, title
 from ..settings.shown_units import to_si
 from ..ui_text import localize
 from .action import Action, FileAction, action, file_of, millimeters
-from .poll_messages import baked, linked, no_bed, no_shape, session_runs
+from .poll_messages import baked, cannot_change, cannot_form, no_shape, session_runs
 
 DEFAULT = Shape()
 FITS = (
@@ -36,10 +36,9 @@ LENGTH = {"soft_min": -100.0, "soft_max": 100.0, "min": -1e5, "max": 1e5, "step"
 
 #: Needs of the operators that display a shape.
 NEEDS = (
-    no_bed,
+    cannot_form,
     session_runs.reworded("Stop the session first: the bed is going to be shaped anew"),
     baked,
-    linked,
 )
 
 
@@ -130,7 +129,7 @@ def show_sample(operator: Any, context: Any) -> None:
     operator.tell(bed, *shape_show.show_file(bed, operator.shape(operator.sample, bed)))
 
 
-@action("digiclay.shape_keep", "Keep Formed as Shape", no_bed, session_runs, options=("UNDO",))
+@action("digiclay.shape_keep", "Keep Formed as Shape", cannot_form, session_runs, options=("UNDO",))
 def keep_shape(operator: Any, context: Any) -> None:
     """Make the formed surface the bed's shape: sessions begin with it, elastic and viscous beds keep to it"""
     bed = bed_of(context)
@@ -142,7 +141,7 @@ def keep_shape(operator: Any, context: Any) -> None:
     operator.report({"INFO"}, words)
 
 
-@action("digiclay.shape_remove", "Remove Shape", no_bed, session_runs, no_shape, options=("UNDO",))
+@action("digiclay.shape_remove", "Remove Shape", cannot_change, session_runs, no_shape, options=("UNDO",))
 def remove_shape(operator: Any, context: Any) -> None:
     """Remove the bed's shape: sessions begin at rest; the formed surface stays until then"""
     settings = bed_of(context).digiclay

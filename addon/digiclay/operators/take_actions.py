@@ -32,7 +32,17 @@ from ..settings import properties
 from ..settings.declared import choice, integer, text
 from ..ui_text import localize
 from .action import FileAction, TimedAction, action, file_of, show_status
-from .poll_messages import baked, cannot_record, linked, no_bake, no_bed, no_recording, no_take, session_runs
+from .poll_messages import (
+    baked,
+    cannot_change,
+    cannot_form,
+    cannot_record,
+    no_bake,
+    no_bed,
+    no_recording,
+    no_take,
+    session_runs,
+)
 
 TAKE = text("Take", "Number of the take; empty: the last one")
 
@@ -100,14 +110,14 @@ class ExportTake(FileAction, bpy.types.Operator):
         self.report({"INFO"}, localize("{} written to {}", entry.name, file))
 
 
-@action("digiclay.take_remove", "Remove Take", no_bed, no_take, take=TAKE)
+@action("digiclay.take_remove", "Remove Take", cannot_change, no_take, take=TAKE)
 def remove_take(operator: Any, context: Any) -> None:
     """Remove a take"""
     takes.remove(bed_of(context), takes.find(bed_of(context), operator.take).number)
 
 
 @action(
-    "digiclay.play_strokes", "Play Strokes", no_bed, session_runs, linked, baked, bases=(FileAction,),
+    "digiclay.play_strokes", "Play Strokes", cannot_form, session_runs, baked, bases=(FileAction,),
     **file_of("*.toml"),
 )  # fmt: skip
 def play(operator: Any, context: Any) -> None:
@@ -137,7 +147,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
     bl_idname = "digiclay.take_replay"
     bl_label = "Replay Take"
     bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, session_runs.reworded("Stop the session on this bed first"), no_take
+    needs = cannot_form, session_runs.reworded("Stop the session on this bed first"), baked, no_take
 
     take: TAKE
     parts: integer(
@@ -274,7 +284,7 @@ class Bake(TimedAction, bpy.types.Operator):
     bl_label = "Bake Session"
     interval = TICK
     bl_options = {"REGISTER", "UNDO"}
-    needs = no_bed, session_runs.reworded("Stop the session on this bed first")
+    needs = cannot_form, session_runs.reworded("Stop the session on this bed first")
 
     take: TAKE
     source: choice("Source", "Source of the fingertip path", items=SOURCES, default="FINGERTIP")
@@ -355,7 +365,7 @@ class Bake(TimedAction, bpy.types.Operator):
         self.report({"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, last))
 
 
-@action("digiclay.bake_free", "Free Bake", no_bed, no_bake)
+@action("digiclay.bake_free", "Free Bake", cannot_change, no_bake)
 def free_bake(operator: Any, context: Any) -> None:
     """Remove the bake: the bed shows its own state again. Keyframes of the fingertip stay"""
     bake.free(bed_of(context))

@@ -250,6 +250,6 @@ def _read_finger() -> tuple[float, float, float]:
 def _take_finger(axes: Any) -> None:
     """Give the fingertip a length, width and height, mm."""
     bed = bed_in_use(bpy.context)
-    if bed is not None and bed.library is None:
+    if bed is not None and not beds.find_obstacle(bpy.context, bed, beds.Use.CHANGE):
         length, width, height = (round(5e-4 * float(axis), 9) for axis in axes)
         devices.resize(devices.find_first(bed), Fingertip(length, width, height))

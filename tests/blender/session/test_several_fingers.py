@@ -277,7 +277,7 @@ def test_a_session_waits_without_any_fingertip(pair: Any, clock: Clock) -> None:
 @pytest.mark.usefixtures("machine")
 @pytest.mark.parametrize("palm", [False, True])
 def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock, palm: bool) -> None:
-    hand = parts.make_palm(bpy.context.collection, pair) if palm else pair
+    hand = parts.make_palm(pair) if palm else pair
     for tip in fingertips_of(pair).values():
         tip.parent = hand
     looked()

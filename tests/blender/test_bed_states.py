@@ -1,0 +1,307 @@
+"""Every operator on a bed in every state: it does its work, or says in one line why it does not."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge, operators
+from digiclay.compat import read_stored
+from digiclay.core.base.errors import DigiclayError
+from digiclay.exchange import formed_bed
+from digiclay.exchange.formed_bed import FORMER
+from digiclay.live import tick
+from digiclay.operators.pin_view import pick_pins
+from digiclay.recorded import takes
+from digiclay.roles import fingertip_of, is_bed
+from digiclay.sessions import running
+from digiclay.settings import own_presets, properties
+
+from tests.blender.at_hand import beds, in_the_view, new_bed, select
+
+#: What an operator does: it adds a bed, or reads data or pins of one, or changes its settings and parts, or
+#: forms and displays something with its pins.
+ADDS, DATA, PINS, CHANGES, FORMS = "adds", "data", "pins", "changes", "forms"
+#: Every operator that works without a hand and without a session, how it is called, and what it does.
+CALLS: dict[str, tuple[Any, ...]] = {
+    "mesh.digital_clay_add": ({"rows": 4, "columns": 4}, ADDS),
+    "digiclay.add_sample": ({"sample": "session:tap", "take": False}, ADDS),
+    "digiclay.open_scene": ({"filepath": "tap.toml", "take": False}, ADDS),
+    "digiclay.take_export": ({"filepath": "take.toml"}, DATA),
+    "digiclay.preset_save": ({"name": "Another"}, DATA),
+    "mesh.digital_clay_make": ({}, PINS, ADDS),
+    "export_mesh.digital_clay": ({"filepath": "bed.stl"}, PINS),
+    "digiclay.find_features": ({}, PINS),
+    "digiclay.rebuild": ({}, CHANGES),
+    "digiclay.forget_surface": ({}, CHANGES),
+    "digiclay.clear_pins": ({}, CHANGES),
+    "digiclay.skin_toggle": ({}, CHANGES),
+    "digiclay.preset_apply": ({"preset": "viscous"}, CHANGES),
+    "digiclay.preset_remove": ({}, CHANGES),
+    "digiclay.shape_remove": ({}, CHANGES),
+    "digiclay.take_remove": ({}, CHANGES),
+    "digiclay.bake_free": ({}, CHANGES),
+    "digiclay.add_fingertip": ({}, FORMS),
+    "digiclay.add_hand": ({}, FORMS),
+    "digiclay.keep_surface": ({}, FORMS),
+    "digiclay.press_scale": ({"scalar": 1.5}, FORMS),
+    "digiclay.press_finger": ({"kind": "palm"}, FORMS),
+    "digiclay.session_reset": ({}, FORMS),
+    "digiclay.shape_from_object": ({}, FORMS),
+    "digiclay.shape_from_file": ({"filepath": "ramp.npy"}, FORMS),
+    "digiclay.shape_sample": ({"sample": "dome"}, FORMS),
+    "digiclay.shape_keep": ({}, FORMS),
+    "digiclay.play_strokes": ({"filepath": "strokes.toml"}, FORMS),
+    "digiclay.take_replay": ({}, FORMS),
+    "digiclay.bake": ({"last": 3}, FORMS),
+}
+WRITTEN = "take.toml", "bed.stl"
+#: What needs a bed that plays a bake, which nothing else is called on.
+BAKED = {"digiclay.bake_free"}
+#: What needs a hand, a view, a session, or the folder of a run.
+ELSEWHERE = {
+    "import_scene.digital_clay_run", "digiclay.pick_pins", "digiclay.methods_reload", "digiclay.press",
+    "digiclay.press_size", "digiclay.press_depth", "digiclay.press_strength", "digiclay.press_brush",
+    "digiclay.press_brush_save", "digiclay.press_center", "digiclay.press_locks_invert",
+    "digiclay.press_locks_clear", "digiclay.press_shape", "digiclay.press_line", "digiclay.session",
+    "digiclay.session_go_on", "digiclay.finish_strokes", "digiclay.session_escape", "digiclay.leave_mode",
+    "digiclay.session_pause", "digiclay.session_step", "digiclay.session_stop", "digiclay.session_rewind",
+    "digiclay.follow_server", "digiclay.leave_server", "digiclay.take_record", "digiclay.take_keep",
+}  # fmt: skip
+
+
+def link(bed: Any) -> Any:
+    """Link the bed of the open file into an empty one, with all that belongs to it."""
+    path = bpy.data.filepath
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (there, here):
+        here.objects = [name for name in there.objects if name.startswith(("Digital", "Fingertip"))]
+    for thing in here.objects:
+        if thing.type == "EMPTY" or is_bed(thing):
+            bpy.context.collection.objects.link(thing)
+    return next(thing for thing in here.objects if is_bed(thing))
+
+
+def override(bed: Any) -> Any:
+    select(link(bed))
+    bpy.ops.object.make_override_library()
+    bpy.context.object.data.override_create(remap_local_usages=True)
+    return bpy.context.object
+
+
+def half_local(bed: Any) -> Any:
+    return link(bed).make_local()
+
+
+def damage(bed: Any) -> Any:
+    """Delete the last row of pins: the others are a bed of fewer rows."""
+    select(bed)
+    for vertex in bed.data.vertices:
+        vertex.select = vertex.index >= 20
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.delete(type="VERT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return bed
+
+
+def edit(bed: Any) -> Any:
+    select(bed)
+    bpy.ops.object.mode_set(mode="EDIT")
+    return bed
+
+
+def stretch(*scale: float) -> Callable[[Any], Any]:
+    def stretched(bed: Any) -> Any:
+        bed.scale = scale
+        return bed
+
+    return stretched
+
+
+def put(bed: Any, name: str) -> Any:
+    """Put the bed with its parts into a new collection alone; return that, in the view layer."""
+    collection = bpy.data.collections.new(name)
+    bpy.context.scene.collection.children.link(collection)
+    for thing in (bed, fingertip_of(bed)):
+        for former in thing.users_collection:
+            former.objects.unlink(thing)
+        collection.objects.link(thing)
+    return bpy.context.view_layer.layer_collection.children[name]
+
+
+def exclude(bed: Any) -> Any:
+    put(bed, "Excluded").exclude = True
+    return bed
+
+
+def exclude_one(bed: Any) -> Any:
+    """Have the bed stand in a collection that is excluded as well, the first of its two."""
+    layer = put(bed, "A")
+    for thing in (bed, fingertip_of(bed)):
+        bpy.context.scene.collection.objects.link(thing)
+    layer.exclude = True
+    return bed
+
+
+def hide_collection(bed: Any) -> Any:
+    """Hide the collection that what is added goes into, with its eye."""
+    layer = put(bed, "Hidden")
+    bpy.context.view_layer.active_layer_collection = layer
+    layer.hide_viewport = True
+    bpy.context.view_layer.active_layer_collection = layer
+    return bed
+
+
+def leave_scene(bed: Any) -> Any:
+    bpy.context.window.scene = bpy.data.scenes.new("Another")
+    return bed
+
+
+def keep(bed: Any) -> Any:
+    return bed
+
+
+#: States of a bed: what brings it there, and what can be done with it then; all else is refused.
+STATES: dict[str, tuple[Callable[[Any], Any], set[str]]] = {
+    "plain": (keep, {ADDS, DATA, PINS, CHANGES, FORMS}),
+    "linked": (link, {ADDS, DATA, PINS}),
+    "overridden, with its mesh": (override, {ADDS, DATA, PINS}),
+    "linked, the object made local alone": (half_local, {ADDS, DATA, PINS}),
+    "mirrored": (stretch(-1.0, 1.0, 1.0), {ADDS, DATA, CHANGES}),
+    "stretched": (stretch(1.0, 1.0, 2.0), {ADDS, DATA, CHANGES}),
+    "pins deleted": (damage, {ADDS, DATA, CHANGES}),
+    "its collection excluded": (exclude, {ADDS, DATA}),
+    "one of its collections excluded": (exclude_one, {ADDS, DATA, PINS, CHANGES, FORMS}),
+    "its collection hidden, and active": (hide_collection, {DATA, PINS, CHANGES, FORMS}),
+    "hidden": (lambda bed: (bed.hide_set(True), bed)[1], {ADDS, DATA, PINS, CHANGES, FORMS}),
+    "in another scene": (leave_scene, {ADDS, DATA}),
+    "edited": (edit, set()),
+}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Files with a small bed that has all that operators look for, plain and baked, and what they read."""
+    return tmp_path_factory.mktemp("beds")
+
+
+@pytest.fixture
+def folder(extension, files, monkeypatch):
+    """The folder of the files, made by the first test that asks."""
+    monkeypatch.chdir(files)
+    if not (files / "bed.blend").exists():
+        make_files(files)
+    return files
+
+
+def make_files(folder: Path) -> None:
+    bed = new_bed(rows=5, columns=5)
+    (folder / "strokes.toml").write_text("[[stroke]]\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n")
+    np.save(folder / "ramp.npy", np.linspace(0.0, 1.0, 25).reshape(5, 5))
+    scene = properties.scene_of(bed)
+    takes.add(bed, takes.simulate(scene), "Press")
+    bpy.ops.digiclay.take_export(filepath=str(folder / "tap.toml"))
+    formed_bed.set_reference(bed)
+    bpy.ops.digiclay.shape_sample(sample="wave")
+    pick_pins(bed, [1, 2])
+    bed.digiclay.own_preset = "Own"
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "bed.blend"))
+    bpy.ops.digiclay.bake(last=3)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "baked.blend"))
+
+
+def file_of(name: str) -> str:
+    """Return the file that an operator is called in."""
+    return "baked.blend" if name in BAKED else "bed.blend"
+
+
+def prepare(name: str, state: str) -> Any:
+    """Open the file that an operator is called in, and bring its bed into a state; return the bed."""
+    bpy.ops.wm.open_mainfile(filepath=str(Path(file_of(name)).resolve()))
+    for file in WRITTEN:
+        Path(file).unlink(missing_ok=True)
+    own_presets.path("Another").unlink(missing_ok=True)
+    own_presets.save("Own", properties.read_scene(beds()[0]))
+    bed = STATES[state][0](beds()[0])
+    bpy.context.view_layer.update()
+    cube = bpy.context.view_layer.objects.get("Cube")
+    if cube is not None and bed.mode == "OBJECT":  # what a shape is made of
+        cube.select_set(True)
+    return bed
+
+
+def call(bed: Any, name: str) -> tuple[str, Any]:
+    """Call an operator on a bed as the view would; return what it says against it, and the result."""
+    area, _, own = name.partition(".")
+    # A bed that the view layer does not have cannot be active: a script can still pass it.
+    with in_the_view(), bpy.context.temp_override(object=bed, active_object=bed):
+        try:
+            return "", getattr(getattr(bpy.ops, area), own)(**CALLS[name][0])
+        except RuntimeError as error:
+            return str(error).partition(".poll() ")[2] or str(error), None
+
+
+def start(bed: Any) -> tuple[str, Any]:
+    """Start a session of a bed, as the operator does in a window, and stop it."""
+    try:
+        tick.start(bpy.context, bed)
+    except DigiclayError as error:
+        return str(error), None
+    assert tick.stop(bed.session_uid) == ""
+    return "", {"FINISHED"}
+
+
+def read_attributes(mesh: Any) -> dict[str, bytes]:
+    """Return the values of the numbers that a mesh has for its pins."""
+    found = {}
+    for name in {"position", FORMER, *bridge.ATTRIBUTES} & set(mesh.attributes.keys()):
+        of = np.int32 if name == "mode" else np.float32
+        values = np.empty(len(mesh.vertices) * (3 if name == "position" else 1), of)
+        mesh.attributes[name].data.foreach_get("vector" if name == "position" else "value", values)
+        found[name] = values.tobytes()
+    return found
+
+
+def observe() -> dict[str, Any]:
+    """Return all that an operator can change: objects, their properties and settings, pins, bakes, files."""
+    found: dict[str, Any] = {}
+    for thing in bpy.data.objects:
+        values = [one.to_dict() if hasattr(one, "to_dict") else one for one in thing.values()]
+        groups = [repr(read_stored(thing, name)) for name in ("digiclay", "digiclay_display")]
+        pins = read_attributes(thing.data) if is_bed(thing) and thing.mode == "OBJECT" else {}
+        found[thing.name_full] = repr(values), groups, pins, thing.modifiers.keys(), thing.library
+    folders = (Path(), own_presets.folder())
+    kept = {file: file.read_bytes() for one in folders for file in one.glob("*") if ".blend" not in file.name}
+    return {**found, "files": kept, "sessions": running.list_sessions()}
+
+
+SESSION = "a session"
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_an_operator_works_or_says_in_a_line_why_it_does_not(folder, state, capfd):
+    wrong, opened = [], ""
+    for name, (_, *uses) in {SESSION: ({}, FORMS), **CALLS}.items():
+        if opened != file_of(name):  # or something has changed since
+            bed, opened = prepare(name, state), file_of(name)
+            before = observe()
+        said, result = start(bed) if name == SESSION else call(bed, name)
+        changed = observe() != before
+        if set(uses) <= STATES[state][1]:
+            right = result == {"FINISHED"} and changed
+        else:
+            one_line = 0 < len(said.strip()) <= 400 and "\n" not in said.strip()
+            right = result is None and one_line and "context is incorrect" not in said and not changed
+        if not right:
+            wrong.append((name, result, changed, said))
+        opened = "" if changed else opened
+    assert wrong == []
+    assert "Traceback" not in "".join(capfd.readouterr())
+
+
+def test_the_table_has_every_operator():
+    every = {kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)}
+    assert CALLS.keys() | ELSEWHERE == every
+    assert not CALLS.keys() & ELSEWHERE
