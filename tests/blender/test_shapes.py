@@ -12,11 +12,13 @@ from digiclay.core.model.layout import make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
 from digiclay.core.shapes.fitting import unpack as heights_of
+from digiclay.core.shapes.heightmap import read_pixels
 from digiclay.exchange import image_reader
 from digiclay.live.beds import read_snapshot
 from digiclay.roles import fingertip_of, is_bed
 from digiclay.settings import properties
 
+from tests import pictures
 from tests.blender.at_hand import beds, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -210,7 +212,7 @@ def test_blender_reads_a_picture_as_it_is(tmp_path, kind, depth, step):
     path = tmp_path / f"Übung 1.{'exr' if kind == 'OPEN_EXR' else 'png'}"
     image(path, values, kind, depth)
     before = len(bpy.data.images)
-    read = image_reader.pixels(path)
+    read = read_pixels(path)
     assert read.shape == (7, 5)
     assert np.abs(read - values).max() <= step
     assert len(bpy.data.images) == before
@@ -219,17 +221,52 @@ def test_blender_reads_a_picture_as_it_is(tmp_path, kind, depth, step):
     assert np.ptp(heights(made)) > 10e-3
 
 
+@pytest.mark.parametrize("name", [*pictures.READ, *pictures.BLENDER])
+def test_blender_reads_every_kind_of_picture_in_all_its_bits(name):
+    step = pictures.STEPS[{**pictures.READ, **pictures.BLENDER}[name]]
+    assert pictures.measure_error(name, read_pixels(pictures.FOLDER / name)) <= step
+
+
+@pytest.mark.parametrize("name", pictures.OUTSIDE)
+def test_a_kind_of_picture_that_blender_does_not_read_is_refused(name):
+    with pytest.raises(ParameterError, match="must be a picture Blender can read"):
+        read_pixels(pictures.FOLDER / name)
+
+
+@pytest.mark.parametrize("orientation", pictures.STORED)
+@pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
+def test_a_picture_stands_in_blender_as_its_exif_data_say(tmp_path, ending, orientation):
+    path = tmp_path / f"a.{ending}"
+    pictures.write_turned(path, orientation)
+    seen = read_pixels(path)[::-1][4::8, 4::8] / 20 * 255
+    assert np.abs(seen - pictures.UPRIGHT).max() < 0.2  # what a JPEG leaves
+
+
+@pytest.mark.parametrize(("kind", "absent"), pictures.NO_DATA)
+def test_blender_leaves_out_what_a_geotiff_has_no_data_of(tmp_path, kind, absent, monkeypatch):
+    path = tmp_path / "dem.tif"
+    known = pictures.write_geotiff(path, kind, absent)[::-1, 6:]
+    read = read_pixels(path)
+    assert np.array_equal(np.ma.getmaskarray(read), np.tile(np.arange(12) < 6, (10, 1)))
+    seen = read[:, 6:]
+    # Blender keeps 24 bits of each number, as a share of the largest.
+    assert np.abs(seen * (known.max() / seen.max()) - known).max() < 1e-3
+    monkeypatch.setattr(image_reader, "MOST", 60)
+    with pytest.raises(ParameterError, match="unscaled where it has pixels without data"):
+        read_pixels(path)
+
+
 def test_a_large_picture_is_scaled_down_by_blender_and_what_is_none_refused(tmp_path, monkeypatch):
     image(tmp_path / "large.png", np.tile(np.linspace(0, 1, 300), (200, 1)), "PNG", "8")
     monkeypatch.setattr(image_reader, "MOST", 6000)
-    read = image_reader.pixels(tmp_path / "large.png")
+    read = read_pixels(tmp_path / "large.png")
     assert read.size <= 6000
     assert read.shape[1] / read.shape[0] == pytest.approx(1.5, rel=0.03)
     assert np.ptp(read) > 0.95
     (tmp_path / "x.png").write_bytes(b"rubbish")
     before = len(bpy.data.images)
     with pytest.raises(ParameterError, match="must be a picture Blender can read"):
-        image_reader.pixels(tmp_path / "x.png")
+        read_pixels(tmp_path / "x.png")
     assert len(bpy.data.images) == before
 
 
@@ -242,4 +279,4 @@ def test_the_sample_pictures_are_the_same_to_blender_and_to_pillow():
         with pillow.open(path) as opened:
             levels = np.flipud(np.asarray(opened)).astype(float)
         levels /= 65535.0 if levels.max() > 255 else 255.0
-        assert np.abs(image_reader.pixels(path) - levels).max() < 1e-5, name
+        assert np.abs(read_pixels(path) - levels).max() < 1e-5, name

@@ -13,12 +13,14 @@ from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes import heightmap
 from digiclay.core.shapes.fitting import Fitted, fit_given, fit_relief, pack, unpack
-from digiclay.core.shapes.heightmap import average_blocks, make_height_map, read_pixels, read_size
+from digiclay.core.shapes.heightmap import average_blocks, make_height_map, read_grid, read_head, read_pixels
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
+
+from tests import pictures
 
 REST, STROKE = Actuator().rest_height, Actuator().stroke
 BED = make_grid(Layout(13, 25, 3e-3))
@@ -257,7 +259,120 @@ def test_a_picture_is_read_as_it_was_written(tmp_path, bits, kind, ending):
     assert np.array_equal(read_pixels(path), np.flipud(values))
     # By its brightness, where it is colored: red weighs 0.299 of 255, as in the television standard.
     Image.fromarray(np.array([[[255] * 3] * 2, [[0] * 3, [255, 0, 0]]], np.uint8)).save(path)
-    assert read_pixels(path).tolist() == [[0, 76], [255, 255]]
+    assert np.abs(read_pixels(path) - [[0, 76.245], [255, 255]]).max() < 1e-4  # 24 bits of 255
+
+
+@pytest.mark.parametrize("name", [*pictures.READ, *pictures.OUTSIDE])
+def test_every_kind_of_picture_is_read_in_all_its_bits_and_what_is_clear_is_black(name):
+    step = pictures.STEPS[{**pictures.READ, **pictures.OUTSIDE}[name]]
+    assert pictures.measure_error(name, read_pixels(pictures.FOLDER / name)) <= step
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("rgb16_planes.tif", "if they are of more than 8 bits (got {}: separate planes)"),
+        ("gray16_white_is_zero.tif", "if they are of more than 8 bits (got {}: 0 is white)"),
+        ("gray_alpha16.tif", "(got {}: a TIFF of 2 channels of 16 bits, unknown to Pillow)"),
+        ("rgb_float32.tif", "(got {}: a TIFF of 3 channels of 32 bits, unknown to Pillow)"),
+        ("cmyk16.tif", "(got {}: CMYK of 16 bits)"),
+    ],
+)
+def test_a_kind_of_picture_that_would_be_read_wrong_is_refused_with_its_cause(name, said):
+    path = pictures.FOLDER / name
+    with pytest.raises(ParameterError, match=re.escape(said.format(path))):
+        read_pixels(path)
+
+
+@pytest.mark.parametrize("orientation", pictures.STORED)
+@pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
+def test_a_picture_stands_as_its_exif_data_say(tmp_path, ending, orientation):
+    path = tmp_path / f"a.{ending}"
+    pictures.write_turned(path, orientation)
+    seen = read_pixels(path)[::-1][4::8, 4::8] / 20
+    assert np.abs(seen - pictures.UPRIGHT).max() < 0.2  # what a JPEG leaves
+
+
+@pytest.mark.parametrize(("kind", "absent"), pictures.NO_DATA)
+def test_what_a_geotiff_has_no_data_of_is_no_part_of_the_shape(tmp_path, kind, absent):
+    known = pictures.write_geotiff(tmp_path / "dem.tif", kind, absent)
+    read = read_pixels(tmp_path / "dem.tif")
+    assert np.array_equal(np.ma.getmaskarray(read), np.tile(np.arange(12) < 6, (10, 1)))
+    assert np.array_equal(read[:, 6:], known[::-1, 6:])
+
+
+ESRI = "ncols 4\nnrows 3\nxllcorner 5e5\nyllcorner 5.3e6\ncellsize 20\nNODATA_value -9999\n"
+NORTH_UP = "1 2 3 4\n5 -9999 7 8\n9 10 11 12\n"
+KNOWN = np.ma.masked_equal([[9, 10, 11, 12], [5, -9999, 7, 8], [1, 2, 3, 4]], -9999)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "known"),
+    [
+        ("a.asc", ESRI + NORTH_UP, KNOWN),
+        ("a.asc", "\ufeff" + (ESRI + NORTH_UP).replace("\n", "\r\n").replace(" ", "\t"), KNOWN),
+        ("a.asc", ESRI.upper().replace("NODATA_VALUE -9999\n", "") + NORTH_UP, KNOWN),
+        ("a.ASC", ESRI + "1 2\n3 4\n5 -9999\n7 8\n9 10\n11 12", KNOWN),
+        ("a.txt", "# in m\n1 2.5 3e0\n4 5 6", [[1, 2.5, 3], [4, 5, 6]]),
+        ("a.csv", "1, 2.5, 3\n4, 5, 6\n\n", [[1, 2.5, 3], [4, 5, 6]]),
+        ("a.csv", "1;2,5;3\n4;5;6\n", [[1, 2.5, 3], [4, 5, 6]]),
+        ("a.txt", "1\t2,5\t3\n4\t5\t6\n", [[1, 2.5, 3], [4, 5, 6]]),
+    ],
+)
+def test_a_grid_of_numbers_is_read_as_its_program_writes_it(tmp_path, name, text, known):
+    (tmp_path / name).write_text(text, encoding="utf-8", newline="")
+    read = read_grid(tmp_path / name)
+    known = np.ma.array(known)
+    assert np.array_equal(read.values, np.ma.filled(known, 0.0))
+    assert (read.share is None) == (np.ma.count_masked(known) == 0)
+    assert read.length == (20.0 if name.lower() == "a.asc" else None)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.asc", NORTH_UP, "(got a.asc: no 'nrows' in its head, as an Esri ASCII grid has it)"),
+        ("a.asc", ESRI + NORTH_UP[8:], "(got a.asc: cannot reshape array of size 8 into shape (3,4))"),
+        ("a.txt", "", "(got a.txt: loadtxt: input contained no data"),
+        ("a.txt", "1 2\n3", "(got a.txt: the number of columns changed from 2 to 1 at row 2)"),
+        ("a.csv", "x,y\n1,2\n", "(got a.csv: could not convert string 'x' to float64 at row 0, column 1.)"),
+        ("a.csv", "1,,2\n1,2,3\n", "could not convert string '' to float64 at row 0, column 2.)"),
+        ("a.csv", "1 2\n3 nan\n", "must hold finite numbers only (got a.csv: nan at 1, 1)"),
+        (
+            "a.txt",
+            "1 2 3\n" * 100,
+            "must be a grid of heights, not a list of points (got a.txt: 100 rows of 3",
+        ),
+    ],
+)
+def test_a_text_that_is_no_grid_is_refused_with_its_row(tmp_path, name, text, said):
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with pytest.raises(ParameterError, match=re.escape(said)):
+        read_grid(tmp_path / name)
+
+
+def test_pins_over_no_data_stand_at_the_foot_and_those_beside_are_as_high_as_if_it_ended_there(tmp_path):
+    heights = np.tile(np.linspace(1.0, 5.0, 25), (13, 1))
+    absent = np.zeros((13, 25), bool)
+    absent[3:6, 4:9] = True
+    grid = make_height_map("a.asc", np.ma.array(np.where(absent, -9999.0, heights), mask=absent), 1.0, 20.0)
+    cells = laid(grid, fit="stretch", rise=8e-3)
+    assert cells.covered == 13 * 25 - 15
+    wanted = np.where(absent, 0.0, 2.0 * (heights - 1.0))
+    assert np.abs(table(cells) - wanted).max() < 1e-9
+    # Twice as fine, each pin has the mean of the pixels that have data.
+    fine = np.ma.array(np.kron(heights, np.ones((2, 2))), mask=np.kron(absent, np.ones((2, 2), bool)))
+    assert np.abs(table(laid(make_height_map("a.asc", fine), fit="stretch", rise=8e-3)) - wanted).max() < 1e-9
+
+
+def test_an_esri_grid_keeps_its_proportions_of_plan_and_height(tmp_path):
+    # 100 m x 60 m, 40 m high, in cells of 20 m, which become 15 mm: 75 mm are five of them.
+    grid = make_height_map("a.asc", np.tile(np.linspace(0.0, 40.0, 5), (3, 1)), 1.0, 20.0)
+    assert np.ptp(laid(grid, relief="true", fit="cover").heights) == pytest.approx(30e-3, abs=ROUNDING)
+    with pytest.raises(ParameterError, match="no pin lies under it"):
+        laid(grid, fit="actual", x=90.0)
+    with pytest.raises(ParameterError, match="its pixels have no place"):
+        laid(grid, fit="placed")
 
 
 def test_a_picture_of_a_hundred_megapixels_is_taken_and_one_of_more_refused_before_it_is_read(tmp_path):
@@ -291,12 +406,12 @@ def hdr(width: int, height: int) -> bytes:
 @pytest.mark.parametrize("mode", ["L", "RGB"])
 def test_the_size_is_the_one_pillow_finds_and_that_of_pictures_only_blender_reads(tmp_path, name, mode):
     Image.new(mode, (37, 21)).save(tmp_path / name)
-    assert read_size(tmp_path / name) == (37, 21)
+    assert read_head(tmp_path / name).size == (37, 21)
     # A JPEG with other segments before its size.
     Image.new("RGB", (37, 21)).save(tmp_path / "b.jpg", exif=b"Exif\0\0" + bytes(60_000), progressive=True)
     (tmp_path / "b.exr").write_bytes(exr(37, 21))
     (tmp_path / "b.hdr").write_bytes(hdr(37, 21))
-    assert {read_size(tmp_path / f"b.{kind}") for kind in ("jpg", "exr", "hdr")} == {(37, 21)}
+    assert {read_head(tmp_path / f"b.{kind}").size for kind in ("jpg", "exr", "hdr")} == {(37, 21)}
 
 
 PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x63\0\0\0\x63\x08\0\0\0\0"
@@ -330,4 +445,4 @@ def test_a_head_that_does_not_tell_is_no_error(tmp_path):
     ]
     for content in (*heads, b"#?RADIANCE\n", b"BM"):
         (tmp_path / "a.png").write_bytes(content)
-        assert read_size(tmp_path / "a.png") is None, content
+        assert read_head(tmp_path / "a.png").size is None, content

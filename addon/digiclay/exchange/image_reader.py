@@ -12,12 +12,10 @@ from ..core.shapes.heightmap import READERS, refuse_too_many
 
 #: Most pixels that are handed over: Blender gives four 32-bit numbers for each. More are scaled down by it.
 MOST = 4_000_000
-#: How bright red, green and blue are, as Pillow and the television standard BT.601 have it.
-BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
 
-def pixels(path: Path) -> NDArray[np.float64]:
-    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first."""
+def pixels(path: Path) -> NDArray[np.float32]:
+    """Return the channels of a picture's pixels, (rows, columns, channels), the lowest row first."""
     try:
         image = bpy.data.images.load(str(path.resolve()), check_existing=False)
     except RuntimeError:
@@ -38,8 +36,7 @@ def pixels(path: Path) -> NDArray[np.float64]:
         if len(image.pixels) != table.size:
             raise _unreadable(path)
         image.pixels.foreach_get(table.ravel())
-        bright = table[..., :3] @ BRIGHTNESS if image.channels > 2 else table[..., 0]
-        return np.asarray(bright, np.float64)
+        return table
     finally:
         bpy.data.images.remove(image)
 

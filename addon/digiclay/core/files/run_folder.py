@@ -296,6 +296,8 @@ def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
         return samples[word]
     if os.path.isfile(word):  # unlike Path.is_file it takes any text, however odd or long
         return Path(word)
+    if os.path.isdir(word):
+        raise SceneError(f"{word} is a folder, not a file.")
     if Path(word).suffix or Path(word).name != word:
         raise SceneError(f"{word}: there is no such file.")
     close = find_nearest_name(word, list(samples))

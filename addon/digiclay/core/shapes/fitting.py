@@ -23,7 +23,7 @@ from ..mesh_io.mesh_limits import make_refusal
 from ..mesh_io.mesh_reader import MESHES
 from ..model.actuator import Actuator
 from ..model.layout import Grid
-from .heightmap import PICTURES, HeightMap, make_height_map, read_pixels
+from .heightmap import GRIDS, PICTURES, HeightMap, make_height_map, read_grid, read_pixels
 from .mesh_relief import ShapeMesh, make_shape_mesh
 from .request import AUTO, LENGTHS, Placement, Shape, Tops
 
@@ -34,7 +34,7 @@ SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "shapes"
 ARRAY = ".npy"
 UNREADABLE = "must be a file that can be read"
 #: What a file of this kind of shape may end with.
-KINDS = (*MESHES, *PICTURES, ARRAY)
+KINDS = (*MESHES, *PICTURES, ARRAY, *GRIDS)
 
 
 def list_shapes() -> list[str]:
@@ -151,8 +151,10 @@ def _placement(shape: Shape, relief: Relief, grid: Grid) -> Placement:
     if not min(wide, deep) > THIN * max(wide, deep):
         rule = "must be wider than a line or a point, seen from above"
         raise ParameterError("shape", "file", rule, f"{relief.name}: {wide:g} x {deep:g}")
-    if shape.fit in ("actual", "placed") and relief.length is None:
+    placed = shape.fit == "placed" and isinstance(relief, HeightMap)
+    if placed or (shape.fit == "actual" and relief.length is None):
         rule = "must be contain, cover or stretch for a picture or a map: its pixels have no length"
+        rule = rule.replace("length", "place") if relief.length else rule
         raise ParameterError("shape", "fit", rule, f"{shape.fit!r} for {relief.name}")
     own = relief.length or 1.0
     if shape.fit == "placed":
@@ -186,8 +188,10 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
         if relief.value_length is None:
             rule = "must be rise or stroke for a picture: its values are no lengths"
             raise ParameterError("shape", "relief", rule, f"'true' for {relief.name}")
-        # A mesh keeps its proportions; a map's heights are lengths by themselves.
-        factor = relief.value_length if relief.length is None else math.sqrt(at.factor_x * at.factor_y)
+        # What has a length in plan keeps its proportions; other heights are lengths by themselves.
+        factor = relief.value_length
+        if relief.length is not None:
+            factor *= math.sqrt(at.factor_x * at.factor_y) / relief.length
     elif high > low:
         factor = (shape.rise if shape.relief == "rise" else actuator.stroke - foot) / (high - low)
     else:
@@ -218,11 +222,14 @@ def read(shape: Shape) -> Relief:
     except SceneError as error:
         raise SceneError(f"shape.file: {error}") from None
     kind = path.suffix.lower()
-    if kind == ARRAY:
-        return _array(path)
-    if kind in PICTURES:
-        return make_height_map(path.name, read_pixels(path))
-    return _mesh(path, shape)
+    try:
+        if kind == ARRAY:
+            return _array(path)
+        if kind in PICTURES:
+            return make_height_map(path.name, read_pixels(path))
+        return read_grid(path) if kind in GRIDS else _mesh(path, shape)
+    except OSError as error:
+        raise make_refusal(UNREADABLE, str(path), error.strerror or str(error)) from None
 
 
 def import_reader(path: Path) -> None:
@@ -238,8 +245,6 @@ def _array(path: Path) -> HeightMap:
     """Read an array of heights, m; its first row lies at the lowest y."""
     try:
         values = map_array(path)
-    except OSError as error:
-        raise make_refusal(UNREADABLE, str(path), error.strerror or "not an array") from None
     except ValueError:
         raise ParameterError("shape", "file", "must hold one array of numbers", str(path)) from None
     return make_height_map(path.name, values, value_length=1.0)
@@ -252,10 +257,8 @@ def _mesh(path: Path, shape: Shape) -> ShapeMesh:
         raise ParameterError("shape", "file", rule, str(path))
     try:
         mesh = mesh_reader.read(path)
-    except (ParameterError, MemoryError):
+    except (ParameterError, MemoryError, OSError):
         raise
-    except OSError as error:
-        raise make_refusal(UNREADABLE, str(path), error.strerror or str(error)) from None
     except Exception as error:  # trimesh raises all sorts of errors on a broken file
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise make_refusal("must be a mesh that can be read", str(path), reason) from None

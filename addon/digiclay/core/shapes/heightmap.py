@@ -1,20 +1,22 @@
 """Height map: a picture or grid of values as a shape, bilinear over its pixels."""
 
 import importlib
+import io
 import re
 import struct
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
+from ..mesh_io.mesh_limits import make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from .request import Placement, Tops
 
@@ -22,20 +24,70 @@ from .request import Placement, Tops
 HEAD = 1 << 20
 #: Segments of a JPEG that tell its size.
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+#: Numbers of tags, of a TIFF file or of the EXIF data in another one.
+WIDTH, HEIGHT, BITS, PHOTOMETRIC, ORIENTATION, CHANNELS, PLANES = 256, 257, 258, 262, 274, 277, 284
+ALPHA, FORMAT, NO_DATA = 338, 339, 42113
+#: Bytes of an item, by the kind of a tag: texts, and whole numbers of 16 and 32 bits.
+ITEMS = {2: 1, 3: 2, 4: 4}
+#: All that is raised over a head that makes no sense.
+UNKNOWN = (struct.error, IndexError, KeyError, ValueError)
 
 
-def read_size(path: Path) -> tuple[int, int] | None:
-    """Return width and height of a picture in pixels by its header, None where it has none that is known."""
+class Head(NamedTuple):
+    """Statements of a picture's file beside its pixels."""
+
+    size: tuple[int, int] | None
+    """Width and height, pixels; None where they are not known."""
+    tags: dict[int, Any]
+    """Texts and whole numbers by the numbers of their tags; of a list its first item; those of EXIF data are
+    the orientation alone."""
+
+
+def read_head(path: Path) -> Head:
+    """Return what a picture's file says beside its pixels."""
+    size, tags = None, {}
     with path.open("rb") as file:
         head = file.read(HEAD)
-        try:
-            if head[:4] in (b"II*\0", b"MM\0*"):
-                order = "<" if head[:1] == b"I" else ">"
-                file.seek(struct.unpack_from(f"{order}I", head, 4)[0])
-                return _tiff(file.read(HEAD), order)
-            return _size(head)
-        except (struct.error, IndexError, KeyError, ValueError):
-            return None
+        with suppress(*UNKNOWN):
+            start = _find_tags(file, head)
+            tags = _read_tags(file, start)
+            tags = {ORIENTATION: tags[ORIENTATION]} if start else tags
+            size = tags[WIDTH], tags[HEIGHT]
+    with suppress(*UNKNOWN):
+        size = size or _size(head)
+    return Head(size, tags)
+
+
+def _find_tags(file: BinaryIO, head: bytes) -> int:
+    """Return the byte at which the tags of a TIFF, or the EXIF data of a JPEG or a PNG, begin."""
+    if head[:2] in (b"II", b"MM"):
+        return 0
+    if head[:2] == b"\xff\xd8":
+        return head.index(b"Exif\0\0") + 6
+    length, kind, at = 0, head[1:4], -4
+    while kind != b"eXIf" and (at >= 0 or kind == b"PNG"):
+        at += 12 + length
+        file.seek(at)
+        length, kind = struct.unpack(">I4s", file.read(8))
+    return at + 8
+
+
+def _read_tags(file: BinaryIO, start: int) -> dict[int, Any]:
+    """Return the first list of tags in TIFF data that begin at a byte."""
+    file.seek(start)
+    order = {b"II\x2a\0": "<", b"MM\0\x2a": ">"}[file.read(4)]
+    file.seek(start + struct.unpack(f"{order}I", file.read(4))[0])
+    (count,) = struct.unpack(f"{order}H", file.read(2))
+    tags: dict[int, Any] = {}
+    for tag, kind, items, content in struct.iter_unpack(f"{order}HHI4s", file.read(12 * count)):
+        if ITEMS.get(kind, 0) * items > len(content):
+            file.seek(start + struct.unpack(f"{order}I", content)[0])
+            content = file.read(min(items, 99))
+        if kind == 2:
+            tags[tag] = content[:items].rstrip(b"\0").decode("latin-1")
+        elif kind in ITEMS:
+            tags[tag] = int.from_bytes(content[: ITEMS[kind]], "little" if order == "<" else "big")
+    return tags
 
 
 def _size(head: bytes) -> tuple[int, int] | None:
@@ -72,63 +124,160 @@ def _jpeg(head: bytes) -> tuple[int, int]:
         at += 1 + length
 
 
-def _tiff(entries: bytes, order: str) -> tuple[int, int]:
-    """Return the size of a TIFF from its list of entries: 256 is the width, 257 the height."""
-    (count,) = struct.unpack_from(f"{order}H", entries)
-    size = {}
-    for index in range(count):
-        tag, kind = struct.unpack_from(f"{order}HH", entries, 2 + 12 * index)
-        (size[tag],) = struct.unpack_from(order + ("H" if kind == 3 else "I"), entries, 10 + 12 * index)
-    return size[256], size[257]
-
-
-Pixels = NDArray[np.generic]
+Pixels = NDArray[Any]
 
 #: Pictures by extension.
-PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr")
+PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".exr", ".hdr")
 #: Pillow's names of those it reads here: by others a file with such an ending could have programs started.
-FORMATS = ("PNG", "TIFF", "JPEG", "BMP", "DIB")
+FORMATS = ("PNG", "TIFF", "JPEG", "BMP", "DIB", "PPM")
 #: Those that Pillow cannot read.
 BLENDER_ONLY = (".exr", ".hdr")
-#: Pillow's names for pictures of one channel; all others are turned into brightness.
-GRAY = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F")
+#: Pillow's names for pictures of one channel, and for those with colors or alpha that are taken as they are.
+GRAY, COLORED = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F"), ("LA", "RGB", "RGBA")
+#: How bright red, green and blue are, as the television standard BT.601 has it.
+BRIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
 #: Most pixels of a picture: 16 000 x 8 000. Some memory is needed for each, see docs/shapes.md.
 MOST = 128_000_000
-#: Readers of pictures in place of Pillow, the last one first; each has the signature of `read_pixels`.
+#: Readers of pictures in place of Pillow, the last one first: channels of the pixels as the file has them,
+#: (rows, columns, channels), the lowest row first.
 READERS: list[Callable[[Path], Pixels]] = []
 
 
 def read_pixels(path: Path) -> Pixels:
-    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first."""
+    """Return the brightness of an upright picture's pixels, (rows, columns), the lowest row first.
+
+    Those without data are masked; what is transparent is black.
+    """
+    head = Head(None, {})
     with suppress(OSError):  # which the reader itself reports
-        if size := read_size(path):
-            refuse_too_many(path, *size)
+        head = read_head(path)
+    if head.size:
+        refuse_too_many(path, *head.size)
     if READERS:
-        return READERS[-1](path)
+        levels = READERS[-1](path)
+        multiplied = head.tags.get(ALPHA) == 1 or path.suffix.lower() == ".exr"
+        pixels = _find_brightness(levels[..., :3] if multiplied else levels)
+    else:
+        pixels = _find_brightness(_read_by_pillow(path, head.tags))[::-1]
+    try:
+        absent = float(head.tags[NO_DATA])
+    except (KeyError, ValueError):
+        pass  # all pixels have data
+    else:
+        if READERS:  # Blender gives whole numbers as shares of the largest one
+            bits = head.tags.get(BITS, 1)
+            absent /= {1: 2.0**bits - 1, 2: 2.0 ** (bits - 1) - 1}.get(head.tags.get(FORMAT, 1), 1.0)
+            if pixels.shape[::-1] != head.size:
+                rule = "must be as small as Blender reads it unscaled where it has pixels without data"
+                raise make_refusal(rule, str(path), "{} x {}".format(*head.size or ()))
+        pixels = _mask(pixels, absent)
+    if WIDTH in head.tags and not READERS:
+        return pixels  # Pillow itself turns a TIFF
+    return _turn_upright(pixels[::-1], head.tags.get(ORIENTATION, 1))[::-1]
+
+
+def _mask(values: Pixels, absent: float) -> Pixels:
+    """Return values of which those that stand for no data are masked."""
+    # Writers round the number, to the 24 bits of a float32 or to some digits.
+    bare = np.isclose(values, absent, rtol=1e-6, atol=0.0, equal_nan=True)
+    masked: Pixels = np.ma.array(values, mask=bare)  # type: ignore[no-untyped-call]
+    return masked
+
+
+def _turn_upright(pixels: Pixels, orientation: int) -> Pixels:
+    """Return pixels, the upper row first, as the EXIF orientation of their file says they are to be seen."""
+    pixels = pixels.T if orientation in (5, 6, 7, 8) else pixels
+    pixels = pixels[:, ::-1] if orientation in (2, 3, 6, 7) else pixels
+    return pixels[::-1] if orientation in (3, 4, 7, 8) else pixels
+
+
+def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
+    """Return the channels of a picture, (rows, columns[, channels]), the upper row first."""
     if path.suffix.lower() in BLENDER_ONLY:
         rule = "must be a PNG, TIFF or JPEG outside Blender"
         raise ParameterError("shape", "file", rule, str(path), "Blender itself reads EXR and HDR.")
     try:
         image: Any = importlib.import_module("PIL.Image")
+        tiff: Any = importlib.import_module("PIL.TiffImagePlugin")
     except ImportError:
         rule = "must be a mesh or an array where Pillow is not installed"
         hint = "Run 'pip install digiclay[images]'."
         raise ParameterError("shape", "file", rule, str(path), hint) from None
     image.init()  # formats that are named are not looked for
+    for order, raw in ((b"II", "F;64F"), (b"MM", "F;64BF")):  # which Pillow can unpack, and does not know of
+        tiff.OPEN_INFO[order, 1, (3,), 1, (64,), ()] = "F", raw
+    several = tags.get(PLANES) == 2 and tags.get(CHANNELS, 1) > 1
+    if tags.get(BITS, 8) > 8 and (several or tags.get(PHOTOMETRIC) == 0):
+        rule = "must have its channels beside each other, and 0 as black, if they are of more than 8 bits"
+        raise make_refusal(rule, str(path), "separate planes" if several else "0 is white")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", image.DecompressionBombWarning)
+        warnings.simplefilter("ignore")
         try:
-            with image.open(path, formats=FORMATS) as opened:
-                refuse_too_many(path, *opened.size)
-                gray = opened if opened.mode in GRAY else opened.convert("L")
-                return np.flipud(np.asarray(gray))
+            data = (
+                path.read_bytes()
+            )  # of a file that it maps into memory Pillow takes turned pixels apart wrong
+            levels = _read_levels(lambda: image.open(io.BytesIO(data), formats=FORMATS), path)
+            if tags.get(BITS) == 32 and tags.get(FORMAT, 1) == 1:
+                return levels.view(np.uint32)  # Pillow takes all 32 bits for numbers with a sign
+            return levels
         except image.DecompressionBombError:
             raise _make_size_error(path, "too many pixels to open") from None
+        except image.UnidentifiedImageError:
+            kind = f"{tags[CHANNELS]} channels of {tags.get(BITS, 1)} bits" if CHANNELS in tags else ""
+            reason = f"a TIFF of {kind}, unknown to Pillow" if kind else "not a picture, or cut off"
         except OSError as error:
             reason = error.strerror or "not a picture, or cut off"
         except (ValueError, SyntaxError, EOFError) as error:
             reason = " ".join(str(error).split())[:100]
     raise ParameterError("shape", "file", "must be a picture that can be read", f"{path}: {reason}")
+
+
+def _read_levels(open_picture: Callable[[], Any], path: Path) -> Pixels:
+    """Return the numbers of a picture, (rows, columns[, channels]), in all of their bits."""
+    with open_picture() as opened:
+        refuse_too_many(path, *opened.size)
+        raw = _set_raw(opened, lambda raw: raw.replace("a;", "A;"))
+        if raw == "LA;16B":  # four bytes a pixel
+            _set_raw(opened, lambda raw: "RGBA")
+            return np.asarray(opened).view(">u2")
+        keyed = "transparency" in opened.info and opened.mode in ("1", "L", "RGB")
+        if keyed or opened.mode in ("P", "PA"):
+            opened = opened.convert("RGBA")
+        elif opened.mode not in (*GRAY, *COLORED):
+            if ";16" in raw:
+                raise ValueError(f"{opened.mode} of 16 bits")
+            opened = opened.convert("LA" if opened.mode == "La" else "RGB")
+        high: Pixels = np.asarray(opened)
+    if high.ndim == 2 or ";16" not in raw:
+        return high
+    # Pillow keeps the higher byte of a color; in the other order of bytes that is the lower one.
+    with open_picture() as opened:
+        _set_raw(opened, lambda raw: raw.replace("a;", "A;")[:-1] + ("L" if raw[-1] == "B" else "B"))
+        levels: Pixels = high.astype(np.uint16) << 8 | np.asarray(opened)
+    return levels[..., :3] if "a;" in raw else levels  # of colors that are multiplied by the alpha already
+
+
+def _set_raw(opened: Any, change: Callable[[str], str]) -> str:
+    """Change how Pillow unpacks the bytes of a picture; return its word for how it did."""
+    former: list[str] = [args if isinstance(args, str) else args[0] for *_, args in opened.tile]
+    opened.tile = [
+        tile._replace(args=change(raw) if isinstance(tile.args, str) else (change(raw), *tile.args[1:]))
+        for tile, raw in zip(opened.tile, former, strict=True)
+    ]
+    return former[0]
+
+
+def _find_brightness(levels: Pixels) -> Pixels:
+    """Return the brightness of pixels, (rows, columns), from their channels, (rows, columns[, channels])."""
+    if levels.ndim == 2:
+        return levels
+    bright = np.empty(levels.shape[:2], np.float32)
+    full = np.float32(1.0 if levels.dtype.kind == "f" else np.iinfo(levels.dtype).max)
+    for row, line in zip(levels, bright, strict=True):  # all at once would take many times the memory
+        line[:] = row[:, :3] @ BRIGHTNESS if row.shape[1] > 2 else row[:, 0]
+        if row.shape[1] in (2, 4):
+            line *= row[:, -1] / full
+    return bright
 
 
 def refuse_too_many(path: Path, width: int, height: int) -> None:
@@ -155,14 +304,18 @@ class HeightMap:
 
     name: str
     values: Floats
-    """(r, c): The first row lies at the lowest y. Each is the mean of up to `block` x `block` pixels."""
+    """(r, c): The first row lies at the lowest y. Each is the mean of up to `block` x `block` pixels, where
+    those without data count as 0."""
     pixels: tuple[int, int]
     """Rows and columns of pixels."""
     block: int = 1
     value_length: float | None = None
     """Meters in the unit of the values; None where they are no lengths."""
+    length: float | None = None
+    """Meters a pixel is wide; None where that is not known."""
+    share: Floats | None = None
+    """(r, c): Share of the pixels that have data; None where all have."""
 
-    length = None
     underside = None
 
     @property
@@ -176,15 +329,26 @@ class HeightMap:
         covered = _within(across, self.pixels[1]) & _within(along, self.pixels[0])
         under_a_pin = min(grid.layout.pitch / at.factor_x, grid.layout.row_spacing / at.factor_y)
         block = max(1, int(min(under_a_pin / self.block, max(self.values.shape)) + RELATIVE_TOLERANCE))
-        values = average_blocks(self.values, block)
-        rows = _places(along, self.pixels[0], block * self.block, values.shape[0])
-        columns = _places(across, self.pixels[1], block * self.block, values.shape[1])
-        value = np.where(covered, _bilinear(values, rows, columns), 0.0)
-        return Tops(value, covered, np.zeros(grid.count, np.bool_))
+
+        def interpolate(table: Floats) -> Floats:
+            means = average_blocks(table, block)
+            rows = _places(along, self.pixels[0], block * self.block, means.shape[0])
+            columns = _places(across, self.pixels[1], block * self.block, means.shape[1])
+            return _bilinear(means, rows, columns)
+
+        share = np.ones(grid.count) if self.share is None else interpolate(self.share)
+        covered &= share >= 0.5
+        value = interpolate(self.values) / np.where(covered, share, 1.0)
+        return Tops(np.where(covered, value, 0.0), covered, np.zeros(grid.count, np.bool_))
 
 
-def make_height_map(name: str, values: NDArray[np.generic], value_length: float | None = None) -> HeightMap:
-    """Make a map of numbers (r, c), the first row at the lowest y; `value_length`: meters in their unit."""
+def make_height_map(
+    name: str, values: Pixels, value_length: float | None = None, length: float | None = None
+) -> HeightMap:
+    """Make a map of numbers (r, c), the first row at the lowest y; lengths: meters in their unit, a pixel.
+
+    Masked numbers have no data.
+    """
     shown = " x ".join(map(str, values.shape)) or "a single number"
     if values.ndim != 2 or min(values.shape) < 2:
         raise ParameterError("shape", "file", "must hold at least 2 x 2 heights", f"{name}: {shown}")
@@ -194,14 +358,51 @@ def make_height_map(name: str, values: NDArray[np.generic], value_length: float 
     if values.dtype.kind not in "biuf":
         raise ParameterError("shape", "file", "must hold numbers", f"{name}: {values.dtype}")
     block = int(np.ceil(np.sqrt(values.size / KEPT)))
+    bare = np.ma.getmask(values)  # type: ignore[no-untyped-call]
+    share = None if bare is np.ma.nomask else average_blocks(~bare, block)
     with np.errstate(over="ignore", invalid="ignore"):
-        kept = average_blocks(values, block)
+        kept = average_blocks(np.ma.filled(values, 0), block)  # type: ignore[no-untyped-call]
     bad = np.argwhere(~np.isfinite(kept))
     if bad.size:
         row, column = (bad[0] * block).tolist()
         content = f"{name}: {kept[tuple(bad[0])]} at {row}, {column}"
         raise ParameterError("shape", "file", "must hold finite numbers only", content)
-    return HeightMap(name, kept, (values.shape[0], values.shape[1]), block, value_length)
+    return HeightMap(name, kept, (values.shape[0], values.shape[1]), block, value_length, length, share)
+
+
+#: Grids of numbers as texts, by extension.
+GRIDS = (".asc", ".txt", ".csv")
+#: Line of the head of an Esri ASCII grid.
+ESRI = re.compile(r"\s*([A-Za-z]\w*)[ \t]+([^\s,;]+)[ \t]*\n")
+
+
+def read_grid(path: Path) -> HeightMap:
+    """Read a text of heights, m: rows of numbers, the first at the lowest y, or an Esri ASCII grid."""
+    head: dict[str, float] = {}
+    at = 0
+    try:
+        text = path.read_text("utf-8-sig")
+        while path.suffix.lower() == ".asc" and (line := ESRI.match(text, at)):
+            head[line[1].lower()], at = float(line[2]), line.end()
+        text = text[at:]
+        separator = next((sign for sign in ";\t," if sign in text), None)
+        if separator != ",":
+            text = text.replace(",", ".")
+        with warnings.catch_warnings(action="error"):
+            values: Pixels = np.loadtxt(text.splitlines(), delimiter=separator, ndmin=2)
+        if path.suffix.lower() == ".asc":
+            rows, columns = int(head["nrows"]), int(head["ncols"])
+            values = _mask(values.reshape(rows, columns)[::-1], head.get("nodata_value", -9999.0))
+    except KeyError as error:
+        reason = f"no {error} in its head, as an Esri ASCII grid has it"
+    except (ValueError, OverflowError, Warning) as error:
+        reason = " ".join(str(error).partition(";")[0].split())[:150]
+    else:
+        if not head and values.shape[1] == 3 and len(values) > 99:
+            rule = "must be a grid of heights, not a list of points"
+            raise make_refusal(rule, path.name, f"{len(values)} rows of 3 numbers")
+        return make_height_map(path.name, values, 1.0, head.get("cellsize"))
+    raise make_refusal("must be a grid of numbers that can be read", path.name, reason)
 
 
 def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
