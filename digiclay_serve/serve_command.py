@@ -152,7 +152,7 @@ def _summary(figures: Mapping[str, Any]) -> Iterator[str]:
     shares = ", ".join(f"{name} {1e3 * elapsed[name]:.2f} ms" for name in ("p50", "p99", "p99.9", "longest"))
     missed = 100.0 * figures["missed"] / max(1, periods)
     yield (
-        f"{periods} control periods of {1e3 * period:g} ms: {figures['missed']} late ({missed:.2g} %), "
+        f"{periods} control periods of {1e3 * period:g} ms: {figures['missed']} late ({missed:.4g} %), "
         f"{figures['left_out']} of them left out; {shares}"
     )
     counts = dict(sorted(figures["counts"].items()))

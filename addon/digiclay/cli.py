@@ -24,6 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def carry_out(parse: Callable[[], Any]) -> int:
     """Read arguments and carry out the command they name; return its exit code, as `main` does."""
+    os.environ["MPLBACKEND"] = "agg"  # a notebook's is one that matplotlib cannot always import
     try:
         arguments = parse()
         code: int = arguments.carry_out(arguments)

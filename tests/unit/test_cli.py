@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from digiclay import __version__
 from digiclay.cli import main
-from digiclay.commands import describe, export
-from digiclay.core.base.errors import BEGINNING, END, one_line
+from digiclay.commands import describe, export, render
+from digiclay.core.base.errors import LONGEST, one_line
 from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.model.actuator import Actuator, Supply
@@ -57,6 +57,8 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "method": (["run", "my.toml", "--method", "hand"], "--method: control.method must be one of"),
     "memory": (["run", "my.toml", "--set", "simulation.duration=1e6"], "free memory"),
     "file": (["run", "other.toml"], "other.toml: there is no such file."),
+    "shape of a folder": (["form", "d.png"], "d.png is a folder, not a file."),
+    "series of a folder": (["batch", "d.png"], "d.png is a folder, not a file."),
     "name": (["run", "ridge_mound_vally"], "Did you mean ridge_mound_valley?"),
     "format": (["run", "my.toml", "--export", "stp"], "known are stl, stl_ascii, obj, ply, glb, 3mf"),
     "surface": (["run", "my.toml", "--set", "layout.rows=1", "--export", "stl"], "at least 2 x 2 cells"),
@@ -201,12 +203,13 @@ def test_a_misspelt_word_gets_a_suggestion_and_what_is_like_nothing_gets_none(li
 def test_an_error_is_one_line_of_a_sane_length(arguments, capsys):
     assert main(arguments) == 2
     said = capsys.readouterr().err
-    assert 0 < len(said) < 600
+    assert 0 < len(said) <= 401
     assert said[:-1].isprintable()
     # What is cut keeps its beginning and its end.
-    whole = "a" * (BEGINNING + END)
+    whole = "a" * LONGEST
     cut = one_line(f"b{whole}c")
     assert (one_line(f" {whole}\n"), cut[0], cut[-1], " ... " in cut) == (whole, "b", "c", True)
+    assert len(cut) == LONGEST
 
 
 def test_a_file_that_fails_half_way_is_one_line(monkeypatch, capfd):
@@ -284,6 +287,26 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said, cores):
     )
     # Numpy reads it when it is imported, so that must not have happened before.
     assert finish(start(script))[1].split() == [cores, "False"]
+
+
+def test_the_backend_of_a_notebook_does_not_hinder_plots(here):
+    script = (
+        "import os\n"
+        "os.environ['MPLBACKEND'] = 'module://of_a_notebook.backend_inline'\n"
+        "from digiclay.cli import console; console()\n"
+    )
+    assert finish(start(script, "run", "my.toml", "--plots", "--no-errors"))[0] == 0
+    assert (here / "my" / "session.png").is_file()
+
+
+def test_a_run_is_kept_whatever_goes_wrong_with_what_is_made_of_it(here, monkeypatch):
+    def draw(*_: Any) -> None:
+        raise ValueError("a fault of a library")
+
+    monkeypatch.setattr(render, "plotted", draw)
+    with pytest.raises(ValueError, match="a fault of a library"):
+        main(["run", "my.toml", "--plots", "--no-errors", "--quiet"])
+    assert {path.name for path in (here / "my").iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
 
 
 def test_a_run_imports_no_other_command_and_none_of_the_packages_it_does_without(here):

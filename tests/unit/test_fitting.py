@@ -241,8 +241,15 @@ def test_means_keep_the_sum(rows, columns, block, chunk, seed):
         (np.zeros(()), "at least 2 x 2 heights (got odd.npy: a single number)"),
         (np.array([["a", "b"], ["c", "d"]]), "hold numbers (got odd.npy: <U1)"),
         (np.zeros((2, 2), complex), "hold numbers (got odd.npy: complex128)"),
-        (np.array([[0.0, 1.0], [np.nan, 2.0]]), "finite numbers only (got odd.npy: nan at 1, 0)"),
-        (np.array([[0.0, np.inf], [1.0, 2.0]]), "finite numbers only (got odd.npy: inf at 0, 1)"),
+        (
+            np.array([[0.0, 1.0], [np.nan, 2.0]]),
+            "numbers only, of at most 1e+60 (got odd.npy: nan at 1, 0)",
+        ),
+        (
+            np.array([[0.0, np.inf], [1.0, 2.0]]),
+            "numbers only, of at most 1e+60 (got odd.npy: inf at 0, 1)",
+        ),
+        (np.array([[0.0, 1.0], [2.0, -1e308]]), "of at most 1e+60 (got odd.npy: -1e+308 at 1, 1)"),
     ],
 )
 def test_what_is_no_map_is_refused(values, said):
@@ -337,7 +344,7 @@ def test_a_grid_of_numbers_is_read_as_its_program_writes_it(tmp_path, name, text
         ("a.txt", "1 2\n3", "(got a.txt: the number of columns changed from 2 to 1 at row 2)"),
         ("a.csv", "x,y\n1,2\n", "(got a.csv: could not convert string 'x' to float64 at row 0, column 1.)"),
         ("a.csv", "1,,2\n1,2,3\n", "could not convert string '' to float64 at row 0, column 2.)"),
-        ("a.csv", "1 2\n3 nan\n", "must hold finite numbers only (got a.csv: nan at 1, 1)"),
+        ("a.csv", "1 2\n3 nan\n", "must hold finite numbers only, of at most 1e+60 (got a.csv: nan at 1, 1)"),
         (
             "a.txt",
             "1 2 3\n" * 100,

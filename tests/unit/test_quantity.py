@@ -19,7 +19,7 @@ from digiclay.core.model.trajectory import Trajectory
 class Lever(Parameters):
     length: float = quantity(0.1, "length", unit="m", symbol="l", source="P", above=0.0, below=10.0)
     teeth: int = quantity(12, "teeth", at_least=3, at_most=99)
-    metal: str = quantity("brass", "what it is made of", choices=("brass", "steel"))
+    metal: str = quantity("brass", "what it is made of", choices=("brass", "steel", "true"))
     notches: tuple[float, ...] = quantity((0.1, 0.2), "notches", unit="m", at_least=0.0)
 
 
@@ -32,6 +32,15 @@ class Lever(Parameters):
         ({"teeth": 3}, "teeth", int, 3),  # bounds are included
         ({"teeth": 99}, "teeth", int, 99),
         ({"notches": [0, 0.5]}, "notches", tuple, (0.0, 0.5)),
+        # Numbers of numpy, as a loop over an array gives them.
+        ({"teeth": np.int64(15)}, "teeth", int, 15),
+        ({"teeth": np.float32(15)}, "teeth", int, 15),
+        ({"length": np.float32(0.5)}, "length", float, 0.5),
+        ({"notches": np.array([0.0, 0.5])}, "notches", tuple, (0.0, 0.5)),
+        ({"notches": (np.float64(0.25), np.int8(1))}, "notches", tuple, (0.25, 1.0)),
+        # A word that TOML takes for a truth value.
+        ({"metal": "true"}, "metal", str, "true"),
+        ({"metal": True}, "metal", str, "true"),
     ],
 )
 def test_a_valid_value_has_the_type_of_its_default(given, field, kind, value):
@@ -54,8 +63,13 @@ def test_a_valid_value_has_the_type_of_its_default(given, field, kind, value):
         ({"teeth": 100}, "Lever.teeth must be at most 99 (got 100)."),
         ({"teeth": 3.5}, "Lever.teeth must be a whole number (got 3.5)."),
         ({"teeth": False}, "Lever.teeth must be a whole number (got False)."),
-        ({"metal": "tin"}, "Lever.metal must be one of brass, steel (got 'tin')."),
+        ({"metal": "tin"}, "Lever.metal must be one of brass, steel, true (got 'tin')."),
         ({"metal": 3}, "Lever.metal must be a text (got 3)."),
+        ({"metal": False}, "Lever.metal must be a text (got False)."),
+        ({"length": np.float64(-1.0)}, "Lever.length must be above 0 m (got -1 m)."),
+        ({"teeth": np.float32(3.5)}, "Lever.teeth must be a whole number (got 3.5)."),
+        ({"length": np.bool_(True)}, "Lever.length must be a number (got True)."),
+        ({"length": np.datetime64("2020")}, "Lever.length must be a number (got datetime.date(2020, 1, 1))."),
         ({"notches": []}, "Lever.notches must be a list of numbers (got [])."),
         ({"notches": (0.1, -0.2)}, "Lever.notches must be at least 0 m (got -0.2 m)."),
         ({"notches": (0.1, "x")}, "Lever.notches must be a number (got 'x')."),
@@ -75,6 +89,11 @@ def test_a_broken_rule_is_one_line_with_owner_field_rule_and_value(given, line):
         ("1.6 cSt", "m2/s", 1.6e-6),
         (" 2  ms ", "s", 2e-3),
         ("-5e-1 N", "N", -0.5),
+        # Signs that look alike: the micro sign, the Greek letter, one sign for both letters.
+        ("20 \N{MICRO SIGN}m", "m", 20e-6),
+        ("20 \N{GREEK SMALL LETTER MU}m", "m", 20e-6),
+        ("20\N{NO-BREAK SPACE}\N{SQUARE MU M}", "m", 20e-6),
+        ("9.81 m/s\N{SUPERSCRIPT TWO}", "m/s2", 9.81),
     ],
 )
 def test_a_quantity_with_a_unit_is_read_into_si(text: str, unit: str, value: float) -> None:

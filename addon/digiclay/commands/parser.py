@@ -39,8 +39,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print the error in the arguments, and exit."""
-        line = one_line(f"{self.prog}: {message}")
-        self.exit(WRONG, f"{line}.{self._hint or self._misspelt()} See '{self.prog} --help'.\n")
+        hint = self._hint or self._misspelt()
+        self.exit(WRONG, one_line(f"{self.prog}: {message}.{hint} See '{self.prog} --help'.") + "\n")
 
     def _misspelt(self) -> str:
         """Return a suggestion for an unknown option."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .. import __version__
-from ..core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
+from ..core.base.errors import OutputError, ParameterError, SceneError
 from ..core.control.methods import list_added
 from ..core.files.run_folder import Claim, claim_folder, find_name
 from ..core.scene.schema import Scene
@@ -220,7 +220,7 @@ def write_run(
     `notes`: lines before the summary; `unjudged`: whether a stop prevented the estimation of the errors.
     """
     skipped: list[Extra] = []
-    wrong: list[DigiclayError] = []
+    wrong: list[Exception] = []
     with claim.write() as folder:
         save(result, folder)
         if result.scene.method in list_added():
@@ -233,7 +233,7 @@ def write_run(
                 continue
             try:
                 extra.make(folder)
-            except DigiclayError as error:  # the session itself is worth keeping
+            except Exception as error:  # the session itself is worth keeping
                 wrong.append(error)
     out = claim.out
     say(arguments, *notes, result.summary(), f"written to {out}")

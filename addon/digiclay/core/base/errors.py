@@ -3,21 +3,26 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-#: Characters of a line that are shown: its beginning, which says what is wrong, and its end, which helps.
-BEGINNING, END = 300, 160
+#: Characters of a message, and of a value in it.
+LONGEST, VALUE = 400, 160
 
 
-def one_line(text: object) -> str:
-    """Return a text as one line of a sane length, without what would steer a terminal."""
+def one_line(text: object, most: int = LONGEST) -> str:
+    """Return a text as one line of a sane length, without what would steer a terminal.
+
+    Of a longer one its beginning is shown, which says what is wrong, and its end, which helps.
+    """
     line = " ".join(str(text).split())
     line = "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in line)
-    if len(line) <= BEGINNING + END:
-        return line
-    return f"{line[:BEGINNING]} ... {line[-END:]}"
+    beginning = most * 3 // 5
+    return line if len(line) <= most else f"{line[:beginning]} ... {line[beginning + 5 - most :]}"
 
 
 class DigiclayError(Exception):
-    """Base of all errors that a user can cause; its text is one complete line."""
+    """Base of all errors that a user can cause; its text is one complete line of a sane length."""
+
+    def __init__(self, text: object = "") -> None:
+        super().__init__(one_line(text))
 
 
 class ParameterError(DigiclayError, ValueError):
@@ -27,6 +32,7 @@ class ParameterError(DigiclayError, ValueError):
     """
 
     def __init__(self, owner: str, field: str, rule: str, value: str, hint: str = "") -> None:
+        value = one_line(value, VALUE)
         self.owner, self.field, self.rule, self.value, self.hint = owner, field, rule, value, hint
         name = f"{owner}.{field}" if field else owner
         super().__init__(f"{name} {rule} (got {value})." + (f" {hint}" if hint else ""))

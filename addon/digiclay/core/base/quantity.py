@@ -11,8 +11,11 @@ import dataclasses
 import math
 import operator
 import re
+import unicodedata
 from dataclasses import dataclass
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from .errors import DigiclayError, ParameterError
 
@@ -141,7 +144,10 @@ class Parameters:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             declared: Quantity = field.metadata["quantity"]
-            value = _typed(self, field.name, getattr(self, field.name), field.default)
+            value = getattr(self, field.name)
+            if isinstance(value, bool) and str(value).lower() in declared.choices:
+                value = str(value).lower()  # TOML takes the word for a truth value
+            value = _typed(self, field.name, value, field.default)
             object.__setattr__(self, field.name, value)
             for item in value if isinstance(value, tuple) else (value,):
                 rule = declared.broken_rule(item)
@@ -173,6 +179,8 @@ def refuse_overrides(kind: type, base: type, names: tuple[str, ...], reason: str
 def _typed(owner: Parameters, name: str, value: Any, default: Any) -> Any:
     """Return `value` in the type of `default`; whole numbers pass for floats."""
     kind = type(default)
+    if isinstance(value, (np.generic, np.ndarray)):
+        value = value.tolist()
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if kind is float and number:
         return float(value) if _finite(value) else value
@@ -195,12 +203,17 @@ def _finite(value: float) -> bool:
         return False
 
 
+def normalize(text: str) -> str:
+    """Return a quantity with plain signs for those that look alike: the Greek mu, ``²``, no-break spaces."""
+    return unicodedata.normalize("NFKC", text).replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
+
+
 def parse(text: str, unit: str) -> float:
     """Read a quantity with one of the `UNITS`, such as ``"3 mm"``, into an SI unit.
 
     Raises ValueError when the number or the unit cannot be read, or the unit measures something else.
     """
-    read = WRITTEN.fullmatch(text.strip())
+    read = WRITTEN.fullmatch(normalize(text).strip())
     if not read:
         raise ValueError(f"must be a number, or a text such as '3 {unit}'")
     value, name = float(read[1]), read[2]

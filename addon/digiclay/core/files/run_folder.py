@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-from ..base.errors import OutputError, SceneError, explain_os_error
+from ..base.errors import VALUE, OutputError, SceneError, explain_os_error, one_line
 from ..base.quantity import find_nearest_name
 from .file_lock import find_host, hold_lock, may_have_made
 
@@ -296,10 +296,11 @@ def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
         return samples[word]
     if os.path.isfile(word):  # unlike Path.is_file it takes any text, however odd or long
         return Path(word)
+    shown = one_line(word, VALUE)
     if os.path.isdir(word):
-        raise SceneError(f"{word} is a folder, not a file.")
+        raise SceneError(f"{shown} is a folder, not a file.")
     if Path(word).suffix or Path(word).name != word:
-        raise SceneError(f"{word}: there is no such file.")
+        raise SceneError(f"{shown}: there is no such file.")
     close = find_nearest_name(word, list(samples))
     asked = f" Did you mean {close}?" if close else ""
-    raise SceneError(f"{word or repr(word)} is neither a file nor a {kind} ({', '.join(samples)}).{asked}")
+    raise SceneError(f"{shown or repr(word)} is neither a file nor a {kind} ({', '.join(samples)}).{asked}")

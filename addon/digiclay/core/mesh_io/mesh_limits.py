@@ -12,6 +12,8 @@ from ..base.errors import ParameterError
 MOST_TRIANGLES = 20_000_000
 #: Most bytes of a mesh's file, or of what a compressed one unpacks to.
 MOST_BYTES = 2_000_000_000
+#: Largest number of a mesh or a map: products of some of them stay finite.
+LARGEST = 1e60
 SMALLER = "Make the mesh coarser first."
 CORNERS = "must have faces whose corners are among its vertices"
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
-from ..mesh_io.mesh_limits import make_refusal
+from ..mesh_io.mesh_limits import LARGEST, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from .request import Placement, Tops
 
@@ -362,11 +362,12 @@ def make_height_map(
     share = None if bare is np.ma.nomask else average_blocks(~bare, block)
     with np.errstate(over="ignore", invalid="ignore"):
         kept = average_blocks(np.ma.filled(values, 0), block)  # type: ignore[no-untyped-call]
-    bad = np.argwhere(~np.isfinite(kept))
+    bad = np.argwhere(~(np.abs(kept) <= LARGEST))
     if bad.size:
         row, column = (bad[0] * block).tolist()
         content = f"{name}: {kept[tuple(bad[0])]} at {row}, {column}"
-        raise ParameterError("shape", "file", "must hold finite numbers only", content)
+        rule = f"must hold finite numbers only, of at most {LARGEST:g}"
+        raise ParameterError("shape", "file", rule, content)
     return HeightMap(name, kept, (values.shape[0], values.shape[1]), block, value_length, length, share)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Flags, Floats, Indices
-from ..mesh_io.mesh_limits import CORNERS, make_refusal
+from ..mesh_io.mesh_limits import CORNERS, LARGEST, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from ..surface.regions import label_components
 from .request import UPWARDS, Placement, Tops
@@ -202,9 +202,10 @@ def make_shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length
         raise make_refusal("must hold a surface made of faces", name, "no face")
     if corners.min() < 0 or corners.max() >= len(place):
         raise make_refusal(CORNERS, name, f"corner {corners.max()} of {len(place)}")
-    bad = np.flatnonzero(~np.isfinite(place).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(place) <= LARGEST).all(axis=1))
     if bad.size:
         shown = ", ".join(f"{value:g}" for value in place[bad[0]])
-        raise make_refusal("must have vertices that are finite numbers", name, f"vertex {bad[0]} at {shown}")
+        rule = f"must have vertices that are finite numbers, of at most {LARGEST:g}"
+        raise make_refusal(rule, name, f"vertex {bad[0]} at {shown}")
     axes, signs = UPWARDS[up]
     return ShapeMesh(name, place[:, axes] * signs, corners, length)

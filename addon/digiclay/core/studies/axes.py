@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.errors import ParameterError, SceneError
-from ..base.quantity import Parameters, Quantity, list_quantities
+from ..base.quantity import Parameters, Quantity, list_quantities, normalize
 from ..files.tables import ReadParts
 from ..scene.scene_source import Setting, load, make_scene, read_table, split_key
 from ..scene.schema import Scene
@@ -91,7 +91,7 @@ def read_varied(text: str, *names: str) -> Varied:
         if not holds:
             raise ParameterError(f"--vary {key}", "", rule, repr(values))
 
-    parts = [part.strip() for part in values.split(":")]
+    parts = [part.strip() for part in normalize(values).split(":")]
     if len(parts) == 1:
         words = tuple(word.strip() for word in values.split(","))
         require(all(words), "must have a value between commas")
