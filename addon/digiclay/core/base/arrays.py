@@ -22,6 +22,10 @@ Indices = NDArray[np.int64]
 #: Corners of triangles (f, 3), numbers of vertices.
 Faces = NDArray[np.int32]
 
+#: Lengths, m, forces, N, times, s, and ranks that differ by no more are equal. What the lattice, symmetry or
+#: the clock makes equal differs by rounding, 1e-12 at most, which is other on another processor: it decides
+#: nothing. Of equal ones the first is taken.
+TIE = 1e-9
 #: Smallest normal number: keeps 0 / 0 from being NaN.
 TINY = float(np.finfo(float).tiny)
 #: Shapes for which one set of `Constants` is kept.
@@ -53,6 +57,11 @@ class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
             made = tuple(self._kind(one) for one in made)
         self[shape] = made
         return made
+
+
+def find_first_largest(values: Floats) -> Any:
+    """Return the first row whose value is the largest, in each column of (r[, m]) values; see `TIE`."""
+    return (values >= np.maximum.reduce(values) - TIE).argmax(axis=0)
 
 
 def any_true(test: NDArray[np.bool_]) -> bool:

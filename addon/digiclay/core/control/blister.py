@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Constants, Flags, Floats, Modes
+from ..base.arrays import TIE, Constants, Flags, Floats, Modes
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import Parameters, quantity
 from ..model.control_interface import Measurement
 from ..model.layout import RELATIVE_TOLERANCE
-from .travel import ABEAM, measure_offsets
+from .travel import measure_offsets
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,6 +114,7 @@ class BlisterRule:
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
         limit = behind * cells.distance
+        limit -= TIE
         frozen: Flags = cells.ahead < limit
         froze = seen.mode == CODES[seen.mode.shape][2]
         if uneven is not False and np.any(uneven):
@@ -145,4 +146,4 @@ class BlisterRule:
             radius * (1.0 + RELATIVE_TOLERANCE)
             for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
         )
-        return Constants((-ABEAM, *wider, self.behind, self.release, self.felt))
+        return Constants((-TIE, *wider, self.behind, self.release, self.felt + TIE))

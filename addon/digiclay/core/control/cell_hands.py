@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Cells, Floats
+from ..base.arrays import TIE, Cells, Floats, find_first_largest
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from .finger_sections import BEYOND, Columns, Whole
@@ -51,7 +51,7 @@ class CellHands(HandInGroups):
         x, y = self._place(memory).T
         apart = measure_square(x, y, basis)
         under = super()._predict_under(memory, basis, height)
-        under += height[apart.argmin(axis=1)][:, None]
+        under += height[find_first_largest(-apart.T)][:, None]
         under -= height
         return np.abs(under, under)
 
@@ -63,7 +63,7 @@ class CellHands(HandInGroups):
         at_x, at_y = self._place(memory).T.take(fingers, axis=1)
         order = (x - at_x) ** 2 + (y - at_y) ** 2
         # Who leaves a pin as it is, is not asked, unless the pin is under it; who presses it is asked first.
-        still = target.take(columns.pairs) == seen.target.take(columns.several)
+        still = np.abs(target.take(columns.pairs) - seen.target.take(columns.several)) <= TIE
         order += still & (order > UNDER**2 * self._sizes[2][:, 0].take(fingers))
         order[owner.take(columns.which) == fingers] = -1.0
         return columns.pick(-order)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Flags, Floats, Modes, any_true
+from ..base.arrays import TIE, Flags, Floats, Modes, any_true
 from ..base.errors import ParameterError
 from ..base.modes import BLISTER, CRITICAL, EDGE, FORCE_FOLLOW, HOLD, SPRING, Mode
 from ..base.quantity import quantity
@@ -23,7 +23,7 @@ from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .finger_sections import WHOLE, Whole
 from .servo import Tracking, lock_overloaded, mark_formed
-from .travel import ABEAM, Heading, Rim, measure_lead, measure_square, update_heading
+from .travel import Heading, Rim, measure_lead, measure_square, update_heading
 
 VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
 
@@ -193,7 +193,7 @@ class CellStatesControl:
         # A cell that follows counts with what it reads: of a fingertip that rises the few readings above the
         # noise would draw the centroid to and fro.
         force = touched.force[part]
-        pressed = force > (~_under_finger(touched.mode[part]) * self.floor if self.floor else 0.0)
+        pressed = force > (~_under_finger(touched.mode[part]) * self.floor if self.floor else TIE)
         if not any_true(pressed):
             return memory, None
         force, basis = force[pressed], touched.quadratic_basis[:, part][:, pressed]
@@ -203,7 +203,7 @@ class CellStatesControl:
         if not memory.felt:
             edge = float(np.dot(force, touched.height[part][pressed])) / total
             memory = memory._replace(heading=Heading(x, y), edge=edge)
-        elif math.hypot(x - memory.x, y - memory.y) > self.parameters.jump:
+        elif math.hypot(x - memory.x, y - memory.y) > self.parameters.jump + TIE:
             memory = memory._replace(heading=Heading(x, y), losses=memory.losses + 1)
         heading = update_heading(memory.heading, x, y, self.parameters.travel)
         return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
@@ -266,7 +266,7 @@ class CellStatesControl:
             "above_blister_trigger": force >= limits.blister_trigger,
             "below_critical_trigger": critical,
             "above_critical_trigger": ~critical,
-            "timed_out": critical & (seen.own[0] * self.period >= limits.critical_time),
+            "timed_out": critical & (seen.own[0] * self.period >= limits.critical_time - TIE),
         }
 
     def _around(
@@ -284,12 +284,12 @@ class CellStatesControl:
         np.less(nearest, blister.edge_radius * (1.0 - RELATIVE_TOLERANCE), out=at_edge)
         at_edge ^= in_blister
         ahead = measure_lead(memory.heading, memory.x, memory.y, basis)
-        facing = height[at_edge & (ahead >= -ABEAM)]
+        facing = height[at_edge & (ahead >= -TIE)]
         if facing.size:
             memory = memory._replace(edge=float(facing.mean()))
         from_patch = np.sqrt(measure_square(memory.x, memory.y, basis))
-        np.less(ahead, self.parameters.behind * from_patch, out=left_behind)
-        left_behind &= nearest > blister.flat_radius
+        np.less(ahead, self.parameters.behind * from_patch - TIE, out=left_behind)
+        left_behind &= nearest > blister.flat_radius * (1.0 - RELATIVE_TOLERANCE)
         left_behind &= in_blister
         weight = np.maximum(blister.evaluate_profile(distance), 0.0)
         top = np.dot(height[under], weight) / np.maximum(weight.sum(axis=0), 1e-12)
@@ -302,7 +302,7 @@ class CellStatesControl:
         spring = mode <= HOLD
         spring |= mode == SPRING
         formed = mark_formed(target, self.actuator.rest_height, self.parameters.dead_band)
-        return np.where(spring, np.where(force > 0.0, np.int8(SPRING), formed), mode)
+        return np.where(spring, np.where(force > TIE, np.int8(SPRING), formed), mode)
 
     def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags, most: Any) -> Floats:
         """Return valve commands: force control under the fingertip, springs and profile elsewhere."""

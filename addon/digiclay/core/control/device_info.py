@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import TIE, Floats
 from ..base.errors import ParameterError
 from ..model.layout import Grid
 from ..model.physics import Cell
@@ -44,7 +44,7 @@ class DeviceInfo:
         """Where the bed ends for a fingertip that leads the blister."""
         assert self.blister is not None
         plan, (left, bottom), reach = self.grid.layout, self.grid.corner, 0.5 * self.blister.flat_radius
-        x, y = -left - 0.5 * (plan.pitch + plan.shift), -bottom - 0.5 * plan.row_spacing
+        x, y = TIE - left - 0.5 * (plan.pitch + plan.shift), TIE - bottom - 0.5 * plan.row_spacing
         return Rim(x if x > reach else math.inf, y if y > reach else math.inf, reach)
 
     @property

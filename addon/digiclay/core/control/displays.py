@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import TIE, Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -136,7 +136,7 @@ class ForceDisplayControl(CellwiseControl):
         asked = take_cells(self.field, seen.cells)
         pressed = seen.force >= gains.felt_force
         alone = np.where(pressed, 0.0, seen.own[0] + 1.0)
-        kept = (seen.mode == Mode.FORCE_FOLLOW) & (alone * self.period <= gains.release_time)
+        kept = (seen.mode == Mode.FORCE_FOLLOW) & (alone * self.period <= gains.release_time + TIE)
         felt = pressed | kept
         seen.own[0] = np.where(felt, alone, 0.0)
         limit = np.minimum(rest + gains.rise, self.actuator.stroke)

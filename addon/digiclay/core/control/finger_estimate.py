@@ -111,6 +111,9 @@ def _list_slopes(profile: _Profile, place: Place, radius: Form) -> tuple[Form, .
 SEEN = np.array([6, 0, 1, 7, 8, 2])
 STATES = 9
 EYE = np.eye(6)
+#: Digits that are kept of the state: rounding must not grow where an estimate is unstable across a line of
+#: symmetry, as over the edge of a bed, where a single pin is touched.
+DIGITS = 12
 #: The size is at most this, as a logarithm: a factor of 2.7.
 LARGEST = 1.0
 #: The elongation is at most this: three times as long as wide.
@@ -194,7 +197,7 @@ class FingerFilter:
         change = gain.dot(weighted.dot(error))
         covariance = guess.covariance - gain.dot(spread)
         error -= change.take(SEEN).dot(slopes)
-        mean = guess.mean + change
+        mean = np.round(guess.mean + change, DIGITS)
         *_, size, along, askew = mean.tolist()
         if abs(size) > LARGEST:
             mean[6] = math.copysign(LARGEST, size)

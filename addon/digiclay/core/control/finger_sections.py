@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Cells, Flags, Floats, count_true, find_copies
+from ..base.arrays import Cells, Flags, Floats, count_true, find_copies, find_first_largest
 from ..model.layout import RELATIVE_TOLERANCE
 
 #: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
@@ -160,7 +160,8 @@ class Columns:
 
     def pick(self, rank: Floats) -> Cells:
         """Return which of `flat` has the highest rank, (p,), of each cell in several columns, (g,)."""
-        best = self._entries[rank.take(self._entries).argmax(axis=0), np.arange(self.double.size)]
+        first = find_first_largest(rank.take(self._entries))
+        best = self._entries[first, np.arange(self.double.size)]
         picked: Cells = self.pairs[best]
         return picked
 

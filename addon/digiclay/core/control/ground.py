@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Flags, Floats, Modes, any_true
+from ..base.arrays import TIE, Flags, Floats, Modes, any_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.interfaces import Alike
@@ -55,7 +55,7 @@ class EdgeGround(Alike):
     def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
         """Tell which frozen cells keep their command, m: those farther off the ground than the profile, m."""
         kept: Flags = target > profile
-        kept ^= top < ground
+        kept ^= top < ground - TIE
         return kept
 
 
@@ -85,7 +85,7 @@ class OwnGround(Alike):
         weight *= inside
         whole = np.maximum(weight.sum(axis=0), UNTOUCHED)
         mean = sum_weighted(ground, weight) / whole
-        sinks = top < mean
+        sinks = top < mean - TIE
         if not np.any(sinks):
             return level, False
         off = ground - mean
@@ -95,7 +95,7 @@ class OwnGround(Alike):
         np.maximum(change, np.minimum(top - mean - reach, 0.0), out=change)
         np.minimum(change, np.maximum(top - mean + reach, 0.0), out=change)
         profile = blister.interpolate(distance, ground, ground + change)
-        raised = seen.target > ground
+        raised = seen.target > ground + TIE
         # What a blister has raised before it sinks stays as far as it is within the level one.
         np.maximum(profile, np.minimum(level, seen.target), out=profile, where=raised)
         uneven = sinks & (reach > UNEVEN * (mean - top))
@@ -106,7 +106,7 @@ class OwnGround(Alike):
         kept: Flags = target > profile
         # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one
         # that sinks into uneven ground is not raised where the ground falls below its top.
-        kept ^= uneven | ((top < ground) & (target <= ground))
+        kept ^= uneven | ((top < ground - TIE) & (target <= ground + TIE))
         return kept
 
 

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import TINY, Cells, Flags, Floats, any_true
+from ..base.arrays import TIE, TINY, Cells, Flags, Floats, any_true, find_first_largest
 from ..model.control_interface import Commands, Measurement
 from ..model.fingertip import continue_ball
-from ..model.layout import Disc
+from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .finger_sections import BEYOND, OUTSIDE, WHOLE, Columns, Sections, Whole
 from .travel import measure_square
 
@@ -66,7 +66,7 @@ class HandControl:
     @cached_property
     def capture(self) -> Floats:
         """How far from each finger a pressed pin may be its own, (f,), m."""
-        return CAPTURE * np.array(self.sizes)
+        return CAPTURE * (1.0 + RELATIVE_TOLERANCE) * np.array(self.sizes)
 
     @cached_property
     def _sizes(self) -> tuple[Cells, Floats, Floats]:
@@ -161,9 +161,9 @@ class HandControl:
         x, y, radius, ground, top = self._find_blisters(memory)
         inside = measure_square(x, y, basis) <= (radius * np.abs(radius))[:, None]
         tops = np.where(inside, np.maximum(top, ground)[:, None], -np.inf)
-        harms = tops > low
+        harms = tops > low + TIE
         claimed = (seen.force[double] != 0.0) | np.logical_or.reduce(harms)
-        harms &= (under > low) | (tops > second)
+        harms &= (under > low + TIE) | (tops > second + TIE)
         harms &= ~np.logical_and.reduce(harms | np.isinf(under))
         if any_true(harms):
             np.putmask(shares, harms, HIDDEN)
@@ -248,9 +248,9 @@ class HandControl:
         free = [i for i in range(len(self.runs)) if not (owner == i).any()]
         x, y = touched.quadratic_basis[1:3, pressed]
         while free and left.max() >= self.felt:
-            strongest = int(left.argmax())
+            strongest = int(find_first_largest(left))
             # Who presses is but the name of the new one, so that figures of finger and controller agree.
-            named = int(touched.pressing[:, pressed[strongest]].argmax())
+            named = int(find_first_largest(touched.pressing[:, pressed[strongest]]))
             finger = free.pop(free.index(named) if named in free else 0)
             apart = np.hypot(x - x[strongest], y - y[strongest])
             apart[apart > NEW * self.capture[finger]] = np.inf
@@ -261,7 +261,7 @@ class HandControl:
         # Of those that land in one period each has what is nearest to it.
         fingers, apart = np.array([finger for finger, _ in seeds]), np.array([apart for _, apart in seeds])
         taken = (owner == NOBODY) & (apart < np.inf).any(axis=0)
-        return np.where(taken, fingers[apart.argmin(axis=0)], owner)
+        return np.where(taken, fingers[find_first_largest(-apart)], owner)
 
     def _choose(
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
@@ -276,7 +276,8 @@ class HandControl:
         inside = square <= edge
         # Outside of all blisters pins are led, or left as they are; of two the nearer one is obeyed.
         asked = target.take(columns.pairs)
-        aside = np.where(asked == seen.target.take(columns.several), -1.0, -0.5)
+        still = np.abs(asked - seen.target.take(columns.several)) <= TIE
+        aside = np.where(still, -1.0, -0.5)
         off = np.where(inside, np.abs(asked - ground), aside - square)
         # Under a fingertip its own blister is obeyed, and where it presses before all.
         inside &= square <= under
@@ -446,7 +447,7 @@ class HandInGroups(HandControl):
 
 def find_lowest(under: Floats) -> Cells:
     """Return the finger with the lowest of undersides (f, q), (q,); `NOBODY`: all are infinite."""
-    lowest: Cells = under.argmin(axis=0)
+    lowest: Cells = find_first_largest(-under)
     lowest[np.minimum.reduce(under) == np.inf] = NOBODY
     return lowest
 
@@ -456,5 +457,6 @@ def find_blister(run: Any, memory: Any) -> tuple[float, float, float, float, flo
     place = memory.place
     x, y = place or (BEYOND, BEYOND)
     # That of a method without a master reaches from the pressed cells on.
-    radius = run.blister.radius + getattr(run.parameters, "jump", 0.0) if place else -1.0
+    radius = run.blister.radius + getattr(run.parameters, "jump", 0.0)
+    radius = radius * (1.0 + RELATIVE_TOLERANCE) if place else -1.0
     return x, y, radius, memory.edge, getattr(memory, "top", getattr(memory, "height", memory.edge))

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Constants, Floats
+from ..base.arrays import TIE, Constants, Floats
 from ..base.quantity import quantity
 from ..model.contact import Contact
 from ..model.control_interface import Commands, Measurement, SetPoint
@@ -363,7 +363,7 @@ class HybridControl:
         found: list[tuple[float, float] | None],
     ) -> None:
         """Find, in place, the tops at which predicted forces add up to the set point, with the sums."""
-        (near,) = (region.cells.distance <= self.contact_radius).nonzero()
+        (near,) = (region.cells.distance <= self.contact_radius + TIE).nonzero()
         wanted = [not (one or own.alone) for one, own in zip(found, memories, strict=True)]
         near, fingers, picked = sections.pick(near, wanted)
         if not fingers:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Modes
+from ..base.arrays import TIE, Floats, Modes
 from ..base.modes import FORCE_FOLLOW
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
@@ -52,7 +52,7 @@ class LeadProfile:
         """Return how far from the top pins may stand, (m,), m, of slopes (m,) by `find_slopes`."""
         drop: Floats = distance - self.level
         np.maximum(drop, 0.0, out=drop)
-        drop *= around if forward is around else np.where(ahead > 0.0, forward, around)
+        drop *= around if forward is around else np.where(ahead > TIE, forward, around)
         return drop
 
 
@@ -154,7 +154,7 @@ class LedBlister:
             poses.append((*aims[-1][:2], *memory.heading[2:]))
         cells = self.rule.divide(sections.spread(poses), basis)
         edges = sections.average(left, self.rule.find_edge(cells), [memory.edge for memory in memories])
-        raised = [memory.top > edge for memory, edge in zip(memories, edges, strict=True)]
+        raised = [memory.top > edge + TIE for memory, edge in zip(memories, edges, strict=True)]
         find = self.profile.find_slopes
         slopes = [find(speed, raised=up) for speed, up in zip(speeds, raised, strict=True)]
         drop = self.profile.find_drop(cells.distance, cells.ahead, *sections.spread(slopes))

@@ -33,8 +33,8 @@ PHASE, X, Y, HEIGHT, OPENING, REFERENCE, EDGE = range(7)
 FROM_X, FROM_Y, TOWARD_X, TOWARD_Y, FELT, ALONE, LOSSES = range(7, 14)
 #: Phases as plain numbers: numpy takes an enumeration's member ten times as long.
 AWAY, SPRUNG, SHAPED = float(IDLE), float(SPRINGING), float(SHAPING)
-#: Share of the travel that settles a direction below which no rounding reaches it.
-SHORT = 1.0 - 1e-9
+#: Share of the travel that settles a direction within which none is settled for certain.
+SHORT = 0.99
 
 
 def _decide_by_run(

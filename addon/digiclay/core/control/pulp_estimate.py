@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Flags, Floats
+from ..base.arrays import TIE, Flags, Floats
 from ..model.touch import Touch
 from .finger_sections import WHOLE, Whole
 
@@ -174,7 +174,8 @@ def find_tops(
     Where none does, it is the end of the range nearest to it. `guesses`: where tops are sought most closely,
     m; `under` (m,), predicted undersides, m; `lost` (m,), from `PulpEstimate.predict_loss`, N.
     """
-    (level,) = (reach.part >= sections.repeat(sections.reduce(np.maximum, reach.part))).nonzero()
+    highest_part = sections.repeat(sections.reduce(np.maximum, reach.part))
+    (level,) = (reach.part >= highest_part - TIE).nonzero()
     lowest, highest = reach.ends.take(level, 1).tolist()
     ranges = []
     for guess, ends in zip(guesses, pairwise(sections.find_bounds(level)), strict=True):

@@ -12,11 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import TIE, Floats
 
-#: A cell no farther behind than this is abeam, and counts as ahead, m: cells lie in rows that a fingertip
-#: may cross at a right angle, and rounding must not decide on them.
-ABEAM = 1e-12
 #: A direction is opposite to another when the cosine of the angle between them is below this.
 BACK = -0.5
 #: A fingertip goes off the bed where the cosine of its direction to outward is above this: under one that
@@ -62,7 +59,8 @@ def update_heading(heading: Heading, x: float, y: float, travel: float, reversal
     """
     dx, dy = x - heading.x, y - heading.y
     way = math.hypot(dx, dy)
-    if way < travel or (way < reversal and dx * heading.toward_x + dy * heading.toward_y < BACK * way):
+    along = dx * heading.toward_x + dy * heading.toward_y
+    if way < travel - TIE or (way < reversal - TIE and along < BACK * way - TIE):
         return heading
     return Heading(x, y, dx / way, dy / way)
 

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..base.arrays import Constants, Flags, Floats, any_true, apply_map, per_row, prepare_map
+from ..base.arrays import TIE, Constants, Flags, Floats, any_true, apply_map, per_row, prepare_map
 from ..model.actuator import Supply
 from ..model.contact import LARGEST_EXPONENT, Contact
 from ..model.delay import Queue
@@ -156,7 +156,8 @@ def _mean_loss(pulp: Pulp, step: float, unit: float) -> Floats:
     loss[:-1] /= unit
     loss /= 1.0 - share
     both = np.tile([*loss[:-1], 0.0, 0.0, loss[-1]], (2, 1))
-    both[1, -2] = 1.0
+    # A pulp that touches as a step begins, by the clock or a lattice, comes to touch in it.
+    both[:, -2] = TIE, 1.0
     return both
 
 
