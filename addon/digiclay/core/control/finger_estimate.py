@@ -113,7 +113,7 @@ STATES = 9
 EYE = np.eye(6)
 #: Digits that are kept of the state: rounding must not grow where an estimate is unstable across a line of
 #: symmetry, as over the edge of a bed, where a single pin is touched.
-DIGITS = 12
+DIGITS = 11
 #: The size is at most this, as a logarithm: a factor of 2.7.
 LARGEST = 1.0
 #: The elongation is at most this: three times as long as wide.

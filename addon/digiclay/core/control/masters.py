@@ -15,7 +15,7 @@ import numpy as np
 from ..base.arrays import Flags, Floats
 from ..base.modes import FORCE_FOLLOW, SPRING
 from ..model.layout import Disc
-from .travel import Heading
+from .travel import PARTS, Heading
 from .virtual_master import (
     CARRIED,
     IDLE,
@@ -129,7 +129,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         total, _, _, near, near_x, near_y = np.array(sums)
         none, idle = total < felt, numbers[PHASE] == AWAY
         with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = near_x / near, near_y / near
+            x, y = np.rint(np.array((near_x, near_y)) / near * PARTS) / PARTS
             way = (x - numbers[FROM_X]) ** 2 + (y - numbers[FROM_Y]) ** 2
         goes = ~none & ~idle & (near >= felt) & (way < (SHORT * gains.travel) ** 2)
         others = ~goes & ~(none & idle)

@@ -21,6 +21,11 @@ BACK = -0.5
 OUTWARD = 0.1
 
 
+#: To how many parts of a meter the place of a fingertip counts. A blister that rises under one on a line of
+#: symmetry may be unstable across it: what rounding leaves there must not grow.
+PARTS = 1e13
+
+
 class Rim(NamedTuple):
     """Outer cells of a bed: a fingertip that leaves over them is carried by fewer, which are not to rise."""
 

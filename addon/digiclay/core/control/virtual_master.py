@@ -32,7 +32,7 @@ from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .ground import GROUNDS, EdgeGround, OwnGround, raise_blister
 from .servo import BatchControl, Tracking, lock_overloaded, mark_formed, sum_weighted
-from .travel import Heading, Rim, measure_excess, update_heading
+from .travel import PARTS, Heading, Rim, measure_excess, update_heading
 
 #: Share of the total force that the cell in the middle of the fingertip carries while shaping, at least: 0.23
 #: to 0.33 of it measured while the fingertip moves slowly.
@@ -253,7 +253,7 @@ class VirtualMasterControl(BatchControl):
         phase, _, _, height, opening, reference, edge, heading, felt, _, losses = master
         if phase is not IDLE:
             if near >= gains.felt_force:
-                x, y = near_x / near, near_y / near
+                x, y = round(near_x / near * PARTS) / PARTS, round(near_y / near * PARTS) / PARTS
                 reversal, reach = self.reversal, self.rim.reach
                 if self.rim.is_under(x, y, reach):
                     # The patch grows and shrinks away from the rim: only farther back is another direction.
