@@ -1,4 +1,4 @@
-"""Figures of README, performance and stacking that are counts, or that depend on one: no page is stale unseen."""
+"""Figures of README, performance and stacking that are counts, or depend on one: none is stale unseen."""
 
 import statistics
 import sys
