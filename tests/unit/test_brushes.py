@@ -198,7 +198,7 @@ def smoothed() -> Running:
     return finish(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)))
 
 
-@pytest.mark.parametrize("make", [smoothed, lambda: crossed("design", 30.0, Brush.LOWER)[1]])
+@pytest.mark.parametrize("make", [smoothed, lambda: crossed("design", 30.0, Brush.RAISE)[1]])
 def test_a_recording_of_strokes_is_a_take_that_replays_bit_for_bit(make):
     take = read_recording(make())
     assert take.orders is not None
