@@ -93,14 +93,14 @@ class Shaped:
 
 
 @cache
-def shaped(stream: Stream, tracking: Tracking = HANDS) -> Shaped:
-    """Return what becomes of a stream, as `real_time_loop` has it."""
+def shaped(stream: Stream, tracking: Tracking = HANDS, lasts: float = LASTS) -> Shaped:
+    """Return what becomes of a stream within a time, s, as `real_time_loop` has it."""
     scene = load(find("ridge_mound_valley"), [Setting("layout.rows", "19"), Setting("layout.columns", "27")])
     session = begin_session(replace(scene, fingers=2 * scene.fingers), LIMITS, tracking)
     order, rows, messages = Order(), [], list(stream.messages())
     position, period = session.system.grid.positions, session.system.period
     assert period == PERIOD
-    for count in range(int(LASTS / PERIOD)):
+    for count in range(int(lasts / PERIOD)):
         while messages and messages[0][0] <= count * PERIOD:
             request = check_fingers(messages.pop(0)[1], None, 0)
             assert bool(request.fault) == stream.hostile
@@ -160,7 +160,7 @@ def test_nobody_presses_on_after_a_dropout(gone: bool) -> None:
 def test_without_a_part_tracked_hands_are_no_fingers() -> None:
     stream, found = Stream(90.0), {}
     for part in ("clutch", "cutoff", "coupling"):
-        found[part] = shaped(stream, replace(HANDS, **{part: 0.0}))
+        found[part] = shaped(stream, replace(HANDS, **{part: 0.0}), 7.0)  # pressed and lifted
     # Off by 7 mm, a hand touches nothing, or presses as much deeper.
     assert not found["clutch"].shaping[:, 0].any()
     assert found["cutoff"].force.max() > 1.5 * shaped(stream).force.max()
