@@ -292,7 +292,7 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said, cores):
 def test_the_backend_of_a_notebook_does_not_hinder_plots(here):
     script = (
         "import os\n"
-        "os.environ['MPLBACKEND'] = 'module://of_a_notebook.backend_inline'\n"
+        "os.environ['MPLBACKEND'] = 'module://matplotlib_inline.backend_inline'\n"
         "from digiclay.cli import console; console()\n"
     )
     assert finish(start(script, "run", "my.toml", "--plots", "--no-errors"))[0] == 0

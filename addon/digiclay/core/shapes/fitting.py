@@ -234,11 +234,9 @@ def read(shape: Shape) -> Relief:
 
 def import_reader(path: Path) -> None:
     """Import the library that reads a file before it can be interrupted; a missing one is refused later."""
-    kind = path.suffix.lower()
-    reader = "PIL.Image" if kind in PICTURES else "trimesh" if kind in mesh_reader.CHECKS else ""
-    if reader:
+    if path.suffix.lower() in PICTURES:
         with suppress(ImportError):
-            importlib.import_module(reader)
+            importlib.import_module("PIL.Image")
 
 
 def _array(path: Path) -> HeightMap:
@@ -255,13 +253,7 @@ def _mesh(path: Path, shape: Shape) -> ShapeMesh:
     if path.suffix.lower() not in MESHES:
         rule = f"must be a mesh, a picture or an array ({', '.join(KINDS)})"
         raise ParameterError("shape", "file", rule, str(path))
-    try:
-        mesh = mesh_reader.read(path)
-    except (ParameterError, MemoryError, OSError):
-        raise
-    except Exception as error:  # trimesh raises all sorts of errors on a broken file
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise make_refusal("must be a mesh that can be read", str(path), reason) from None
+    mesh = mesh_reader.read(path)
     up = shape.up if shape.up != AUTO else mesh.up
     length = LENGTHS[shape.unit] if shape.unit != AUTO else mesh.length or LENGTHS["mm"]
     return make_shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)
