@@ -177,6 +177,47 @@ def test_a_third_finger_that_hovers_over_two_that_meet_changes_nothing(method: s
     np.testing.assert_allclose(state.row(0), alone.row(0), rtol=0, atol=1e-12)
 
 
+def drag(system: System, apart: float, angle: float, turn: float) -> Floats:
+    """Return poses (t, p, 2, 7): pressed, lifted by 5.5 and 11.5 mm, at rest, then off at once.
+
+    They are so far apart, m, in a direction, rad, and go in one that is turned from it; the lower rises.
+    """
+    time = np.arange(730)[:, None] * PERIOD + system.instants
+    poses = np.zeros((*time.shape, 2, 7))
+    poses[..., 3] = 1.0
+    gone = 12e-3 * np.maximum(time - 2.92, 0.0)
+    for finger, (side, top) in enumerate(((0.5, 42e-3), (-0.5, 48e-3))):
+        way = [(0.0, 42e-3), (0.5, 36.5e-3), (0.7, 36.5e-3), (0.7 + (top - 36.5e-3) / 6e-3, top)]
+        height = np.interp(time, *np.transpose(way)) + (0.5 * gone if side > 0.0 else 0.0)
+        poses[..., finger, 0] = 1.3e-3 + side * apart * np.cos(angle) + gone * np.cos(angle + turn)
+        poses[..., finger, 1] = 0.7e-3 + side * apart * np.sin(angle) + gone * np.sin(angle + turn)
+        poses[..., finger, 2] = height
+    return poses
+
+
+@pytest.mark.parametrize(
+    ("apart", "angle", "turn"),
+    [
+        (10.5, 120, 90), (12.0, 0, 60), (12.0, 160, 90), (13.7, 30, 90), (13.7, 0, 0), (15.0, 15, 90),
+    ],
+)  # fmt: skip
+def test_a_finger_beside_a_higher_one_is_followed_as_alone(apart: float, angle: int, turn: int) -> None:
+    # While pins far above a fingertip told of its place, both were lost at 12 mm, and at 13.7.
+    one, two = (
+        assemble(
+            scene("virtual_master", *[FINGER] * count, layout=replace(PAPER.layout, rows=27, columns=27))
+        )
+        for count in (1, 2)
+    )
+    poses = drag(two, apart * 1e-3, np.deg2rad(angle), np.deg2rad(turn))
+    _, both = follow(two, poses)
+    alone = np.hstack([follow(one, poses[:, :, [finger]])[1] for finger in (0, 1)])
+    # In all rows of the lift: without contact the force is off by the whole set point.
+    off, own = (np.sqrt(np.mean((forces[200:] - 0.4) ** 2, axis=0)) for forces in (both, alone))
+    assert (both[200:] > 0.0).all()
+    assert (off <= 1.1 * own).all()
+
+
 @pytest.mark.parametrize("method", [None, *METHODS])
 def test_the_order_of_the_fingers_changes_nothing(method: str | None) -> None:
     unlike, order = (FINGER, SOFT, LONG), [2, 0, 1]

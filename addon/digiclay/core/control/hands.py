@@ -29,6 +29,9 @@ CAPTURE = 1.2
 NEW, UNDER = 0.65, 0.5
 #: How far above a pressed pin a predicted underside may be that presses it, m.
 REACHED = 6e-3
+#: How far a pin may stand above a fingertip's underside and tell where it is, m: one that another fingertip's
+#: blister holds up beside it would draw its master there.
+ASIDE = 2e-3
 #: How near a pressed pin two undersides must be for both to be able to press it, m.
 UNCLEAR = 0.2e-3
 #: Share of a pin that a finger does not see.
@@ -59,7 +62,8 @@ class HandControl:
     runs: tuple[Any, ...]
     """The method's, one a finger."""
     sizes: tuple[float, ...]
-    """Largest semi-axis of each fingertip, m."""
+    heights: tuple[float, ...]
+    """Largest semi-axis of each fingertip, and that upwards, m."""
     felt: float
     """Force from which on a pin tells of a new finger, N."""
 
@@ -69,10 +73,10 @@ class HandControl:
         return CAPTURE * (1.0 + RELATIVE_TOLERANCE) * np.array(self.sizes)
 
     @cached_property
-    def _sizes(self) -> tuple[Cells, Floats, Floats]:
-        """The fingers, their sizes, m, and squares of `capture`, m², (f, 1) each."""
-        numbers = np.arange(len(self.runs))
-        return numbers[:, None], np.array(self.sizes)[:, None], self.capture[:, None] ** 2
+    def _sizes(self) -> tuple[Cells, Floats, Floats, Floats]:
+        """The fingers, their sizes, m, squares of `capture`, m², and their heights, m, (f, 1) each."""
+        numbers, sizes, heights = np.arange(len(self.runs)), np.array(self.sizes), np.array(self.heights)
+        return numbers[:, None], sizes[:, None], self.capture[:, None] ** 2, heights[:, None]
 
     @property
     def rows(self) -> int:
@@ -222,14 +226,14 @@ class HandControl:
         """Return the undersides of fingers over pins of a `height`, (f, q), m; infinite where one is far."""
         x, y = self._place(memory).T
         square = measure_square(x, y, basis)
-        _, size, reach = self._sizes
+        _, size, reach, tall = self._sizes
         far: Flags = square > reach
         if not self._predicts:
             tops = np.array([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
             square /= size * size
             heights = continue_ball(square)
-            heights *= size
-            heights += tops + size
+            heights *= tall
+            heights += tops + tall
             heights[far] = np.inf
             return heights
         under = np.full(square.shape, np.inf)
@@ -311,6 +315,8 @@ class HandTogether(HandControl):
         self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see the pressed cells, without the forces on those of the others."""
+        near = find_lowest(np.where(under < touched.height[pressed] - ASIDE, np.inf, under))
+        owner = np.where(near == NOBODY, owner, near)
         own = owner[:, None] == self._sizes[0].T
         columns = touched._replace(
             quadratic_basis=touched.quadratic_basis[:, pressed, None],

@@ -237,9 +237,10 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
 
     if not (hasattr(controllers[0], "blister") and hasattr(controllers[0].begin(), "place")):
         return controllers[0]  # it follows no fingertip
-    sizes = [max(touch.fingertip.length, touch.fingertip.width) for touch in touches if touch]
+    tips = [touch.fingertip for touch in touches if touch]
+    sizes, heights = [max(tip.length, tip.width) for tip in tips], [tip.height for tip in tips]
     felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
-    common = tuple(controllers), tuple(sizes), felt
+    common = tuple(controllers), tuple(sizes), tuple(heights), felt
     if isinstance(controllers[0], BatchControl):
         return HandTogether(*common, join_controllers(controllers))
     return (CellHands if hasattr(controllers[0], "whose") else HandInGroups)(*common)
