@@ -35,7 +35,16 @@ from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
 from .methods import ControlParameters, Pace
 from .pulp_estimate import PulpEstimate, Reach, find_tops, lead_heights
 from .servo import declare_again, mark_formed
-from .virtual_master import HEAVIEST, IDLE, SHAPING, Master, Phase, VirtualMaster, VirtualMasterControl
+from .virtual_master import (
+    HEAVIEST,
+    IDLE,
+    SHAPING,
+    SPRINGING,
+    Master,
+    Phase,
+    VirtualMaster,
+    VirtualMasterControl,
+)
 from .virtual_master import build as build_master
 
 
@@ -218,7 +227,10 @@ class HybridControl:
 
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
         """Let Method I follow the fingertip; the next one is predicted again."""
-        master, disc = self.substitute.locate(memory.master, touched)
+        before, begins = memory.master, self.substitute.is_new(memory.master)
+        master, disc = self.substitute.locate(Master(losses=before.losses) if begins else before, touched)
+        if begins and master.phase is not IDLE:
+            master = master._replace(phase=before.phase)
         if memory.led_radius:
             led = (memory.led_x, memory.led_y, memory.led_radius)
             disc = enclose_discs(disc, led) if disc else led
@@ -313,13 +325,18 @@ class HybridControl:
         master = memory.master
         if not memory.alone:
             (top, coming), asked = found or (felt, 0.0), self.parameters.force_setpoint
-            if self._leaves(memory) and top > (along := self._move_top(memory)):
+            goes, beyond = self._leaves(memory)
+            carried = memory.trim != 0.0  # one that has just landed does not leave, wherever it is estimated
+            if carried and (goes or beyond) and top > (along := self._move_top(memory)):
                 top, coming = along, -1.0  # fewer cells carry the fingertip, and none is to rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
             due, doubt = (*memory.due[1:], coming), self._doubt(memory, force, cells)
-            if doubt > (DOUBTED * asked) ** 2:
+            if beyond and not (carried and goes) and force < LEARNED * asked:
+                phase = SHAPING if carried else SPRINGING
+                master = Master(phase, height=math.nan, losses=memory.losses)
+            elif doubt > (DOUBTED * asked) ** 2:
                 (x, y, *_), due, doubt = memory.estimate.mean.tolist(), memory.due, 0.0
                 shaping, heading, losses = SHAPING, memory.heading, memory.losses
                 master = Master(shaping, x, y, top, 0.0, top, edge, heading, top, 0, losses)
@@ -334,12 +351,12 @@ class HybridControl:
             *first, top, edge, heading, trim, felt, alone, losses, x, y, reach, due, doubt, master
         )
 
-    def _leaves(self, memory: Follower) -> bool:
-        """Tell whether the fingertip goes off the bed."""
+    def _leaves(self, memory: Follower) -> tuple[bool, bool]:
+        """Tell whether the fingertip goes off the bed, and whether it is beyond, where few pins carry it."""
         x, y, _, vx, vy, *_ = memory.estimate.mean.tolist()
         rim, speed = self.device.rim, math.hypot(vx, vy)
         goes = speed > SLOWEST and rim.is_ahead(x, y, vx / speed, vy / speed)
-        return goes or rim.is_under(x, y, -rim.reach)
+        return goes, rim.is_under(x, y, -rim.reach)
 
     def _doubt(self, memory: Follower, force: float, cells: int) -> float:
         """Return the doubt, N², after a force of some cells, N: beyond a limit Method I takes over."""
