@@ -84,6 +84,18 @@ def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
     assert made.summary() == "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N (0.57 to 1 JND)"
 
 
+@pytest.mark.parametrize(("speed", "said"), [(24e-3, ", lost once, 0.99 s"), (26e-3, ""), (5e-3, "")])
+def test_the_summary_tells_that_a_lift_lost_the_finger_unless_no_pin_rises_so_fast(
+    speed: float, said: str
+) -> None:
+    points = [(0.0, 0.041), (0.2, 0.037), (0.5, 0.037), (1.5, 0.037 + speed)]
+    way = [{"time": time, "position": [0, 0, z]} for time, z in points]
+    path = {"waypoints": way, "interpolation": "linear"}
+    done = run(scene(layout={"rows": 13, "columns": 13}, blister={}, trajectory=path))
+    assert said in done.summary()
+    assert ("lost" in done.summary()) == ("lost" in done.metrics) == bool(said)
+
+
 def stopped_after(count: int) -> Result:
     asked = iter(range(1, 1000))
     return run(scene(), stopped=lambda: next(asked) == count)

@@ -1,6 +1,7 @@
 """Table of all metrics of sessions and of methods: units, labels and meanings."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 #: Factor from the SI unit to the unit that people read.
 FACTORS = {"mm": 1e3, "mm/s": 1e3, "mN": 1e3, "µm": 1e6, "µs": 1e6, "ml": 1e6, "%": 1e2}
@@ -117,3 +118,14 @@ METHOD: dict[str, Metric] = {
     ),
     "cost_ratio": Metric("1", "the same over that of the first method", "cost, ratio"),
 }
+
+
+def describe_losses(metrics: Mapping[str, Any]) -> str:
+    """Return how often each finger of a run was lost, and how long it was without contact, or ``""``."""
+    each = metrics.get("lost", ())
+    return "; ".join(
+        f"{f'finger {number} ' if len(each) > 1 else ''}lost {'once' if count == 1 else f'{count} times'}, "
+        f"{one['time']:.2g} s without contact"
+        for number, one in enumerate(each, 1)
+        if (count := one["losses"])
+    )

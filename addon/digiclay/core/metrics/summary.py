@@ -292,11 +292,32 @@ def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float
     return compute_mean(1.0 - touching[first:after], compute_weights(time)[first:after])
 
 
+class Loss(NamedTuple):
+    """End of contact that the fingertip did not ask for: when, and how long it was without contact, s."""
+
+    start: float
+    time: float
+
+
 def find_contact_ends(time: ArrayLike, total_force: ArrayLike) -> Floats:
     """Return when contact ends, s, shape (ends,), bounces counted once, from times, s, and forces (t,), N."""
     touching = find_contact_rows(total_force)
     ends: Floats = np.asarray(time, dtype=np.float64)[1:][touching[:-1] & ~touching[1:]]
     return ends[np.diff(ends, prepend=-np.inf) > BOUNCE]
+
+
+def find_losses(time: Floats, total_force: Floats, height: Floats, free_speed: float) -> list[Loss]:
+    """Return the ends of contact at which a fingertip rose no faster than a pin can, m/s; all (t,), SI.
+
+    A loss lasts until the next contact, until the fingertip rises faster, or to the end.
+    """
+    losses = []
+    for end in find_contact_ends(time, total_force).tolist():
+        rise = np.gradient(height, time)
+        if rise[(time > end - 0.2) & (time <= end + 0.1)].max() <= free_speed:
+            over = time[(time > end) & ((total_force > 0.0) | (rise > free_speed))]
+            losses.append(Loss(end, float(over[0] if over.size else time[-1]) - end))
+    return losses
 
 
 def measure_touchdown(

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ..base.errors import explain_os_error
 from ..engine.simulation import begin, periods
 from ..engine.system import System
-from ..metrics.metric_table import ERRORS, METRICS, RUN
-from ..metrics.summary import compute_metrics, split_fingers, take_worst
+from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_losses
+from ..metrics.summary import compute_metrics, find_losses, split_fingers, take_worst
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
 from ..scene.assembly import assemble
@@ -70,6 +70,7 @@ class Result:
         )
         if self.metrics.get("rfd_jnd_least") is not None:
             felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
+        felt += f", {lost}" if (lost := describe_losses(self.metrics)) else ""
         simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
         end = " (incomplete: stopped)" if self.incomplete else ""
         errors = ""
@@ -133,14 +134,19 @@ def evaluate(
         "total_force": rows["force"].sum(axis=1),
         "position": system.grid.positions,
     }
-    each, depths = [], []
+    each, depths, lost = [], [], []
     for finger, own in zip(scene.fingers, split_fingers(history), strict=True):
         each.append(compute_metrics(own, scene.set_point))
+        losses = find_losses(moments, own["total_force"], own["fingertip"][:, 2], system.fastest)
+        lost.append({"losses": len(losses), "time": sum(loss.time for loss in losses)})
         if system.cell.touch is not None and finger.fingertip:
             depths.append(find_indentations(finger.fingertip, own))
     metrics: dict[str, Any] = take_worst(each)
     if system.fingers > 1:
         metrics["fingers"] = each
+    # Only what is to hold a force can lose a fingertip.
+    if scene.set_point and any(one["losses"] for one in lost):
+        metrics["lost"] = lost
     if depths:
         depth = np.max(depths, axis=0)
         metrics["max_indentation"] = float(depth.max())

@@ -8,7 +8,14 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..metrics.summary import compute_rfd, find_contact_ends, measure_lag, split_fingers, sum_cells
+from ..metrics.summary import (
+    compute_rfd,
+    find_contact_ends,
+    find_losses,
+    measure_lag,
+    split_fingers,
+    sum_cells,
+)
 from ..model.control_interface import find_set_point
 from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
@@ -185,10 +192,8 @@ def find_free_speed(scene: Scene) -> float:
 
 def find_unintended_losses(done: Result) -> list[float]:
     """Return when contact of a fingertip ended, s, though it rose no faster than a pin can just then."""
-    limit, moments = find_free_speed(done.scene), done.history["time"]
-    losses: list[float] = []
+    limit, moments, losses = find_free_speed(done.scene), done.history["time"], list[float]()
     for own in split_fingers(done.history):
-        rise = np.gradient(own["fingertip"][:, 2], moments)
-        lost = find_contact_ends(moments, own["total_force"]).tolist()
-        losses += [t for t in lost if rise[(moments > t - 0.2) & (moments <= t + 0.1)].max() <= limit]
+        found = find_losses(moments, own["total_force"], own["fingertip"][:, 2], limit)
+        losses += [loss.start for loss in found]
     return losses
