@@ -13,6 +13,7 @@ from digiclay.core.engine.simulation import advance, begin, trace_fingers
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.files.tables import parse_tables
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.fingertip import compute_forms, compute_underside
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.scene.assembly import assemble
@@ -175,6 +176,22 @@ def test_a_third_finger_that_hovers_over_two_that_meet_changes_nothing(method: s
     # Rounding alone: sums go over the cells in another order.
     np.testing.assert_allclose(all_forces[:, :2], forces, rtol=0, atol=1e-9)
     np.testing.assert_allclose(state.row(0), alone.row(0), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("below", "known"), [(0.1e-3, False), (0.3e-3, True)])
+def test_nobody_knows_who_presses_a_pin_just_below_two_predicted_fingertips(
+    below: float, known: bool
+) -> None:
+    system = assemble(scene("hybrid", FINGER, FINGER))
+    hands: Any = system.controller
+    one, own = np.full(1, REST), np.zeros((hands.rows, 1))
+    basis, mode = np.ones((6, 1)), np.zeros(1, np.int8)
+    pin = Measurement(basis, one, np.full(1, 5e-3), one, mode, own, np.zeros(1, np.intp))
+    shares, sure = hands._share(
+        np.full((2, 1), REST + below), np.zeros(1, np.intp), pin, np.zeros(1, np.intp)
+    )
+    assert sure.tolist() == [known]
+    assert shares.ravel().tolist() == [1.0, 0.0]
 
 
 def drag(system: System, apart: float, angle: float, turn: float) -> Floats:

@@ -126,6 +126,22 @@ def test_the_blister_s_edge_is_the_mean_height_of_the_ring_ahead_and_abeam(towar
     assert memory.edge == pytest.approx(measured.height[ahead].mean(), abs=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("toward", "leaves"), [((1.0, 0.0), True), ((-1.0, 0.0), False), ((0.0, 1.0), False)]
+)
+def test_no_cell_rises_for_a_finger_that_leaves_the_bed(toward, leaves):
+    # The outer cells begin 2 mm beyond the pressed one, and 3 mm ahead carry the finger.
+    cell, gains = MIDDLE + 2, CONTROL.parameters
+    control = replace(CONTROL, rim=Rim(8e-3, 8e-3, 3e-3))
+    measured = seen({cell: 0.5 * gains.force_setpoint}, {cell: Mode.FORCE_FOLLOW})
+    memory = Patch(heading=Heading(BED.x[cell], BED.y[cell], *toward), felt=True)
+    memory, _ = control.locate(memory, measured)
+    _, orders = control.command(memory, measured)
+    assert (orders.command[cell] > 0.0) != leaves
+    shaped = orders.target[cell + (1 if toward[0] >= 0.0 else -1)]
+    assert shaped == pytest.approx(REST + (0.0 if leaves else gains.rise), abs=1e-12)
+
+
 FF, PATCH = Mode.FORCE_FOLLOW, Mode.BLISTER
 #: With sensors whose noise hides forces below 25 mN; with a flat top short of a pin 3 mm away, and beyond it.
 NOISY = replace(CONTROL, floor=25e-3)

@@ -10,9 +10,12 @@ from digiclay.core.control.finger_estimate import Estimate, FingerFilter, Spread
 from digiclay.core.control.finger_sections import Sections
 from digiclay.core.control.flow_servo import FlowServo, make_flow_servo
 from digiclay.core.control.servo import Tracking, lock_overloaded
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.physics import Cell
 from digiclay.core.model.valve import Valve
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
 
 from tests.assemble import make_basis, make_system
 
@@ -182,3 +185,19 @@ def test_of_cells_picked_for_some_fingers_each_finger_has_its_own(wanted: list[b
     assert picked.add(values[cells]) == [sum(own) for own in found.values()]
     spread = sections.spread([(1, 2), (3, 4), (5, 6), (7, 8)]).tolist()
     assert spread == [[1] * 4 + [3] * 3 + [5] * 2 + [7] * 3, [2] * 4 + [4] * 3 + [6] * 2 + [8] * 3]
+
+
+@pytest.mark.parametrize(
+    ("asked", "force", "yields"), [(0.4, 0.17, False), (0.4, 0.19, True), (0.6, 0.19, False)]
+)
+def test_a_single_pin_gives_way_that_carries_nearly_half_of_the_set_point(asked, force, yields):
+    system = assemble(resolve({"control": {"method": "hybrid", "force_setpoint": asked}}))
+    controller, count, pin = system.controller, system.grid.count, 312
+    pressed, level = np.zeros(count), np.full(count, 40e-3)
+    pressed[pin] = force
+    basis, mode = system.grid.compute_basis(np.arange(count)), np.zeros(count, np.int8)
+    own = np.zeros((controller.rows, count))
+    seen = Measurement(basis, level, pressed, level.copy(), mode, own, np.arange(count))
+    _, orders = controller.command(controller.begin(), seen)
+    assert (orders.target[pin] < 40e-3, orders.command[pin] < 0.0) == (yields, yields)
+    np.testing.assert_array_equal(np.delete(orders.target, pin), 40e-3)

@@ -17,6 +17,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording, write
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.accuracy import Errors
 from digiclay.core.session.memory_limit import (
     count_busy_cells,
     count_bytes_needed,
@@ -94,6 +95,16 @@ def test_the_summary_tells_that_a_lift_lost_the_finger_unless_no_pin_rises_so_fa
     done = run(scene(layout={"rows": 13, "columns": 13}, blister={}, trajectory=path))
     assert said in done.summary()
     assert ("lost" in done.summary()) == ("lost" in done.metrics) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("order", "parts"), [(1, 4), (2, 2)], ids=["across a kink, in quarters", "smooth, in halves"]
+)
+def test_an_estimate_is_the_error_itself_where_the_reference_converges_with_an_order(
+    order: int, parts: int
+) -> None:
+    error = np.array([5e-6, 1e-3, 4e-3])
+    assert Errors.estimate(error - error / parts**order) == pytest.approx(tuple(error), rel=1e-12)
 
 
 def stopped_after(count: int) -> Result:
