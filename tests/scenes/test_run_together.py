@@ -258,10 +258,17 @@ def test_without_all_commands_or_unasked_a_run_is_judged_without_errors_or_histo
         "simulation.physics_step=2e-3",
         "blister.profile=gaussian",
         "fluid.viscosity=1.6e-9",  # the flow is turbulent
+        "valve_lag=absent",
+        "control.method=cell_states",
+        "simulation.control_period=10 ms",
     ],
 )
 def test_scenes_of_another_structure_do_not_stand_together(setting: str) -> None:
-    assert describe_structure(sample("tap", setting)) != describe_structure(sample("tap"))
+    scenes = [sample("tap"), sample("tap", setting)]
+    assert describe_structure(scenes[1]) != describe_structure(scenes[0])
+    for together in (run_together, measure_together):
+        with pytest.raises(ParameterError, match=r"\(got number 1 unlike number 0\)"):
+            next(together(scenes))
 
 
 #: Noise of three runs: of force, of height, and its seed.

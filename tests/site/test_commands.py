@@ -89,8 +89,6 @@ def execute(command: str, folder: Path) -> str:
 
 def play(text: str, folder: Path, excused: set[str]) -> list[str]:
     """Carry out the commands of a page that are not excused, in a folder with its files; return failures."""
-    for name, source in _listed()["own"].items():
-        shutil.copyfile(ROOT / source, folder / name)
     for name, content in find_files(text).items():
         (folder / name).write_text(content, encoding="utf-8")
     once = dict.fromkeys(command.text for command in find_commands(text) if command.text not in excused)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
-from ..base.errors import DigiclayError
+from ..base.errors import DigiclayError, ParameterError
 from ..base.modes import Mode
 from ..engine.simulation import repeat_period, simulate_period
 from ..engine.state import ActiveSet, State
@@ -25,7 +25,14 @@ from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_scene import Ended, Result, evaluate, report
-from .packing import extend_path, find_diverged, make_divergence_error, select_runs
+from .packing import (
+    Findings,
+    describe_structure,
+    extend_path,
+    find_diverged,
+    make_divergence_error,
+    select_runs,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,6 +260,17 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
     return Monitor(play, np.maximum(largest, differences))
 
 
+def _refuse_unlike(scenes: Mapping[int, Scene]) -> None:
+    """Refuse scenes that are not of one structure."""
+    findings = Findings()
+    structures = {run: describe_structure(scene, findings) for run, scene in scenes.items()}
+    first, wanted = next(iter(structures.items()))
+    for run, structure in structures.items():
+        if structure != wanted:
+            rule = "must have the bed, the parts and the steps of each other (packing.describe_structure)"
+            raise ParameterError("Batch", "scenes", rule, f"number {run} unlike number {first}")
+
+
 def _run(
     scenes: Sequence[Scene],
     observer: type[Histories | Sums],
@@ -272,6 +290,7 @@ def _run(
     if not systems:
         return
     running = {run: scenes[run] for run in systems}
+    _refuse_unlike(running)
     play = begin_play(running, systems)
     watching = observer(running, scenes[0].recorder, play)
     monitor = _start(running) if errors and has_every_command(scenes[0]) else None
