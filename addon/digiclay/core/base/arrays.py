@@ -26,6 +26,7 @@ Faces = NDArray[np.int32]
 #: the clock makes equal differs by rounding, 1e-12 at most, which is other on another processor: it decides
 #: nothing. Of equal ones the first is taken.
 TIE = 1e-9
+PARTS = 2.0**30
 #: Smallest normal number: keeps 0 / 0 from being NaN.
 TINY = float(np.finfo(float).tiny)
 #: Shapes for which one set of `Constants` is kept.
@@ -57,6 +58,12 @@ class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
             made = tuple(self._kind(one) for one in made)
         self[shape] = made
         return made
+
+
+def settle(values: Any) -> Any:
+    """Return numbers, or one, to about `TIE`: those that are equal but for rounding become the same."""
+    # Halfway between two parts of a power of two no number lies that is written with a few digits.
+    return np.rint(values * PARTS) / PARTS
 
 
 def find_first_largest(values: Floats) -> Any:

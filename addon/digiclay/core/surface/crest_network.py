@@ -11,7 +11,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from ..base.arrays import Flags, Floats, Indices
+from ..base.arrays import Flags, Floats, Indices, settle
 from .regions import label_components
 
 #: From so many half widths to so many from a junction a branch shows where it goes.
@@ -28,7 +28,7 @@ class Branch:
     @property
     def length(self) -> float:
         """In plan, m."""
-        return measure_length(self.points)
+        return float(settle(measure_length(self.points)))
 
 
 #: A branch's end: its number, and 0 for the first point or 1 for the last.
@@ -296,7 +296,7 @@ def _joints(network: Network) -> Joints:
             joints[ends[0]], joints[ends[1]] = (ends[1], nothing), (ends[0], nothing)
             continue
         ways = {end: network.path(end) for end in ends}
-        pairs = sorted((float(ways[a] @ ways[b]), a, b) for a, b in combinations(ends, 2))
+        pairs = sorted((float(settle(ways[a] @ ways[b])), a, b) for a, b in combinations(ends, 2))
         for cosine, a, b in pairs:
             if cosine < -STRAIGHT and a not in joints and b not in joints:
                 between = _round(network, a, b)

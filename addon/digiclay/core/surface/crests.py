@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Indices
+from ..base.arrays import TIE, Floats, Indices, settle
 from .crest_network import SADDLE, Chain, find_chains, find_stretch, measure_run, place_along, reaches_out
 from .formed import Formed
 from .skeleton import find_skeleton, measure_half_width
@@ -270,7 +270,7 @@ def space_evenly(points: Floats, step: float) -> Floats | None:
     run = measure_run(points)
     if run[-1] < 1e-9:
         return None
-    return place_along(np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step)) + 1)), run, points)
+    return place_along(np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step - TIE)) + 1)), run, points)
 
 
 def _straight(leg: Floats) -> tuple[Floats, Floats]:
@@ -287,7 +287,7 @@ def _turns(line: Floats, width: int, closed: bool) -> Floats:
     before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
     one, two = line - line[before], line[after] - line
     sine = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    return np.asarray(np.abs(np.arctan2(sine, np.sum(one * two, axis=1))))
+    return np.asarray(settle(np.abs(np.arctan2(sine, np.sum(one * two, axis=1)))))
 
 
 def smooth(line: Floats, times: int, closed: bool) -> Floats:
@@ -371,7 +371,7 @@ def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[
     made = []
     for _, numbers in groups:
         own_crests = [_crest(field, pieces[n], lines[n]) for n in numbers]
-        kept = sorted((one for one in own_crests if one is not None), key=lambda one: -one.length)
+        kept = sorted((one for one in own_crests if one is not None), key=lambda one: -settle(one.length))
         core = np.concatenate([pieces[n].points for n in numbers])
         if kept:
             core = np.concatenate([one.points[:, :2] for one in kept])
@@ -394,7 +394,7 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
     before, after = np.maximum.accumulate(off), np.maximum.accumulate(off[::-1])[::-1]
     banks = np.minimum(before, after)
     run = measure_run(points)
-    for at in np.argsort(off / np.maximum(banks, 1e-12)).tolist():
+    for at in np.argsort(settle(off / np.maximum(banks, 1e-12)), kind="stable").tolist():
         if off[at] >= SADDLE * banks[at]:
             return [chain]
         first, last = find_stretch(off < off[at] + LEVEL * (banks[at] - off[at]), at)

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..base.arrays import Faces, Floats, Indices
+from ..base.arrays import Faces, Floats, Indices, find_first_largest, settle
 from ..base.quantity import Parameters, quantity
 from ..model.layout import list_steps
 from .crest_network import find_stretch, measure_run
@@ -217,21 +217,21 @@ def find(grid: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
     finding, features = finding or Finding(), []
     list_steps(grid.formed.shift / grid.formed.pitch)  # refuses rows that have no neighbors
     for kind, sign in (("boss", 1.0), ("crease", -1.0)):
-        some = sorted(_of_kind(grid, finding, kind, sign), key=lambda feature: -feature.volume)
+        some = sorted(_of_kind(grid, finding, kind, sign), key=lambda feature: -settle(feature.volume * 1e9))
         features += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
     return features
 
 
 def _of_kind(grid: SurfaceGrid, finding: Finding, kind: str, sign: float) -> Iterator[Feature]:
     """Give the features of one kind, not yet numbered."""
-    off = sign * grid.raised
+    off = settle(sign * grid.raised)
     inside = off > finding.threshold
     faces = grid.faces[inside[grid.faces].any(axis=1)]
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     label = label_components(len(off), edges[inside[edges].all(axis=1)])
     # All corners of a triangle that are inside are joined by it, and so have one label.
     of_face = np.where(inside[faces], label[faces], -1).max(axis=1)
-    at_pins = sign * grid.formed.raised
+    at_pins = settle(sign * grid.formed.raised)
     pins = _by_label(np.where(inside[grid.pins], label[grid.pins], -1))
     for name, block in _by_label(of_face).items():
         own_pins = pins.get(name, np.empty(0, np.int64))
@@ -254,7 +254,7 @@ def _shared_out(
     """Give each part with pins enough its pins, its piece of a region, and this apart from the others."""
     place = grid.formed.position[pins]
     while len(every) > 1:
-        owner = np.argmin(measure_distances(place, every), axis=0)
+        owner = find_first_largest(-measure_distances(place, every))
         count = np.bincount(owner, minlength=len(every))
         if count.min() >= smallest:
             break

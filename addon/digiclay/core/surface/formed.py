@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import Faces, Flags, Floats, Indices
+from ..base.arrays import TIE, Faces, Flags, Floats, Indices
 from ..base.errors import OutputError, ParameterError
 from ..model.layout import find_grid_shape, find_neighbors, name_first_bad, read_places
 
@@ -113,7 +113,8 @@ def _cut_along_ac(place: Floats, top: Floats, *corners: Faces) -> Flags:
     a, b, c, d = corners
     ac, bd = (np.sum((place[i] - place[j]) ** 2, axis=1) for i, j in ((a, c), (b, d)))
     steep_ac, steep_bd = np.abs(top[a] - top[c]), np.abs(top[b] - top[d])
-    by_height = (steep_ac < steep_bd) | ((steep_ac == steep_bd) & (top[a] + top[c] >= top[b] + top[d]))
+    higher = top[a] + top[c] >= top[b] + top[d] - TIE
+    by_height = (steep_ac < steep_bd - TIE) | ((steep_ac <= steep_bd + TIE) & higher)
     return np.where(np.abs(ac - bd) <= SAME_LENGTH * (ac + bd), by_height, ac < bd)
 
 

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from ..base.arrays import Flags, Floats, Indices
+from ..base.arrays import Flags, Floats, Indices, settle
 from ..model.layout import SQUARE
 
 #: A hollow is a hole when it is deeper than this share of the lowest way out of it.
@@ -41,7 +41,7 @@ def average_neighbors(beside: Indices, on_bed: Flags, off: Floats, times: int) -
     count = on_bed.sum(axis=1)
     for _ in range(times):
         heights = np.where(beside >= 0, off[beside], 0.0)
-        off = 0.5 * (off + heights.sum(axis=1) / count)
+        off = settle(0.5 * (off + heights.sum(axis=1) / count))
     return off
 
 
