@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo extension test form lint test-convergence mutants test-matrix test-window test-proof test-release release docs guide-pictures clean
+.PHONY: help demo extension test form lint test-convergence test-kernel mutants test-matrix test-window test-proof test-release release docs guide-pictures clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -41,6 +41,10 @@ test: ## run the tests of behavior and of file formats, in Blender 4.5 too
 test-convergence: ## run tests/convergence: errors of the integration against references, tolerances and estimates
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/convergence.txt; $(PART) .reports/convergence.txt "tests of convergence" 900 -- $(HANGS) -n auto --dist loadfile tests/convergence
+
+test-kernel: ## run tests/regression and tests/convergence on the kernel of numpy's library for unknown processors
+	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@rm -f .reports/kernel.txt; OPENBLAS_CORETYPE=Prescott $(PART) .reports/kernel.txt "tests on another kernel" 1200 -- $(HANGS) -n auto --dist loadfile tests/regression tests/convergence
 
 lint: ## check style, format and types, and mend nothing
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)

@@ -124,6 +124,11 @@ BENCHMARKS = {
     "several_fingers": Benchmark(
         "several_fingers.measure", "what several fingertips cost, and two near each other feel"
     ),
+    "kernels": Benchmark(
+        "kernels.measure", "sessions on other kernels of numpy's library: what the last bit changes",
+        ("--quick", "--python other/bin/python --out results"),
+        {"--python FILE": {"action": "append", "default": [], "help": "also this Python, with its numpy"}},
+    ),
     "commits": Benchmark(
         "processes.measure_commits", "time of a control period at two commits",
         ("v0.1.0", "v0.1.0 main --turns 9"),

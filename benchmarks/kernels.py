@@ -1,0 +1,132 @@
+"""Benchmark ``kernels``: sessions on other kernels of numpy's library, or with another numpy."""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import find, list_samples, make_scene, read_table
+from digiclay.core.scene.schema import Scene
+
+from digiclay_study.method_trials import GROUPS, LIMITS, RANDOM, list_trajectories, place_trial
+
+from .report import Report, Row, Steps, tabulate
+
+#: Methods that carry a blister, and behaviors.
+CARRIED = ("virtual_master", "cell_states", "hybrid")
+METHODS = (*CARRIED, "elastic", "plastic", "viscous", "push_pull", "force_display")
+#: Kernels of OpenBLAS, and no instructions that numpy itself would choose.
+KERNELS = {
+    "Haswell": {"OPENBLAS_CORETYPE": "Haswell"},
+    "Prescott": {"OPENBLAS_CORETYPE": "Prescott"},
+    "SkylakeX": {"OPENBLAS_CORETYPE": "SkylakeX"},
+    "no dispatch": {
+        "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL"
+    },
+}
+REFERENCE = "Haswell"
+ROOT = Path(__file__).parents[1]
+SESSION, DRAGS = "ridge_mound_valley", 8
+#: With --quick one run of so many; every so many control periods are compared; longest of a kernel, s.
+QUICK, EVERY, LONGEST = 12, 10, 7200.0
+
+
+def list_scenes() -> dict[str, Scene]:
+    """Return the sample scenes with each method that fits, and the suite's trajectories, by name."""
+    scenes, groups = {}, [group for group in GROUPS if group not in LIMITS]
+    for name in list_samples():
+        table = read_table(find(name))
+        for method in METHODS:
+            given = dict(table)
+            if table.get("control", {}).get("method", CARRIED[0]) != method:
+                given = {key: part for key, part in table.items() if key != "shape"}
+                given["control"] = {"method": method}
+            if method not in CARRIED:
+                given.pop("blister", None)
+            scenes[f"{name} {method}"] = make_scene(find(name), given)
+    for method in CARRIED:
+        session = make_scene(find(SESSION), read_table(find(SESSION)) | {"control": {"method": method}})
+        for name in list_trajectories(groups, DRAGS):
+            scenes[f"{RANDOM if name == SESSION else name} {method}"] = place_trial(session, name)[0]
+    return scenes
+
+
+def record(scene: Scene) -> dict[str, Any]:
+    """Return heights, m, forces, N, and modes of every so many control periods, (t, n)."""
+    system = assemble(scene)
+    rows = [
+        (state.row(0), state.row(system.rows.force), state.mode())
+        for state in periods(system, scene.trajectories(), begin(system), scene.periods)
+        if state.period % EVERY == 0
+    ]
+    return dict(zip(("height", "force", "mode"), map(np.array, zip(*rows, strict=True)), strict=True))
+
+
+def main() -> None:
+    """Record the runs of some numbers in files of a folder; the arguments are folder and step."""
+    for number, scene in list(enumerate(list_scenes().values()))[:: int(sys.argv[2])]:
+        np.savez(Path(sys.argv[1]) / f"{number}.npz", **record(scene))
+
+
+def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+    """Compare the runs of each kernel with those of the first."""
+    step, names, rows = QUICK if arguments.quick else 1, list(list_scenes()), list[Row]()
+    kernels = {name: (sys.executable, change) for name, change in KERNELS.items()}
+    kernels |= {python: (python, {}) for python in arguments.python}
+    with tempfile.TemporaryDirectory() as scratch:
+        folders = {name: Path(scratch) / str(number) for number, name in enumerate(kernels)}
+        for name in steps.through(list(kernels)):
+            _run(name, *kernels[name], folders[name], step)
+            files = sorted(folders[name].iterdir(), key=lambda file: int(file.stem))
+            for file in files if name != REFERENCE else ():
+                found = _compare(file, folders[REFERENCE] / file.name)
+                rows.append({"kernel": name, "run": names[int(file.stem)], **found})
+                file.unlink()
+    kinds = [[row for row in rows if row["kernel"] == name] for name in kernels if name != REFERENCE]
+    shown = [
+        {
+            "kernel": own[0]["kernel"], "runs": len(own),
+            **{key: max(row[key] for row in own) for key in ("height", "force", "modes")},
+            "run": max(own, key=lambda row: row["height"])["run"],
+        }
+        for own in kinds
+    ]  # fmt: skip
+    columns = {
+        "kernel": "kernel", "runs": "runs", "height (µm)": "height .2g 1e6", "force (mN)": "force .2g 1e3",
+        "modes": "modes", "run of the largest": "run",
+    }  # fmt: skip
+    title = f"\nlargest differences from {REFERENCE}; modes: of so many pins at once\n"
+    return Report([title, *tabulate(shown, columns)], rows)
+
+
+def _run(name: str, python: str, change: dict[str, str], folder: Path, step: int) -> None:
+    """Record runs in a process with a changed environment, in files of a folder."""
+    folder.mkdir()
+    paths = {"PYTHONPATH": os.pathsep.join([str(ROOT / "addon"), str(ROOT)]), "OPENBLAS_NUM_THREADS": "1"}
+    words = [python, "-m", "benchmarks.kernels", str(folder), str(step)]
+    environment = {**os.environ, **paths, **change}
+    done = subprocess.run(
+        words, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=LONGEST, check=False
+    )
+    if done.returncode:
+        raise DigiclayError(f"kernels: {name} failed: {done.stderr.strip().splitlines()[-1][:200]}.")
+
+
+def _compare(file: Path, other: Path) -> Row:
+    """Return the largest differences of two recorded runs, m and N, and of how many pins' modes at once."""
+    one, two = dict(np.load(file)), dict(np.load(other))
+    force = np.abs(one["force"] - two["force"]).max(), np.abs((one["force"] - two["force"]).sum(1)).max()
+    modes = np.count_nonzero(one["mode"] != two["mode"], axis=1).max()
+    height = np.abs(one["height"] - two["height"]).max()
+    return {"height": float(height), "force": float(max(force)), "modes": int(modes)}
+
+
+if __name__ == "__main__":
+    main()
