@@ -1,13 +1,13 @@
 """Reader of glTF files, GLB and JSON: the triangles of all nodes of the scene, in meters, y up.
 
 Materials and pictures are not opened; a file of vertices must lie in the glTF's folder, or below it.
-trimesh drops fans, takes normalized integers as they are, and allocates memory before it checks sizes.
 """
 
 import base64
 import binascii
 import json
 import math
+import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,6 +34,10 @@ INSIDE = "must have its vertices in the file, or in a file in its own folder"
 NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 ITEMS = {"SCALAR": 1, "VEC3": 3}
 TRIANGLES, STRIP, FAN = 4, 5, 6
+#: Extensions that change no vertex, or that are read.
+HARMLESS = re.compile(r"KHR_(materials|texture|lights|xmp|animation|mesh_quantization)\w*|EXT_texture\w*")
+#: One that adds copies where a reader is free not to know of it.
+COPIES = "EXT_mesh_gpu_instancing"
 
 
 def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
@@ -42,6 +46,10 @@ def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         tree, binary = _chunks(data, path.name) if data[:4] == b"glTF" else (json.loads(data), None)
         if not str(tree["asset"]["version"]).startswith("2."):
             raise ValueError(f"its version is {str(tree['asset']['version'])[:20]}")
+        needed = [one for one in tree.get("extensionsRequired", []) if not HARMLESS.fullmatch(one)]
+        needed += [COPIES] if COPIES in tree.get("extensionsUsed", []) else []
+        if needed:
+            raise make_refusal("must not need an extension that changes its vertices", path.name, needed[0])
         file = _File(path, tree, binary)
         parts = list(file.surfaces())
         refuse_many_triangles(path.name, sum(file.triangles(part) for part, _ in parts))
@@ -109,6 +117,9 @@ class _File:
             if index in seen:
                 raise ValueError(f"node {index} stands in two places")
             seen.add(index)
+            if "mesh" in node and ("skin" in node or any(node.get("weights", []))):
+                rule = "must not be bent by a skin or by weights: apply them first"
+                raise make_refusal(rule, self._path.name, f"node {index}")
             placement = nest_placement(_placement(node), outer)
             waiting += [(child, placement) for child in reversed(node.get("children", []))]
             for part in self._entry("meshes", node["mesh"])["primitives"] if "mesh" in node else ():

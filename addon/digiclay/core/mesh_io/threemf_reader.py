@@ -38,6 +38,12 @@ Start = Callable[[str, dict[str, str]], None]
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02 "
 PATH = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06 path"
 RELATION = "http://schemas.openxmlformats.org/package/2006/relationships Relationship"
+#: Namespaces of extensions that add nothing to a shape, or that are read.
+KNOWN = (
+    CORE.strip(),
+    PATH.partition(" ")[0],
+    "http://schemas.microsoft.com/3dmanufacturing/material/2015/02",
+)
 MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 #: Meters in a model's unit.
 UNITS = {
@@ -69,6 +75,7 @@ class _Model:
     unit: float = UNITS["millimeter"]
     objects: dict[Key, _Object] = field(default_factory=dict)
     items: list[Placed] = field(default_factory=list)
+    prefixes: dict[str, str] = field(default_factory=dict)
     counted: int = 0
     unpacked: int = 0
 
@@ -131,6 +138,7 @@ def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start:
 
     parser.StartDoctypeDeclHandler = refuse
     parser.StartElementHandler = start
+    parser.StartNamespaceDeclHandler = model.prefixes.__setitem__
     fed = 0
     try:
         with archive.open(entry) as file:
@@ -167,6 +175,9 @@ def _add_part(archive: zipfile.ZipFile, part: str, name: str, model: _Model, roo
             if unit not in UNITS:
                 raise ValueError(f"no unit: {unit}")
             model.unit = UNITS[unit]
+            for prefix in given.get("requiredextensions", "").split():
+                if model.prefixes.get(prefix, prefix) not in KNOWN:
+                    raise ValueError(f"needs {model.prefixes.get(prefix, prefix)}")
 
     def start(tag: str, given: dict[str, str]) -> None:
         if not tag.startswith(CORE):
