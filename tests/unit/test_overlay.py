@@ -18,7 +18,7 @@ from digiclay.overlay.picture import (
     round_axis,
     scale_curve,
 )  # fmt: skip
-from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Content, Readings, find_room, lay_out
+from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Content, Readings, find_room, lay_out, place_label
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -114,6 +114,33 @@ def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) ->
     high = np.max([p.max(axis=0) for p in points], axis=0)
     assert (low >= [box.x, box.y]).all()
     assert (high <= [box.x + box.width, box.y + box.height]).all()
+
+
+#: Place, and left end and base line of a label of 60 x 12 pixels in a room from 50, 10 to 250, 200.
+LABELS = {
+    "to the right of its place": ((100.0, 100.0), (122.0, 74.0)),
+    "to the left, where there is no room": ((200.0, 100.0), (118.0, 74.0)),
+    "in the room, where its place is not": ((400.0, 100.0), (190.0, 74.0)),
+    "from its edge": ((0.0, 100.0), (50.0, 74.0)),
+    "above the lower edge": ((100.0, 12.0), (122.0, 10.0)),
+    "below the upper edge": ((100.0, 300.0), (122.0, 188.0)),
+}
+
+
+@pytest.mark.parametrize("case", LABELS)
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_a_label_stands(case: str, scale: float) -> None:
+    (x, y), wanted = LABELS[case]
+    room = (50.0 * scale, 10.0 * scale, 250.0 * scale, 200.0 * scale)
+    found = place_label((x * scale, y * scale), (60.0 * scale, 12.0 * scale), room, scale)
+    assert np.divide(found, scale).tolist() == list(wanted)
+
+
+def test_a_row_too_long_for_its_box_has_smaller_letters() -> None:
+    names = ("Bed", "Bed of the third experiment, last of six")
+    short, long = (draw(session(name=name)).words[0] for name in names)
+    assert short.size == 12.0
+    assert 7.0 < long.size < 10.0
 
 
 def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:

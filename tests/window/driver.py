@@ -317,11 +317,16 @@ def shot(name: str) -> None:
     # Blender's own screenshot reads a buffer that software GL leaves black.
     file = OUT / f"{name}.png"
     subprocess.run(["import", "-window", "root", str(file)], check=True, timeout=120, capture_output=True)
-    image = bpy.data.images.load(str(file))
-    SEEN.setdefault("colors", {})[name] = len(
-        np.unique(np.array(image.pixels[:], np.float32).reshape(-1, image.channels), axis=0)
-    )
+    pixels = read_shot(name)
+    SEEN.setdefault("colors", {})[name] = len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0))
+
+
+def read_shot(name: str) -> Any:
+    """Return the pixels of a picture, (height, width, channels), the lower row first."""
+    image = bpy.data.images.load(str(OUT / f"{name}.png"))
+    pixels = np.array(image.pixels[:], np.float32).reshape(image.size[1], image.size[0], image.channels)
     bpy.data.images.remove(image)
+    return pixels
 
 
 def hand_over() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import addon_utils
 import bpy
+import numpy as np
 
 #: The guide's pictures show the pins as a user sees them.
 FINE_PINS = "DIGICLAY_SCREENSHOTS" in os.environ
@@ -75,6 +76,8 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.event("MOUSEMOVE", "NOTHING", blender.on_the_bed(-15, 5))
     yield 1.0
     blender.shot("press_cursor")
+    yield from edges(blender)
+    yield from keys(blender)
 
     yield from drag(blender, [(-18.0 + 6.0 * step, 6.0) for step in range(0, 7, 2)])
     note(blender, "pressed")
@@ -85,6 +88,55 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from shown(blender)
     yield from ended(blender)
     yield from disabled(blender)
+
+
+def said(blender: Any, name: str) -> None:
+    """Write down what is shown beside the cursor."""
+    chosen = blender.part("press.brush").tool_settings(bpy.context)
+    blender.SEEN[name] = blender.part("press.tool").describe(blender.beds()[0], chosen)
+
+
+def keys(blender: Any) -> Iterator[float | None]:
+    """Hold Ctrl and Shift over the bed, with a hand at rest, and let go of Ctrl where nobody sees it."""
+    at = blender.on_the_bed(-15, 5)
+    for name, held in (("LEFT_CTRL", {"ctrl": True}), ("RIGHT_SHIFT", {"shift": True})):
+        blender.event(name, "PRESS", at, **held)
+        yield from blender.rounds()
+        said(blender, f"{name} held")
+        blender.event(name, "RELEASE", at)
+        yield from blender.rounds()
+        said(blender, f"{name} let go")
+    blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
+    yield from blender.rounds()
+    blender.event("MOUSEMOVE", "NOTHING", (at[0] + 1, at[1]))
+    yield from blender.rounds()
+    said(blender, "moved without Ctrl")
+
+
+def edges(blender: Any) -> Iterator[float | None]:
+    """Move the mouse into corners of a view full of pins; find where the text beside it is drawn."""
+    area, region = blender.view()
+    looking = area.spaces.active.region_3d
+    preferences = bpy.context.preferences.addons[blender.EXTENSION].preferences
+    area.spaces.active.show_region_ui = True
+    distance, looking.view_distance = looking.view_distance, 0.4
+    yield 0.5
+    left, bottom, right, top = blender.part("overlay.views").find_free_room(area, region)
+    places = {"middle": (0.4, 0.6), "right": (0.98, 0.6), "corner": (0.97, 0.03)}
+    blender.SEEN["room"], blender.SEEN["text"] = (left, bottom, right, top), {}
+    for name, (x, y) in places.items():
+        at = round(region.x + left + x * (right - left)), round(region.y + bottom + y * (top - bottom))
+        pictures = []
+        for preferences.show_cursor_text in (False, True):
+            blender.event("MOUSEMOVE", "NOTHING", at)
+            yield from blender.rounds(8)
+            blender.shot(f"press_text_{name}")
+            pictures.append(blender.read_shot(f"press_text_{name}"))
+        rows, columns = np.nonzero((pictures[0] != pictures[1]).any(axis=2))
+        ends = [columns.min(), rows.min(), columns.max(), rows.max()] - np.tile([region.x, region.y], 2)
+        blender.SEEN["text"][name] = ends.tolist()
+    looking.view_distance, area.spaces.active.show_region_ui = distance, False
+    yield 0.5
 
 
 def depths(blender: Any) -> Iterator[float | None]:
@@ -102,10 +154,25 @@ def depths(blender: Any) -> Iterator[float | None]:
         yield 0.1
     yield from come(blender)
     note(blender, "after Ctrl")
+    said(blender, "deeper")
     blender.event("LEFT_CTRL", "RELEASE", at)
     blender.key("ESC", at)
     yield from blender.settle()
     blender.event("LEFTMOUSE", "RELEASE", at)
+    yield from blender.settle()
+    said(blender, "the next one")
+    blender.key("P", at)  # pauses: the stroke stays in the queue
+    yield from blender.until(lambda: blender.session().paused)
+    blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
+    blender.event("LEFTMOUSE", "PRESS", at, ctrl=True)
+    yield from blender.until(lambda: any(session.strokes for session in blender.sessions()))
+    blender.event("LEFTMOUSE", "RELEASE", at, ctrl=True)
+    blender.event("LEFT_CTRL", "RELEASE", at)
+    yield from blender.rounds()
+    said(blender, "while Raise forms")
+    blender.key("ESC", at)
+    blender.key("P", at)
+    yield from blender.until(lambda: not blender.session().paused)
     yield from blender.settle()
 
 

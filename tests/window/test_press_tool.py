@@ -37,6 +37,27 @@ def test_the_wheel_presses_deeper_and_ctrl_in_mid_stroke_draws_on_as_deep(seen: 
     assert np.linalg.norm((along - before)[:2]) > 3.0
 
 
+def test_the_text_at_the_cursor_says_what_a_press_does_now_and_what_is_being_formed(seen: Seen) -> None:
+    lower, size = "Lower, depth 4 mm", "Size 16 mm   "
+    assert seen["LEFT_CTRL held"] == f"{size}Raise, height 15 mm"
+    assert seen["RIGHT_SHIFT held"] == f"{size}Smooth 100 %"
+    free = ("LEFT_CTRL let go", "RIGHT_SHIFT let go", "moved without Ctrl", "the next one")
+    assert {seen[name] for name in free} == {f"{size}{lower}"}
+    # Eight turns of the wheel, 0.25 mm each, of the one stroke.
+    assert seen["deeper"].startswith(f"{size}Lower, depth 6 mm   Forming: Lower")
+    assert seen["while Raise forms"].startswith(f"{size}{lower}   Forming: Raise")
+
+
+def test_the_text_at_the_cursor_stays_beside_the_sidebar_and_above_the_edge(seen: Seen) -> None:
+    left, bottom, right, top = seen["room"]
+    width = seen["text"]["middle"][2] - seen["text"]["middle"][0]
+    assert width > 150  # of all its letters
+    for x, y, to_x, to_y in seen["text"].values():
+        assert left <= x < to_x < right
+        assert bottom <= y < to_y < top
+        assert to_x - x == pytest.approx(width, abs=3)  # smooth edges
+
+
 def test_clicks_pick_the_pins_under_the_mouse_and_forces_are_written_once_they_are_shown(seen: Seen) -> None:
     # Column 12 of row 12 is the middle; 3 mm a pin.
     assert seen["picked"]["picked"] == [3 * 25 + 8, 3 * 25 + 12, 3 * 25 + 16]

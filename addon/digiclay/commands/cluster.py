@@ -210,7 +210,8 @@ class Cluster(Executor):
         except Exception as error:
             scheduler = error
         versions_of = {f"The scheduler {self._address}": scheduler}
-        workers = self._client.run(pickle.loads, call, on_error="return")
+        answers = self._client.run(pickle.loads, call, on_error="return")
+        workers = {name: answer for name, answer in answers.items() if not _is_lost(answer)}
         versions_of |= {f"Worker {name}": versions for name, versions in workers.items()}
         _refuse_others(versions_of, self._versions)
 
@@ -219,6 +220,11 @@ class Cluster(Executor):
         with suppress(Exception):  # the scheduler may be gone
             if self._client.status == "running" and self._remote:
                 self._client.cancel(list(self._remote), force=True)
+
+
+def _is_lost(answer: Any) -> bool:
+    """Return whether a worker died instead of an answer; one that comes back is asked by its tasks."""
+    return isinstance(answer, ConnectionError) or (isinstance(answer, OSError) and answer.errno is None)
 
 
 def _refuse_others(versions_of: Mapping[str, Any], here: Versions) -> None:

@@ -5,11 +5,12 @@ from typing import Any
 
 from ..compat import bpy
 from ..press import aim, brush, tool
+from ..press.pointer import HELD
 from ..sessions import running
 from ..sessions.sculpting import change_stroke, queue_stroke
 from ..strokes.stroke import SHALLOWEST, Brush
 from ..ui_text import localize
-from .action import Drawing, action, show_status
+from .action import Drawing, Polled, action, show_status
 from .poll_messages import no_finger, no_tool_in_view
 from .press_stroke import find_pressed, open_session
 
@@ -66,6 +67,21 @@ class PlaceCenter(Drawing, bpy.types.Operator):
         bed, settings = brush.bed_in_use(context), brush.tool_settings(context)
         if bed is not None and settings is not None and context.area == area:
             tool.draw_on_bed(context, bed, tool.find_axes(*aim.read_surface(bed), settings), "", (0.0, 0.0))
+
+
+class NoteKeys(Polled, bpy.types.Operator):
+    """Note whether Ctrl and Shift are held, for the text at the cursor"""
+
+    bl_idname = "digiclay.press_keys"
+    bl_label = "Note Keys"
+    bl_options = {"INTERNAL"}
+    in_any_mode = True
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        if (HELD.ctrl, HELD.shift) != (event.ctrl, event.shift):
+            HELD.ctrl, HELD.shift = event.ctrl, event.shift
+            context.area.tag_redraw()
+        return {"PASS_THROUGH"}
 
 
 def _tell_all(operator: Any, context: Any, kind: Brush) -> set[str] | None:

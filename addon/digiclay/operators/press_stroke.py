@@ -178,7 +178,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         if event.type in MOVES:
             self._move(context, bed, event)
         elif event.type in WHEELS and event.ctrl and self.kind.has_amount:
-            self._deepen(context, WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
+            self._deepen(WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
             self._change(lambda stroke: replace(stroke, held=False))
@@ -207,11 +207,10 @@ class Press(PressSettings, Modal, bpy.types.Operator):
             depth, share = self._amount()
             self._change(partial(draw, x=x, y=y, depth=depth, share=share, lean=self.lean))
 
-    def _deepen(self, context: Any, by: float) -> None:
-        """Change depth or height, m, from here on; the tool shows it beside the cursor and in the header."""
+    def _deepen(self, by: float) -> None:
+        """Change depth or height of this stroke, m, from here on; the setting of the tool stays."""
         self.full = min(max(self.full + by, 0.0), DEEPEST)
         self._change(partial(deepen, by=by * self.strength * self.pressure))
-        self._keep_amount(context)
 
     def _amount(self) -> tuple[float, float]:
         """Return depth or height, m, and share of a sample drawn now."""
@@ -237,11 +236,6 @@ class Press(PressSettings, Modal, bpy.types.Operator):
             return False
         self.button = read_event(self.button, event.type, (event.type_prev, event.value_prev))
         return self.button.up
-
-    def _keep_amount(self, context: Any) -> None:
-        """Let the next stroke of this brush have the depth or height of this one."""
-        for owner in filter(None, (self, brush.tool_settings(context))):
-            setattr(owner, brush.amount_name(self.kind), 1e3 * self.full)
 
     def _show(self, context: Any) -> None:
         """Show brush, depth or height, and keys in the status bar."""

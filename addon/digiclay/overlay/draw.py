@@ -81,10 +81,16 @@ def _fill(points: Floats, triangles: list[tuple[int, int, int]], color: Color, a
     batch.draw(shader)
 
 
+def measure(text: str, size: float) -> float:
+    """Return the width of a text of a size, pixels."""
+    blf.size(FONT, size)
+    return float(blf.dimensions(FONT, text)[0])
+
+
 def _write(words: Words) -> None:
     """Write a line of text."""
     blf.size(FONT, words.size)
     blf.color(FONT, *words.color, 1.0)
-    x = words.x - blf.dimensions(FONT, words.text)[0] if words.to_the_right_end else words.x
+    x = words.x - measure(words.text, words.size) if words.to_the_right_end else words.x
     blf.position(FONT, round(x), round(words.y), 0.0)
     blf.draw(FONT, words.text)

@@ -17,6 +17,8 @@ from .picture import LINES, Box, Color, Dot, Line, Look, Picture, Words, make_le
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
+#: Mean width of a letter of Blender's font, of its size, in the widest texts.
+LETTER = 0.57
 #: Space below a section.
 GAP = 6.0
 #: Width of the number and force of a fingertip, and of the numbers of an axis.
@@ -85,6 +87,7 @@ class Pen:
     def row(self, top: float, left: str, right: str = "", small: bool = False) -> float:
         """Write a row of two texts, left and right; return the top of the next one, pixels."""
         size = (SMALL if small else LETTERS) * self.scale
+        size *= min(1.0, self.width / (LETTER * size * max(1, len(left) + len(right) + 1)))
         color = self.look.faint if small else self.look.ink
         y = top - 0.75 * ROW * self.scale
         for x, text, at_right in ((self.x, left, False), (self.x + self.width, right, True)):
@@ -301,6 +304,7 @@ SHARE = 0.75
 
 #: Left, bottom, right and top of a part of the view, pixels.
 Room = tuple[float, float, float, float]
+Place = tuple[float, float]
 
 
 def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
@@ -324,6 +328,20 @@ def find_covered(room: Room, scale: float, corner: str, box: Box | None = None, 
     x, y = (left, left + wide) if at_left else (right - wide, right), (top - tall, top)
     y = y if at_top else (bottom, bottom + tall)
     return x[0], y[0], x[1], y[1]
+
+
+#: Distance of a label from its place: beside and below it, at a UI scale of 1, pixels.
+BESIDE, BELOW = 22.0, 26.0
+
+
+def place_label(xy: Place, size: Place, room: Room, scale: float) -> Place:
+    """Return the left end and base line of a label of a size beside a place, inside a room, pixels."""
+    left, bottom, right, top = room
+    x = xy[0] + BESIDE * scale
+    if x + size[0] > right:  # it stands to the left of its place
+        x = xy[0] - BESIDE * scale - size[0]
+    y = max(xy[1] - BELOW * scale, bottom)
+    return max(min(x, right - size[0]), left), min(y, top - size[1])
 
 
 def lay_out(

@@ -192,12 +192,11 @@ def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
     return f"{localize(LABELS[brush])}, {localize(amount_name(brush))} {1e3 * depth:.3g} mm{share}"
 
 
-def describe_queue(strokes: int, seconds: float | None) -> str:
-    """Return how many strokes are still to be formed, and within about how many seconds; None: not known."""
-    if not strokes:
-        return ""
+def describe_queue(brush: Brush, waiting: int, seconds: float | None) -> str:
+    """Return what is being formed, how many strokes wait, and about how long all take, s; None: not known."""
+    more = f" + {waiting}" if waiting else ""
     left = "" if seconds is None else localize(", {:.0f} s", math.ceil(seconds))
-    return localize("   To form: {}", strokes) + left
+    return localize("   Forming: {}", localize(LABELS[brush])) + more + left
 
 
 #: Folder of the presets below ``presets``, here and in the user's own folder.

@@ -43,6 +43,16 @@ def find_lean(tilt: tuple[float, float], seen: Floats) -> tuple[float, float]:
     return float(x), float(y)
 
 
+@dataclass
+class HeldKeys:
+    """Keys that are down, as the last event over a 3D view had them."""
+
+    ctrl: bool = False
+    shift: bool = False
+
+
+HELD = HeldKeys()
+
 Named = tuple[str, str]
 
 PRESS, RELEASE = ("LEFTMOUSE", "PRESS"), ("LEFTMOUSE", "RELEASE")

@@ -19,6 +19,8 @@ from ..core.model.layout import Grid, Layout
 from ..core.surface.pointing import find_contact_outline
 from ..device.instant import find_ellipsoid
 from ..overlay.picture import Color, Line, Words
+from ..overlay.sections import LETTERS, place_label
+from ..overlay.views import find_free_room
 from ..roles import fingertip_of
 from ..sessions import running
 from ..sessions.sculpting import estimate_time, list_pressing
@@ -35,11 +37,13 @@ from .brush import (
     TOOL,
     amount_name,
     bed_in_use,
+    choose_brush,
     describe_brush,
     describe_queue,
     find_images,
     find_kind,
 )
+from .pointer import HELD
 
 #: A light line on a dark one is seen on everything.
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
@@ -57,11 +61,21 @@ def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> l
     return [Line(points, *look, pairs=True) for look in ((DARK, 4.0 * width), (color, 2.0 * width))]
 
 
-def make_label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
-    """Return text beside a place, pixels, light on a dark edge."""
-    x, y, size = xy[0] + 22.0 * scale, xy[1] - 26.0 * scale, 12.0 * scale
-    edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
-    return [*edge, Words(x, y, size, LIGHT, text)]
+def make_label(
+    context: Any, text: str, xy: tuple[float, float], corner: tuple[float, float] = (0.0, 0.0)
+) -> list[Words]:
+    """Return text beside a place, light on a dark edge, where no panel covers it; see `draw_on_bed`."""
+    from ..overlay.draw import measure
+
+    if not (text and np.isfinite(xy).all()):
+        return []
+    scale = float(context.preferences.system.ui_scale)
+    left, bottom, right, top = np.add(find_free_room(context.area, context.region), 2 * corner).tolist()
+    width, size = measure(text, LETTERS * scale), LETTERS * scale
+    share = min(1.0, (right - left) / width)
+    x, y = place_label(xy, (share * width, size), (left, bottom, right, top), scale)
+    edge = [(x + i, y + j, share * size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
+    return [Words(*each) for each in (*edge, (x, y, share * size, LIGHT, text))]
 
 
 def close(path: Floats) -> Floats:
@@ -85,15 +99,14 @@ def draw_on_bed(
     system = context.preferences.system
     lines = map_paths(lambda places: np.asarray(corner) + bridge.project(context, bed, places), paths)
     shown = [line for line in lines if np.isfinite(line).all()]
-    label = make_label(text, xy, system.ui_scale) if np.isfinite(xy).all() else ()
-    cursor(make_lines(shown, system.pixel_size, color), label)
+    cursor(make_lines(shown, system.pixel_size, color), make_label(context, text, xy, corner))
 
 
 #: Widths from which on a header names popovers in full, and has a button for each brush, in pixels at a
 #: resolution scale of 1.
 WIDE, WIDEST = 1000, 1450
 #: Widths of what it holds, in Blender's units of 20 pixels.
-BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 5.8, 6.6, 6.0
+BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 6.6, 6.6, 5.4
 
 
 def draw_header(context: Any, layout: Any, settings: Any) -> None:
@@ -176,30 +189,31 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     target, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y))
     if hider is not None:
         words = localize("{} hides the bed", hider.name)
-        cursor([], make_label(words, xy, context.preferences.system.ui_scale))
+        cursor([], make_label(context, words, xy, (region.x, region.y)))
         return
     if target is None or fingertip_of(target.bed) is None:
         return
     settings = tool.operator_properties(OPERATOR)
-    depth, kind = 1e-3 * settings.depth, _shown_brush(target.bed, settings)
+    kind, amount, _ = find_shown(target.bed, settings)
+    depth = 1e-3 * settings.depth if kind.rises else amount
     rim = close(touch_outline(target.bed, target.grid.layout, target.point[:2], depth, kind))
     rims = [np.column_stack(image.place(*rim.T)) for image in find_images(settings)]
-    amount = 1e-3 * getattr(settings, amount_name(kind))
-    text = describe_brush(bridge.finger_of(fingertip_of(target.bed)), kind, amount, settings.strength)
-    text += describe_queue(*_measure_queue(target.bed))
-    text = text if preferences.get(context).show_cursor_text else ""
+    text = describe(target.bed, settings) if preferences.get(context).show_cursor_text else ""
     color = SMOOTHING if kind in SWEEPS else LIGHT
     paths = map_paths(partial(drape, target.grid, target.height), [*rims, *_trail(target)])
     paths += find_axes(target.grid, target.height, settings)
     draw_on_bed(context, target.bed, paths, text, xy, color, (region.x, region.y))
 
 
-def _measure_queue(bed: Any) -> tuple[int, float | None]:
-    """Return how many strokes a bed's session has to form, and within about how many seconds, if known."""
+def describe(bed: Any, settings: Any) -> str:
+    """Return what is shown beside the cursor: what the press does, and what the bed's session forms."""
+    words = describe_brush(bridge.finger_of(fingertip_of(bed)), *find_shown(bed, settings))
     session = running.find(bed)
-    if session is None or session.paused or not session.clock.factor:
-        return (len(session.strokes) if session else 0), None
-    return len(session.strokes), estimate_time(session) / session.clock.factor
+    if session is None or not session.strokes:
+        return words
+    known = not session.paused and session.clock.factor
+    left = estimate_time(session) / session.clock.factor if known else None
+    return words + describe_queue(session.strokes[0].brush, len(session.strokes) - 1, left)
 
 
 def find_axes(grid: Grid, height: Floats, settings: Any) -> list[Floats]:
@@ -217,11 +231,15 @@ def find_axes(grid: Grid, height: Floats, settings: Any) -> list[Floats]:
     return [drape(grid, height, line) for line in lines if len(line) > 1]
 
 
-def _shown_brush(bed: Any, settings: Any) -> Brush:
-    """Return the brush of the stroke that is drawn, which Ctrl may have inverted, or the tool's."""
+def find_shown(bed: Any, settings: Any) -> tuple[Brush, float, float]:
+    """Return brush, depth or height, m, and strength of the stroke that is drawn, or of a press now."""
     session = running.find(bed)
     last = session.strokes[-1] if session is not None and session.strokes else None
-    return last.brush if last is not None and last.held else Brush(settings.brush)
+    if last is not None and last.held and last.samples[-1].share:
+        sample = last.samples[-1]
+        return last.brush, sample.depth / sample.share, sample.share
+    kind = choose_brush(settings.brush, HELD)
+    return kind, 1e-3 * getattr(settings, amount_name(kind)), settings.strength
 
 
 def _trail(target: aim.Target) -> list[Floats]:
@@ -268,6 +286,11 @@ class PressTool(bpy.types.WorkSpaceTool):
         ("digiclay.press_shape", {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "shift": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "shift": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
+        # Keys that are pressed or let go while another operator has the events are found by the next move.
+        *(
+            ("digiclay.press_keys", {"type": kind, "value": "ANY", "any": True}, None)
+            for kind in ("LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT", "MOUSEMOVE")
+        ),
         ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
         ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),
         ("digiclay.press_strength", {"type": "F", "value": "PRESS", "ctrl": True}, None),
