@@ -110,6 +110,10 @@ class Flag(IntFlag):
     FORCE_LIMITED = 2
     #: The fingertip is on its way to the pose asked for, at its largest speed.
     POSE_LIMITED = 4
+    #: No pose has come yet, or none for so long that its fingertip lifts.
+    NO_POSE = 8
+    #: Control periods were left out within the last second: the session was late.
+    LEFT_OUT = 16
 
 
 @dataclass(frozen=True)
@@ -122,6 +126,8 @@ class Limits:
     #: Largest speed of a point of the fingertip, m/s: that of a robot's tool with people beside it, by ISO
     #: 10218-1, and about three times that of fingers that explore a surface.
     speed: float = 0.25
+    #: Time without a pose after which the fingertip lifts, s.
+    silence: float = 2.0
 
 
 LIMITS = Limits()

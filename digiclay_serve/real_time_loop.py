@@ -15,8 +15,8 @@ from digiclay.core.session.take import make_take
 from numpy.typing import NDArray
 
 from .doors import Doors
-from .protocol import name_flags, pack_frame
-from .served_session import PartWriter, Session, aim, follow, make_frame, record, reset
+from .protocol import Flag, name_flags, pack_frame
+from .served_session import PartWriter, Session, aim, follow, lacks_pose, make_frame, record, reset
 
 #: Rounding errors of times count as whole periods when they are below this share of one.
 SLACK = 1e-6
@@ -89,6 +89,8 @@ class TimeCounts:
 
 #: Periods are made up for if they are this late at most, s; those before are left out.
 CATCH_UP = 0.05
+#: How long frames tell that periods were left out: a slow reader misses some, s.
+TOLD = 1.0
 #: Width of a bin of the histograms, s.
 BIN = 1e-5
 #: Longest time without a look at whether to stop, s.
@@ -124,6 +126,7 @@ def run_session(
     elapsed, spent, lateness = (TimeCounts(BIN) for _ in range(3))
     schedule = Schedule(time.perf_counter(), period, max(1, round(CATCH_UP / period)))
     resets, flagged, taken = 0, Counter[str](), doors.read_order()
+    heard, omitted = schedule.start, -math.inf
     while not stopped():
         order, began = doors.read_order(), time.perf_counter()
         # What is new is not left to wait: its period begins early, by one at most.
@@ -131,18 +134,23 @@ def run_session(
         if wait > 0.0:
             doors.wait(min(wait, LOOK))
             continue
-        taken, before = order, time.thread_time()
+        if order is not taken:
+            taken, heard = order, began
+        before = time.thread_time()
         count, begins = schedule.take_due(max(began, schedule.begins))
         begins = np.minimum(begins, began)
         if order.resets != resets:
             resets = order.resets
             session = _restart(session, writer, room)
         diverged = session.diverged
-        session, targets, clear = aim(session, order, count)
+        session, targets, clear = aim(session, order, count, began - heard)
+        omitted = began if count < len(begins) else omitted
+        flags = Flag.LEFT_OUT * (began - omitted < TOLD)
+        flags |= Flag.NO_POSE * lacks_pose(session, order, began - heard)
         session = follow(session, targets, order.number, count, clear)
         if session.diverged != diverged:
             tell(f"The session diverged, and went back to {session.kept.period * period:.3f} s.")
-        frame = make_frame(session)
+        frame = make_frame(session, flags)
         doors.show(pack_frame(frame))
         ended = time.perf_counter()
         flagged.update(name_flags(frame.flags))

@@ -53,6 +53,10 @@ def add(commands: Any) -> None:
             _within(1.0, 1e4, "mm/s"),
             f"largest speed of the fingertip, mm/s; default: {most_speed:g}", most_speed,
         ),
+        "--silence S": (
+            _within(0.01, 1e6, "s"),
+            f"lift the fingertip after this time without a pose; default: {LIMITS.silence:g}", LIMITS.silence,
+        ),
         "--fingers N": (whole_number(1, MOST_FINGERS), "number of fingertips, all as the scene's first"),
         "--lift MS": (_within(1.0, 1e4, "ms"), "lift fingers not named for this time; default: 100", 100.0),
         "--clutch MM": (_within(0.0, 1e3, "mm"), "height over the pins where fingers begin, and slip", 0.0),
@@ -88,7 +92,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     scene, _ = scene_of(arguments)
     if arguments.fingers is not None:
         scene = replace(scene, fingers=scene.fingers[:1] * arguments.fingers)
-    limits = Limits(arguments.most_force, 1e-3 * arguments.most_speed)
+    limits = Limits(arguments.most_force, 1e-3 * arguments.most_speed, arguments.silence)
     by_hand = (1e-3 * arguments.lift, 1e-3 * arguments.clutch, arguments.filter, 1e3 * arguments.coupling)
     session = begin_session(scene, limits, Tracking(*by_hand))
     bed, host = describe_bed(scene, session.system, session.limits), arguments.host

@@ -96,10 +96,17 @@ def _begin_at_rest(scene: Scene, system: System, limits: Limits, tracking: Track
     )  # fmt: skip
 
 
-def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, float]:
+def lacks_pose(session: Session, order: Order, silence: float) -> bool:
+    """Return whether no pose has come, or none for a time, s, after which its fingertips lift."""
+    most = session.tracking.lift if order.named else session.limits.silence
+    return silence > most or not (order.named or order.pose)
+
+
+def aim(session: Session, order: Order, count: int, silence: float = 0.0) -> tuple[Session, Floats, float]:
     """Return the session, and where its fingertips (f, 7) are to be after control periods by an order.
 
-    And the height, m, over which they go there at once. An identity that is not named lifts.
+    And the height, m, over which they go there at once. An identity that is not named lifts, and so does the
+    fingertip of a pose that came long ago. `silence`: time since the order, s.
     """
     targets, clear = session.poses.copy(), math.inf
     if order.named:
@@ -114,6 +121,8 @@ def aim(session: Session, order: Order, count: int) -> tuple[Session, Floats, fl
         clear = felt.peak + CLEAR
     if order.pose is not None:
         targets[0] = order.pose
+        if lacks_pose(session, order, silence):
+            targets[0, 2] = max(order.pose[2], float(session.state.row(0).max()) + CLEAR)
     return session, targets, clear
 
 
@@ -216,13 +225,14 @@ def record(session: Session, room: int) -> Session:
     return replace(live_session.start_recording(session, now.snapshot, room=room), kept=now)
 
 
-def make_frame(session: Session) -> Frame:
-    """Return the state for other programs: no more force than the limit, and flags."""
+def make_frame(session: Session, flags: int = 0) -> Frame:
+    """Return the state for other programs: no more force than the limit, and more flags."""
     state, system, most = session.state, session.system, session.limits.force
     forces = state.row(system.rows.force)
     total = float(forces.sum())
     each = state.finger_forces() if system.fingers > 1 else np.array([total])
-    flags = Flag.POSE_LIMITED if session.behind else Flag(0)
+    if session.behind:
+        flags |= Flag.POSE_LIMITED
     if exceeds_law(system, state, session.pose):
         flags |= Flag.BEYOND_A_FINGER
     if (largest := float(each.max())) > most:

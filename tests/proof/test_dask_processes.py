@@ -136,6 +136,23 @@ def test_a_piece_that_no_worker_survives_fails_alone(here: Path, start: Start) -
     assert done[pieces[1]].startswith("2 workers died of this, the last one tcp://127.0.0.1:")
 
 
+def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(
+    here: Path, start: Start
+) -> None:
+    other = copy_package(here / "other") / "addon"
+    (other / "digiclay/__init__.py").write_text("import os\nos._exit(1)\n", encoding="utf-8")
+    _, address = start_scheduler(start, here)
+    workers = [start_worker(start, address, "--no-nanny", addon=addon) for addon in (other, ADDON)]
+    with Client(address, set_as_default=False) as client:
+        wait_until(lambda: len(client.scheduler_info()["workers"]) == 2)
+    short = ["sweep", "my.toml", "--vary", "control.force_gain=1,2", "--quiet"]
+    sweep = start("digiclay", *short, "--scheduler", address, "--out", "far")
+    _, said = sweep.communicate(timeout=TIMEOUT)
+    assert (sweep.returncode, said) == (0, "")
+    assert [worker.poll() for worker in workers] == [1, None]
+    assert len(points(here / "far")) == 2
+
+
 def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Path, start: Start) -> None:
     other = copy_package(here / "other") / "addon"
     front = other / "digiclay" / "__init__.py"

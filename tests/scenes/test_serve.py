@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -190,6 +191,29 @@ def test_the_fingertip_has_one_client_at_a_time(server: Server) -> None:
         second.send(pack_pose(Pose(PRESS, 17)))
         assert "Another client moves the fingertip" in json.loads(second.recv(TIMEOUT))["message"]
     is_well(server, 18)  # it has gone, so that the fingertip is free
+
+
+def test_the_force_of_a_client_that_has_gone_ends_and_frames_say_so(server: Server) -> None:
+    with server.connect("?format=binary&rate=200") as watching:
+        with server.connect("?format=binary&rate=200") as pressing:
+            pressing.send(pack_pose(Pose(PRESS, 19)))
+            assert not frame_after(pressing, 19).flags & Flag.NO_POSE
+        own = (frame for frame in frames(watching) if frame.number == 19)
+        pressed = list(takewhile(lambda frame: not frame.flags & Flag.NO_POSE, own))
+        assert max(frame.total_force for frame in pressed) > 0.0
+        lifted = next(frame for frame in own if frame.pose[2] > frame.heights.max())
+        assert (lifted.total_force, bool(lifted.flags & Flag.NO_POSE)) == (0.0, True)
+    is_well(server, 20)  # the next pose brings it down
+
+
+def test_a_frame_after_periods_that_were_left_out_says_so(server: Server) -> None:
+    with server.connect("?format=binary&rate=200") as client:
+        server.process.send_signal(signal.SIGSTOP)
+        time.sleep(0.2)  # four times what is made up for
+        server.process.send_signal(signal.SIGCONT)
+        assert any(frame.flags & Flag.LEFT_OUT for frame in islice(frames(client), 200))
+        # It ends, on a machine that keeps up for a second.
+        assert any(not frame.flags & Flag.LEFT_OUT for frame in frames(client))
 
 
 def test_a_thousand_silent_connections_shut_out_nobody_with_the_token(server: Server) -> None:
@@ -371,7 +395,8 @@ def test_the_examples_of_the_page_run(server, door, monkeypatch, capsys):
         exec(example, {})
     said = capsys.readouterr().out
     assert said.startswith("9 x 9 pins\ntotal force: ")
-    assert float(said.split()[-2]) > 0.0
+    assert float(said.split()[6]) > 0.0
+    assert said.endswith(" N; ceiling of each finger: 2.0 N\n")
     subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
     wait_until(lambda: received(door, "/digiclay/state", subscribe)[4:7] == pytest.approx(PLACE, abs=1e-8))
 

@@ -21,9 +21,11 @@ from digiclay_serve.real_time_loop import Schedule, TimeCounts, run_session
 from digiclay_serve.served_session import (
     PartWriter,
     Session,
+    aim,
     begin_session,
     follow,
     join_parts,
+    lacks_pose,
     make_frame,
     record,
     reset,
@@ -139,6 +141,21 @@ def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, fl
         assert (frame.total_force >= most) == bool(frame.flags & Flag.FORCE_LIMITED)
         assert frame.total_force <= most
     assert (seen, frame.pose[2]) == (flags, height)
+
+
+#: Time since a pose, s, and whether its fingertip lifts.
+@pytest.mark.parametrize(("silence", "lifts"), [(0.0, False), (0.29, False), (0.31, True), (1e6, True)])
+def test_the_fingertip_of_a_client_that_is_silent_lifts(silence: float, lifts: bool) -> None:
+    session, order = begin_session(STILL, replace(LIMITS, silence=0.3)), Order(pose=tuple(DOWN[0]))
+    assert lacks_pose(session, Order(), 0.0)  # none has come
+    assert lacks_pose(session, order, silence) == lifts
+    for _ in range(40):  # down at 0.25 m/s
+        session = follow(session, aim(session, order, 1)[1], 3, 1)
+    assert session.state.finger_forces().sum() > 0.1
+    for _ in range(40):
+        session = follow(session, aim(session, order, 1, silence)[1], 3, 1)
+    assert (session.poses[0, 2] > session.state.row(0).max()) == lifts
+    assert (session.state.finger_forces().sum() == 0.0) == lifts
 
 
 def test_the_ceiling_is_each_fingers() -> None:
