@@ -11,7 +11,7 @@ from ..sessions.sculpting import change_stroke, queue_stroke
 from ..strokes.stroke import SHALLOWEST, Brush
 from ..ui_text import localize
 from .action import Drawing, Polled, action, show_status
-from .poll_messages import no_finger, no_tool_in_view
+from .poll_messages import no_finger, no_tool, no_tool_in_view
 from .press_stroke import find_pressed, open_session
 
 KEYS = "Press where the center is to be, and drag along the axis  |  Esc or right click: cancel"
@@ -75,7 +75,7 @@ class NoteKeys(Polled, bpy.types.Operator):
     bl_idname = "digiclay.press_keys"
     bl_label = "Note Keys"
     bl_options = {"INTERNAL"}
-    in_any_mode = True
+    needs = (no_tool,)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         if (HELD.ctrl, HELD.shift) != (event.ctrl, event.shift):
