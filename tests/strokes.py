@@ -14,6 +14,9 @@ from tests import hand
 from tests.hand import heights, let_go
 
 Places = list[tuple[float, float]]
+#: Control periods that are simulated at a time: a stroke leaves the same bits in any number of them, and each
+#: time its state is packed.
+CHUNK = 64
 
 
 def begin_bed(name: str, rows: int, columns: int) -> Running:
@@ -39,7 +42,9 @@ def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, sha
 
 def finish(session: Running, most: float = 60.0) -> Running:
     """Let the session go on until its strokes are finished and the pins at rest, at most so long, s."""
-    session = hand.finish(session, round(most / hand.TICK))
+    last = session.state.period + round(most / hand.PERIOD)
+    while session.strokes and session.state.period < last:
+        session = sculpting.follow_finger(session, session.pose, CHUNK)
     assert not session.strokes
     return hand.go_on(session, 15)
 
