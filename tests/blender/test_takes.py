@@ -340,6 +340,13 @@ def test_a_range_of_frames_that_cannot_be_is_refused(bed, first, last):
         next(bake.sample_path(bpy.context.scene, bed, first, last, 5e-3))
 
 
+def test_a_scene_whose_time_is_stretched_is_not_baked(bed, monkeypatch):
+    render = bpy.context.scene.render
+    monkeypatch.setattr(render, "frame_map_new", 200)
+    with pytest.raises(DigiclayError, match=r"must have two equal numbers \(got 100 to 200\)"):
+        next(bake.sample_path(bpy.context.scene, bed, 1, 10, 5e-3))
+
+
 def test_each_frame_shows_the_nearest_period():
     take, _ = taken()
     assert bake.frame_periods(take, 24.0).tolist() == [0, 8, 17, 25, 33, 42, 50, 58, 67, 75, 83, 92, 100]

@@ -196,7 +196,7 @@ def find_moment(context: Any) -> float | None:
     scene, screen = context.scene, context.screen
     if screen is None or not screen.is_animation_playing:
         return None
-    return float(scene.frame_current_final * scene.render.fps_base / scene.render.fps)
+    return float((scene.frame_current + scene.frame_subframe) * scene.render.fps_base / scene.render.fps)
 
 
 def _visible_rows(session: Running) -> Floats:

@@ -351,7 +351,7 @@ class Bake(TimedAction, bpy.types.Operator):
             system = assemble(made)
             # How the path ends is unknown before its simulation, and nothing asks for it.
             take = Take(made, snapshot.dump(system, begin(system)), poses, b"")
-        rate = scene.render.fps / scene.render.fps_base
+        rate = bake.read_rate(scene)
         for part in bake.simulate_frames(take, rate):
             if isinstance(part, float):
                 yield 0.3 + 0.7 * part

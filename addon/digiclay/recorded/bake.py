@@ -158,12 +158,21 @@ def free(bed: Any) -> bool:
     return True
 
 
+def read_rate(scene: Any) -> float:
+    """Return the frames of a scene per second; DigiclayError where its time, and so keyframes, are stretched."""
+    render = scene.render
+    if render.frame_map_old != render.frame_map_new:
+        got = f"{render.frame_map_old} to {render.frame_map_new}"
+        raise DigiclayError(f"The scene's Time Stretching must have two equal numbers (got {got}).")
+    return float(render.fps / render.fps_base)
+
+
 def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
     """Read the paths of the fingertips as animated; yield the share done, at last the poses (t + 1, f, 7)."""
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
-    rate = scene.render.fps / scene.render.fps_base
+    rate = read_rate(scene)
     count = int(np.floor((last - first) / rate / period + 1e-6))
     kept = scene.frame_current, scene.frame_subframe
     tips = len(fingertips_of(bed))
