@@ -159,7 +159,7 @@ def free(bed: Any) -> bool:
 
 
 def read_rate(scene: Any) -> float:
-    """Return the frames of a scene per second; DigiclayError where its time, and so keyframes, are stretched."""
+    """Return the frames of a scene per second; DigiclayError where its time is stretched."""
     render = scene.render
     if render.frame_map_old != render.frame_map_new:
         got = f"{render.frame_map_old} to {render.frame_map_new}"
