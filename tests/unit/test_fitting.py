@@ -275,6 +275,15 @@ def test_every_kind_of_picture_is_read_in_all_its_bits_and_what_is_clear_is_blac
     assert pictures.measure_error(name, read_pixels(pictures.FOLDER / name)) <= step
 
 
+@pytest.mark.parametrize("mode", ["P", "L", "RGB", "1"])
+def test_a_color_that_is_clear_by_itself_is_black_and_nothing_is_warned_of(tmp_path, mode, recwarn):
+    levels = Image.fromarray(np.array([[255, 0], [0, 255]], np.uint8))
+    clear = {"P": bytes([255] * 255 + [0]), "L": 255, "RGB": (255, 255, 255), "1": 1}[mode]
+    levels.convert(mode).save(tmp_path / "a.png", transparency=clear)
+    assert np.ptp(read_pixels(tmp_path / "a.png")) == 0.0
+    assert not recwarn.list
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
