@@ -1,6 +1,6 @@
 """Beds put together part by part for tests: every part at its default unless a test names another."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -71,10 +71,12 @@ def make_system(
     dead_time: float = 1e-3,
     control: VirtualMaster | Callable[[float], Any] | None = None,
     blister: Blister | None = None,
+    others: Sequence[Mapping[str, Any]] = (),
     **parts: Any,
 ) -> System:
     """Return a bed; parts that are None are left out, and without `control` every valve stays shut.
 
+    `others`: what further fingers have unlike the first.
     `control` is the parameters of Method I, or a function that makes a controller for a control period.
     """
     master = control if isinstance(control, VirtualMaster) else None
@@ -91,7 +93,9 @@ def make_system(
         blister=(blister or fitting(bed)) if master else None, simulation=Simulation(period, step, stepper),
         recorder=None, fingers=fingers,
     )  # fmt: skip
-    system = assemble(scene.with_sections(**parts))
+    scene = scene.with_sections(**parts)
+    more = (replace(scene.fingers[0], **own) for own in others)
+    system = assemble(replace(scene, fingers=(*scene.fingers, *more)))
     return replace(system, controller=control(period)) if callable(control) else system
 
 
@@ -143,11 +147,17 @@ def whole(state: State) -> Floats:
     return np.array([state.row(index) for index in range(len(state.rows))])
 
 
-def record(system: System, trajectory: Trajectory | Motion, count: int, state: State | None = None) -> Record:
-    """Simulate `count` control periods and keep every row; row 0 is the state handed in."""
+def record(
+    system: System,
+    trajectory: Trajectory | Motion | Sequence[Trajectory | Motion],
+    count: int,
+    state: State | None = None,
+) -> Record:
+    """Simulate `count` control periods, of a finger or several; row 0 is the state handed in."""
+    fingers = trajectory if isinstance(trajectory, Sequence) else [trajectory]
     state = state.copy() if state else begin(system)
     rows, modes, memory = [whole(state)], [], []
-    for state in periods(system, [trajectory], state, count):  # noqa: B020
+    for state in periods(system, fingers, state, count):  # noqa: B020
         rows.append(whole(state))
         modes.append(state.mode())
         memory.append(state.memory)

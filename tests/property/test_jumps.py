@@ -76,9 +76,10 @@ def half_shut(t: float, x: Floats, y: Floats) -> Floats:
     return np.where(x < 0.0, 0.0, np.sin(300.0 * t + 1e3 * y))
 
 
-def jumped(system: System, finger: Trajectory) -> Record:
+def jumped(system: System, *fingers: Trajectory) -> Record:
+    lasting = max(finger.times[-1] for finger in fingers)
     with strict():
-        return record(system, finger, min(150, round(finger.times[-1] / system.period) + 2))
+        return record(system, fingers, min(150, round(lasting / system.period) + 2))
 
 
 def stacked(scenes: Sequence[Scene], row: str) -> list[Floats]:
@@ -87,13 +88,15 @@ def stacked(scenes: Sequence[Scene], row: str) -> list[Floats]:
     return [found[number] for number in range(len(scenes))]
 
 
-def assert_within_reach(system: System, finger: Trajectory, height: Floats) -> None:
+def assert_within_reach(system: System, height: Floats, *fingers: Trajectory) -> None:
     """Check heights, (t, n), a control period apart: within the stroke, and within `Speeds.reach`."""
+    touches = getattr(system.cell.touch, "each", (system.cell.touch,))
     assert height.min() >= 0.0
     assert height.max() <= system.cell.actuator.stroke
     for period, (before, after) in enumerate(pairwise(height)):
-        poses = finger.poses(period * system.period + system.instants)
-        unders = under(system.cell.touch.fingertip.outline(poses), system.grid.x, system.grid.y)
+        poses = [finger.poses(period * system.period + system.instants) for finger in fingers]
+        outlines = [touch.fingertip.outline(each) for touch, each in zip(touches, poses, strict=True)]
+        unders = np.min([under(outline, system.grid.x, system.grid.y) for outline in outlines], axis=0)
         lowest, highest = find_speeds(system.cell).reach(before, unders, system.period)
         # Rounding: the undersides are taken over another sum here.
         assert (after >= lowest - 1e-12).all()
@@ -101,16 +104,18 @@ def assert_within_reach(system: System, finger: Trajectory, height: Floats) -> N
 
 
 def assert_withstands(
-    bed: Layout, spots: list[Spot], turn: tuple[float, ...], period: float, stepper: str, **changes: object
-) -> None:
+    bed: Layout, hand: list[list[Spot]], turn: tuple[float, ...], period: float, stepper: str,
+    **changes: object,
+) -> None:  # fmt: skip
     system = make_system(
         bed, stepper=stepper, period=period, step=period, control=scripted(half_shut), **changes
     )
-    run = jumped(system, way(spots, turn))
+    fingers = [way(spots, turn) for spots in hand]
+    run = jumped(system, *fingers)
     assert np.all(run.height[:, system.grid.x < 0.0] == 40e-3)
     assert np.isfinite(run.rows).all()
     assert run.force.min() >= 0.0
-    assert_within_reach(system, way(spots, turn), run.height)
+    assert_within_reach(system, run.height, *fingers)
 
 
 @settings(max_examples=25)
@@ -122,13 +127,36 @@ def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
     spots: list[Spot], turn: tuple[float, ...], bed: Layout, changes: dict[str, object], period: float,
     stepper: str,
 ) -> None:  # fmt: skip
-    assert_withstands(bed, spots, turn, period, stepper, **changes)
+    assert_withstands(bed, [spots], turn, period, stepper, **changes)
+
+
+#: Of fingers: all alike, or one with a law of its own.
+contacts = st.sampled_from([{}, {"contact": Contact(exponent=2e4)}, {"contact": Contact(1e3, 700.0)}])
+PRESSED = [(5, 1.0, 0.0, 1.0), (50, 1.0, 0.0, -3.0), (50, 1.0, 0.0, -2.0), (50, 1.0, 0.0, -2.0)]
+#: Millimeters of the place, and milliseconds: 47 mm sideways in 2 ms of a step, to pins that another presses.
+BESIDE = [(1, -46.0, 1.0, -3.5), (75, -46.0, 1.0, -3.5), (2, 1.0, 1.0, -3.5), (50, 1.0, 1.0, -3.5)]
+
+
+@settings(max_examples=15)
+@given(
+    st.lists(jumps, min_size=2, max_size=3), turns, beds, parts, contacts, st.sampled_from(PERIODS), STEPPERS
+)
+@example([PRESSED, BESIDE], LEVEL, Layout(5, 5), {}, {}, 5e-3, "bernoulli")
+@example(
+    [PRESSED, BESIDE, DOWN], LEVEL, Layout(5, 5), {}, {"contact": Contact(exponent=2e4)}, 5e-3, "bernoulli"
+)
+def test_no_jump_of_several_fingers_takes_a_pin_where_none_can_be(
+    hand: list[list[Spot]], turn: tuple[float, ...], bed: Layout, changes: dict[str, object],
+    own: dict[str, object], period: float, stepper: str,
+) -> None:  # fmt: skip
+    others = [own, {}][: len(hand) - 1]
+    assert_withstands(bed, hand, turn, period, stepper, others=others, **changes)
 
 
 @settings(max_examples=2)
 @given(jumps, turns, st.sampled_from(PERIODS))
 def test_the_adaptive_stepper_withstands_jumps(spots, turn, period):
-    assert_withstands(Layout(3, 3), spots, turn, period, "adaptive")
+    assert_withstands(Layout(3, 3), [spots], turn, period, "adaptive")
 
 
 @settings(max_examples=5)
@@ -142,7 +170,7 @@ def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> No
     scenes = [taken(one, waypoints(spots)) for one, spots in zip(stiff, several, strict=False)]
     shut = [replace(one, control=None, blister=None) for one in scenes]
     for scene, height, still in zip(scenes, stacked(scenes, "height"), stacked(shut, "height"), strict=True):
-        assert_within_reach(assemble(scene), scene.section("trajectory").trajectory(), height)
+        assert_within_reach(assemble(scene), height, scene.section("trajectory").trajectory())
         assert np.all(still == 40e-3)
 
 

@@ -12,6 +12,7 @@ from digiclay.core.model.actuator import Actuator, Supply
 from digiclay.core.model.contact import LARGEST_EXPONENT, Contact
 from digiclay.core.model.delay import Delay, split_delay
 from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.lag import ValveLag
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.relaxation import Relaxation
@@ -313,3 +314,14 @@ def test_a_tap_loses_81_percent_of_its_work(duration):
         forces.append(max(last - float(Relaxation().relaxed(own)), 0.0))
     work = 0.5 * (np.array(forces[1:]) + forces[:-1]) * np.diff(depth)
     assert work.sum() / work[work > 0.0].sum() == pytest.approx(0.81, abs=0.03)
+
+
+def test_a_valve_that_closes_is_open_until_a_billionth() -> None:
+    closing = scripted(lambda t, x, y: 1.0 if t < 0.05 else 0.0)
+    system = make_system(Layout(1, 2), dead_time=0.0, valve_lag=ValveLag(50e-3), control=closing)
+    run = record(system, AWAY, 230)
+    opening = run.rows[1:, system.cell.lag_rows.start]
+    exact = -np.expm1(-1.0) * np.exp(-(run.time[11:] - 50e-3) / 50e-3)
+    # Of the sets that are made anew every 0.16 s; 7e-6 if a valve is shut at 1e-4.
+    np.testing.assert_allclose(opening[10:], exact[:, None].repeat(2, 1), rtol=1e-9, atol=1e-9)
+    assert opening[9].min() > 0.6

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from decimal import MAX_EMAX, MIN_EMIN, Decimal, localcontext
 
 import numpy as np
 import pytest
@@ -83,6 +84,22 @@ def test_no_size_overflows_and_no_load_pulls(exponent: float, slip: float, decay
         assert push[0] <= 1e-9
     elif loaded == (slip < 0.0):  # it leaves, or it meets the finger
         assert met[0] <= 1e-9
+
+
+@pytest.mark.parametrize("exponent", [-5.0, 5.0, 250.0])
+@pytest.mark.parametrize(("slip", "decay"), [(-8e3, 1.0), (-100.0, 1e9), (310.0, 1e6), (8e3, 1e9)])
+@pytest.mark.parametrize("pulp", [1.0, 50.0])
+def test_a_vast_growth_keeps_its_digits(exponent: float, slip: float, decay: float, pulp: float) -> None:
+    e, way, rate, unit = map(Decimal, (exponent, slip, decay, pulp))
+    with localcontext() as digits:
+        digits.prec, digits.Emax, digits.Emin = 60, MAX_EMAX, MIN_EMIN
+        growth = way + rate * unit
+        relief = (1 + rate * e.exp() * (growth.exp() - 1) / growth).ln()
+    numbers = [np.array([value]) for value in (exponent, float(growth), slip, decay, pulp)]
+    push, mean = closed_form.solve_carefully(*numbers)
+    # Rounding of slip and exponent; 3e-7 of the mean where relief and growth are subtracted.
+    np.testing.assert_allclose(push, float(rate * unit - relief), rtol=1e-12, atol=1e-12 * abs(slip))
+    np.testing.assert_allclose(mean, float(relief / rate), rtol=1e-12)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,11 @@ taken as one with that of the strongest, of equal force and stiffness where a pa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +20,8 @@ from ..model.contact import LARGEST_EXPONENT, ExponentialLaw
 from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
-from .bernoulli import BernoulliExponential, BernoulliPlan
-from .closed_form import TINY, StepStart, find_loaded_path
+from .bernoulli import LARGEST_DEVIATION, BernoulliExponential, BernoulliPlan
+from .closed_form import LARGE, TINY, StepStart, find_loaded_path
 
 #: Parts of a physics step: which fingertips press changes within it.
 PARTS = 2
@@ -37,16 +39,20 @@ class TogetherPlan:
     """Of each finger, in parts of the physics steps."""
     between: Floats
     """(i, p): From undersides at the period's instants to those at the parts' instants."""
+    beside: Cells
+    """(2, i): The period's instants before and after each of those."""
 
     @cached_property
     def _numbers(self) -> Floats:
-        """Of each finger (4, f): m, 1/m; m x0; force of a unit of tension, N; pressure of it, Pa."""
+        """Of each finger (5, f): m, 1/m; m x0; force of a unit of tension, N; pressure of it, Pa; exponent
+        from which on a flow may be turbulent."""
         laws: list[ExponentialLaw] = [plan.cell.touch.contact for plan in self.plans if plan.cell.touch]
         rows = [
             (law.exponent, law.exponent * law.offset, law.share * law.stiffness / law.exponent)
             for law in laws
         ]
-        return np.array([(*row, plan.to_load) for row, plan in zip(rows, self.plans, strict=True)]).T
+        more = [(plan.to_load, plan.limits[0]) for plan in self.plans]
+        return np.array([(*row, *last) for row, last in zip(rows, more, strict=True)]).T
 
     @cached_property
     def _maps(self) -> list[tuple[Floats, Floats, Floats]]:
@@ -75,27 +81,30 @@ class TogetherPlan:
         openings = plan.response[: len(plan.weights)].dot(valves)
         pressure = cell.supply.pressure(openings)
         size = cell.flow.conductance(openings, pressure)
-        free = plan.moves[2 * count : 3 * count].dot(np.concatenate([size, np.copysign(size, openings)]))
-        below = np.einsum("ip,pcg->icg", self.between, under)
-        exponent, shift, unit, load = numbers
+        free = plan.moves[count : 3 * count].dot(np.concatenate([size, np.copysign(size, openings)]))
+        openings, pressure = (rows[:, None].repeat(len(fingers) + 1, axis=1) for rows in (openings, pressure))
+        # A polynomial swings about a jump: between two instants a finger is between where it is at them.
+        ends = under[self.beside]
+        below = np.einsum("ip,pcg->icg", self.between, under).clip(ends.min(axis=0), ends.max(axis=0))
+        exponent, shift, unit, *_ = numbers
         work = np.zeros((len(filters) + 5, *fingers.shape))
         work[: len(filters)], work[-4] = filters, 1.0
         for s, part in enumerate(plan.segments):
             loss, propagator, shares = (each[fingers] for each in self._maps[s])
-            level = exponent * (height - below[list(part.nodes)]) - shift
+            underside, nodes = below[list(part.nodes)], plan.nodes[s]
+            level = exponent * (height - underside) - shift
             first = _tension(level[0])
             work[-3] = first
             lost = np.einsum("cgj,jcg->cg", loss[:, :, 0], work[:-2])
-            pushes = (first > lost) & ~again
+            waits = first <= lost
+            pushes = ~(waits | again)
             idle = ~pushes.any(axis=0)
-            # Where none pushes yet, it is the one nearest to it.
-            nearest = np.where(again, NONE, level[0] - np.log1p(lost)).argmax(axis=0)
-            pushes |= idle & (np.arange(len(fingers))[:, None] == nearest)
-            size_of = np.where(pushes, level + np.log(unit * exponent), NONE)
-            strongest = size_of[0].argmax(axis=0) * height.size + np.arange(height.size)
-            m, own = exponent.take(strongest), unit.take(strongest)
+            united = pushes | idle & ~again
+            size_of = np.where(united, level[0] + np.log(unit * exponent), NONE)
+            strongest = size_of.argmax(axis=0), np.arange(height.size)
+            m, own = exponent[strongest], unit[strongest]
             # Exponentials in units of the strongest one's, at start, middle and end of the fingers' way.
-            sizes = size_of - np.log(own * m)
+            sizes = size_of - np.log(own * m) - m * (underside - underside[0])
             whole = np.logaddexp.reduce(sizes, axis=1)
             share = np.exp(sizes - whole[:, None])
             ratio = unit / own
@@ -103,33 +112,49 @@ class TogetherPlan:
             rest = np.where(
                 exponent == m, -ratio, ratio * first - np.exp(np.minimum(sizes[0], LARGEST_EXPONENT))
             )
-            relaxed = np.maximum(np.where(pushes, lost * ratio - rest, 0.0).sum(axis=0), TINY)
-            bend = (whole[0] - 2.0 * whole[1] + whole[2]) / 3.0
-            nodes = plan.nodes[s]
+            relaxed = np.maximum(np.where(united, lost * ratio - rest, 0.0).sum(axis=0), TINY)
+            # Rows of each finger alone, and of those that push at the start as one. What comes to push later
+            # is not in that one, but no pin is higher under all fingers than under any of them.
+            ways = _append(level, whole)
+            bend, lift = (ways[0] - 2.0 * ways[1] + ways[2]) / 3.0, ways[0] - ways[2]
+            rates, _, _, to_load, hard = _append(numbers, numbers[:, *strongest])
+            slip, deviation = free[s::count, None] * (rates / plan.numbers[0]) - (lift, bend)
+            # See `bernoulli.BernoulliPlan.limits`; a pin behind a shut valve is locked.
+            hard = np.where(openings[nodes].any(axis=0), hard, 0.5 * LARGE)
+            beyond = ways[0] + np.maximum(np.maximum(slip, deviation), 0.0) >= hard
+            deviation[beyond | (deviation >= LARGEST_DEVIATION)] = 0.0
             start = StepStart(
                 cell,
                 openings[nodes],
                 pressure[nodes],
-                plan.weights[nodes, None] / cell.actuator.area,
-                whole[0],
-                free[s] * (m / plan.numbers[0]) - bend,
+                plan.weights[nodes, None, None] / cell.actuator.area,
+                ways[0],
+                deviation,
                 finger_deviation=bend,
-                lift=whole[0] - whole[2],
-                relaxed=relaxed,
-                idle=idle,
+                lift=lift,
+                relaxed=_append(lost + 1.0, relaxed),
+                idle=_append(waits, idle),
             )
-            rise, _, mean = find_loaded_path(m, load.take(strongest), shares.take(strongest), start)
+            rises, _, means = find_loaded_path(rates, to_load, _append(shares, shares[strongest]), start)
+            rises[-1, idle] = np.inf
+            rise = rises.min(axis=0)
             after = np.clip(height + rise, 0.0, cell.actuator.stroke)
-            last = _tension(exponent * (after - below[part.nodes[-1]]) - shift)
-            pressed = (mean + 1.0) * np.einsum("i,icg->cg", SIMPSON, share) / (ratio * exponent / m) - 1.0
+            last = _tension(exponent * (after - underside[-1]) - shift)
             straight = 0.5 * (first + last)
-            held = after != height + rise
-            work[-2] = np.maximum(np.where(pushes & ~held, pressed, straight), 0.0)
+            pressed = ((means[-1] + 1.0) * np.einsum("i,icg->cg", SIMPSON, share) + rest) / ratio
+            # Nor is any finger pressed harder than alone.
+            mean = np.minimum(np.where(pushes, pressed, straight), means[:-1])
+            work[-2] = np.maximum(np.where(after == height + rise, mean, straight), 0.0)
             work[-1] = last
             work[:-4] = np.maximum(np.einsum("cgij,jcg->icg", propagator, work), 0.0)
+            work = np.where(again, work[:, :1], work)
             height = after
-        work = np.where(again, work[:, :1], work)
         return height, work[:-5], work[-5]
+
+
+def _append(rows: Any, row: Any) -> Any:
+    """Return arrays (.., c, g) and (.., g) as one (.., c + 1, g)."""
+    return np.concatenate([rows, row[..., None, :]], axis=-2)
 
 
 def _tension(exponent: Floats) -> Floats:
@@ -143,6 +168,7 @@ def plan_together(cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, 
     count = segments[-1].nodes[-1] + 1
     parts: list[Segment] = []
     rows: list[Floats] = []
+    beside: list[tuple[int, int]] = []
     for segment in segments:
         # A polynomial through the underside at the instants of a step.
         places = np.linspace(0.0, 1.0, len(segment.nodes))
@@ -154,10 +180,12 @@ def plan_together(cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, 
             for row in (at[:, None] ** powers) @ to_powers:
                 rows.append(np.zeros(count))
                 rows[-1][list(segment.nodes)] = row
+            for instant in at * (len(places) - 1):
+                beside.append((segment.nodes[math.floor(instant)], segment.nodes[math.ceil(instant)]))
             length = segment.length / PARTS
             parts.append(Segment(segment.start + part * length, length, (first, first + 1, first + 2)))
     stepper = BernoulliExponential()
     made: dict[int, BernoulliPlan] = {}
     for cell in cells:
         made[id(cell)] = made.get(id(cell)) or stepper.plan(cell, queue, tuple(parts))
-    return TogetherPlan(tuple(made[id(cell)] for cell in cells), np.array(rows))
+    return TogetherPlan(tuple(made[id(cell)] for cell in cells), np.array(rows), np.array(beside).T)
