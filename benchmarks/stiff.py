@@ -7,7 +7,7 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -18,7 +18,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
-from digiclay.core.model.fingertip import compute_forms, compute_underside, require_one
+from digiclay.core.model.fingertip import compute_forms, compute_underside
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
@@ -30,12 +30,16 @@ from .report import Report, Row, Steps, tabulate
 from .session_parts import period_calls, replaying
 
 Table = Mapping[str, Any]
+Path = tuple[tuple[float, float, float], ...]
 
 #: Commands are recorded at this control period and held through it, s: all steps divide it, so that
 #: every run is the same problem.
 HOLD = 0.1
 #: Simulated time, s.
 DURATION = 0.5
+PRESS = (
+    (0.0, 0.0, 0.5e-3), (0.15, 0.0, -2.5e-3), (0.25, 1e-3, -2.5e-3), (0.4, 3e-3, 1.5e-3), (0.5, 3e-3, 3e-3),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -44,11 +48,8 @@ class Case:
 
     changes: Table = field(default_factory=dict)
     """Sections of a scene file."""
-    path: tuple[tuple[float, float, float], ...] = (
-        (0.0, 0.0, 0.5e-3), (0.15, 0.0, -2.5e-3), (0.25, 1e-3, -2.5e-3), (0.4, 3e-3, 1.5e-3),
-        (0.5, 3e-3, 3e-3),
-    )  # fmt: skip
-    """(float, float, float): Waypoints: time, s; x, m; height over the bed at rest, m."""
+    path: Path = PRESS
+    """Waypoints: time, s; x, m; height over the bed at rest, m."""
     why: str = ""
     """What makes it ill-conditioned: a rounding error of its data already moves its solution, or the path is
     no function of time that a step could resolve. Empty where the error must fall with the step."""
@@ -58,6 +59,8 @@ class Case:
     factor: float = 1.0
     """The recorded commands are those of the easy case, because this case's own controller sees no need to
     act; and what they are multiplied with."""
+    others: tuple[Path, ...] = ()
+    """Of further fingers."""
 
 
 #: A press with a fingertip that then rises, dragged a little; everything at its default.
@@ -71,6 +74,9 @@ THROUGH = ((0.0, 0.0, 2e-3), (0.1995, 0.0, 2e-3), (0.2, 0.0, -60e-3), (0.35, 0.0
 #: Jumps of 100 mm to and fro within 1, 5, 20 and 50 ms, at a depth of 4 mm; and when they begin and end, s.
 JUMPS = (0.0, 0.05, 0.051, 0.15, 0.155, 0.25, 0.27, 0.35, 0.4, 0.5)
 FROM_AFAR = (1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0)
+#: Fingers beside the first.
+BESIDE = tuple(tuple((time, x + far, z) for time, x, z in PRESS) for far in (-4e-3, 3.5e-3))
+STILL = ((0.0, 2e-3, -2e-3), (0.5, 2e-3, -2e-3))
 BIG_GAINS = {"position_gain": 5e6, "force_gain": 5e4}
 
 #: Beds, and a blister that fits on them.
@@ -117,6 +123,9 @@ CASES: dict[str, Case] = {
     "jumps sideways, out first": _jumping(0.1, 0.0, away_first=False),
     "jumps down first": _jumping(0.0, 0.1, away_first=True),
     "jumps up first": _jumping(0.0, 0.1, away_first=False),
+    "three fingers, bore 0.2 mm": Case({"actuator": {"bore": 0.2e-3}}, others=BESIDE),
+    "three fingers, orifice 2 mm": Case({"valve": {"orifice_diameter": 2e-3}}, others=BESIDE),
+    "jumps sideways beside a finger": replace(_jumping(0.1, 0.0, away_first=True), others=(STILL,)),
     "openings of 1e-9": Case(
         {"control": {"position_gain": 1e-6, "force_gain": 1e-8}}, borrowed=True, factor=1e-8
     ),
@@ -150,10 +159,17 @@ def scene(case: Case, stepper: str, step: float, period: float) -> Scene:
     sections["simulation"] = {
         "stepper": stepper, "physics_step": step, "control_period": period, "duration": DURATION,
     }  # fmt: skip
-    sections["trajectory"] = {
-        "interpolation": "linear" if case.straight else "smooth",
-        "waypoints": [{"time": t, "position": [x, 0.0, rest + z]} for t, x, z in case.path],
-    }
+    trajectories = [
+        {
+            "interpolation": "linear" if case.straight else "smooth",
+            "waypoints": [{"time": t, "position": [x, 0.0, rest + z]} for t, x, z in path],
+        }
+        for path in (case.path, *case.others)
+    ]
+    if case.others:
+        sections["finger"] = [{"trajectory": trajectory} for trajectory in trajectories]
+    else:
+        (sections["trajectory"],) = trajectories
     return resolve(sections, "stiff")
 
 
@@ -239,9 +255,10 @@ def _within_reach(
 ) -> bool:
     """Return whether heights, (n,), are within `Speeds.reach` of those a control period before."""
     assert system.cell.touch is not None
-    poses = require_one(trajectories).poses(period * system.period + system.instants)
+    fingertip, times = system.cell.touch.fingertip, period * system.period + system.instants
     places = system.grid.compute_basis(np.arange(system.grid.count))
-    under = compute_underside(*compute_forms(system.cell.touch.fingertip.outline(poses)), places)
+    outlines = [fingertip.outline(trajectory.poses(times)) for trajectory in trajectories]
+    under = np.min([compute_underside(*compute_forms(outline), places) for outline in outlines], axis=0)
     lowest, highest = find_speeds(system.cell).reach(before, under, system.period)
     # Rounding: these undersides are computed from other products.
     return bool((after >= lowest - 1e-12).all() and (after <= highest + 1e-12).all())
