@@ -204,7 +204,7 @@ def drag(system: System, apart: float, angle: float, turn: float) -> Floats:
     poses[..., 3] = 1.0
     gone = 12e-3 * np.maximum(time - 2.92, 0.0)
     for finger, (side, top) in enumerate(((0.5, 42e-3), (-0.5, 48e-3))):
-        way = [(0.0, 42e-3), (0.5, 36.5e-3), (0.7, 36.5e-3), (0.7 + (top - 36.5e-3) / 6e-3, top)]
+        way = [(0.0, 42e-3), (0.5, 36.5e-3), (0.7, 36.5e-3), (2.62, top)]
         height = np.interp(time, *np.transpose(way)) + (0.5 * gone if side > 0.0 else 0.0)
         poses[..., finger, 0] = 1.3e-3 + side * apart * np.cos(angle) + gone * np.cos(angle + turn)
         poses[..., finger, 1] = 0.7e-3 + side * apart * np.sin(angle) + gone * np.sin(angle + turn)
@@ -215,7 +215,7 @@ def drag(system: System, apart: float, angle: float, turn: float) -> Floats:
 @pytest.mark.parametrize(
     ("apart", "angle", "turn"),
     [
-        (10.5, 120, 90), (12.0, 0, 60), (12.0, 160, 90), (13.7, 30, 90), (13.7, 0, 0), (15.0, 15, 90),
+        (10.5, 120, 90), (12.0, 0, 90), (12.0, 160, 90), (12.0, 160, 0), (13.7, 30, 90), (15.0, 15, 90),
     ],
 )  # fmt: skip
 def test_a_finger_beside_a_higher_one_is_followed_as_alone(apart: float, angle: int, turn: int) -> None:

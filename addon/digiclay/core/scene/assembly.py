@@ -238,9 +238,11 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     if not (hasattr(controllers[0], "blister") and hasattr(controllers[0].begin(), "place")):
         return controllers[0]  # it follows no fingertip
     tips = [touch.fingertip for touch in touches if touch]
-    sizes, heights = [max(tip.length, tip.width) for tip in tips], [tip.height for tip in tips]
+    sizes, heights = tuple(max(tip.length, tip.width) for tip in tips), tuple(tip.height for tip in tips)
     felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
-    common = tuple(controllers), tuple(sizes), tuple(heights), felt
-    if isinstance(controllers[0], BatchControl):
-        return HandTogether(*common, join_controllers(controllers))
-    return (CellHands if hasattr(controllers[0], "whose") else HandInGroups)(*common)
+    each = tuple(controllers)
+    if isinstance(each[0], BatchControl):
+        return HandTogether(each, sizes, heights, felt, join_controllers(controllers))
+    if hasattr(each[0], "whose"):
+        return CellHands(each, sizes, sizes, felt)  # which of two undersides is nearer is asked of balls
+    return HandInGroups(each, sizes, heights, felt)
