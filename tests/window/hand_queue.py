@@ -12,7 +12,6 @@ from tests.window.hand_strokes import (
     brush,
     done,
     drag,
-    finish,
     hand,
     note,
     on_the_screen,
@@ -79,6 +78,11 @@ def queue(blender: Any) -> Iterator[float | None]:
     for count in (1, 2):
         yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "key ctrl+z sleep 0.2")
         note(blender, f"undone {count}")
+    for count in (1, 2):
+        yield from act(blender, "key ctrl+shift+z sleep 0.2")
+        note(blender, f"redone {count}")
+    yield from act(blender, "key BackSpace sleep 0.2")
+    note(blender, "backspace")
     yield from reset(blender)
 
 
@@ -98,11 +102,29 @@ def haste(blender: Any) -> Iterator[float | None]:
 
 
 def taken_back(blender: Any) -> Iterator[float | None]:
-    process = hand("sleep 0.01")
+    """Take back queued strokes, redo them; save a queue, and press Esc three times while it is formed."""
+    away = to(on_the_screen(blender, 0.0, -33.0))
     yield from drawn(blender, *LINES)
-    yield from act(blender, "key Escape")
-    yield from finish(blender, process)
-    note(blender, "one taken back")
+    yield from act(blender, away, "key ctrl+z sleep 0.2 key ctrl+z sleep 0.2")
+    note(blender, "two taken back")
+    yield from act(blender, "key ctrl+shift+z sleep 0.2 key ctrl+shift+z sleep 0.2")
+    note(blender, "two redone")
+    yield from reset(blender)
+    # A ridge takes longer than the keys after it.
+    brush(blender).brush = "RAISE"
+    yield from drawn(blender, *LINES)
+    file = str(blender.OUT / "queue.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    yield from done(blender, hand("key Escape sleep 0.05 key Escape sleep 0.05 key Escape"))
+    blender.SEEN["after Esc"] = len(blender.sessions())
+    yield from blender.until(lambda: not blender.sessions())
+    note(blender, "stopped")
+    bpy.ops.wm.open_mainfile(filepath=file)
+    yield from blender.until(lambda: not blender.part("live.beds").read_queue(blender.beds()[0])[-1])
+    yield from blender.rounds()
+    note(blender, "opened")
+    brush(blender).brush = "LOWER"
+    yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "click 1")
     yield from reset(blender)
 
 

@@ -17,7 +17,7 @@ def press(blender: Any) -> Iterator[float | None]:
 
 
 def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
-    """Draw a stroke, go to Edit Mode before the fingertip has formed it, and take it back with Esc there."""
+    """Draw a stroke, go to Edit Mode before the fingertip has formed it, stop with Esc, and go on."""
     blender.select(blender.beds()[0])
     yield None
     move, press = ("MOUSEMOVE", "NOTHING"), "LEFTMOUSE"
@@ -30,11 +30,16 @@ def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
     (session,) = blender.sessions()
     yield from blender.until(lambda: blender.sessions()[0].tick > session.tick)
     strokes = blender.SEEN["strokes"] = []
-    for name, kind in (("edited", "TAB"), ("taken back", "ESC")):
+    for name, kind in (("edited", "TAB"), ("stopped in Edit Mode", "ESC")):
         yield from blender.after(name, kind)
         strokes.append([len(session.strokes) for session in blender.sessions()])
     blender.shot("session_edited")
-    yield from blender.after("edited no more", "TAB")
+    blender.key("TAB", blender.middle())
+    yield from blender.rounds()
+    yield from blender.start()
+    yield from blender.after("edited no more")
+    yield from blender.until(lambda: not blender.session().strokes)
+    strokes.append([blender.session().finished_strokes])
     settings.brush = "LOWER"
 
 

@@ -21,6 +21,8 @@ def test_strokes_drawn_at_once_do_not_wait_for_the_clock_are_all_formed_and_undo
     assert formed(seen, "formed") == [True] * 3
     for count in (1, 2):
         assert formed(seen, f"undone {count}") == [True] * (3 - count) + [False] * count
+        assert formed(seen, f"redone {count}") == [True] * (1 + count) + [False] * (2 - count)
+    assert formed(seen, "backspace") == [True, True, False]
     # By the clock it were 5 ms in a tick, of which there are at most 30 a second. Software draws for most of
     # the time, and the machine is shared.
     assert seen["time"]["simulated"] > 2.0 * 0.15 * seen["time"]["after the hand"]
@@ -32,12 +34,24 @@ def test_strokes_are_finished_at_once_each_with_its_undo_step(seen: Seen) -> Non
     assert formed(seen, "finished, undone") == [True, True, False]
 
 
-def test_esc_lets_strokes_go_on_that_are_being_finished_at_once_else_it_takes_back_the_last(seen):
+def test_esc_lets_strokes_go_on_that_are_being_finished_at_once(seen: Seen) -> None:
     assert seen["let go on"]["left"] >= 1
     assert seen["let go on"]["sessions"] == 1
     assert formed(seen, "let go on, formed") == [True] * 3
     assert formed(seen, "let go on, undone") == [True, True, False]
-    assert formed(seen, "one taken back") == [True, True, False]
+
+
+def test_queued_strokes_are_taken_back_and_redone_one_by_one(seen: Seen) -> None:
+    assert formed(seen, "two taken back") == [True, False, False]
+    assert formed(seen, "two redone") == [True] * 3
+
+
+@pytest.mark.parametrize("name", ["stopped", "opened"])
+def test_three_times_esc_takes_back_no_stroke_and_a_file_saved_meanwhile_has_all(
+    seen: Seen, name: str
+) -> None:
+    assert seen["after Esc"] == 1  # the session stops when they are formed
+    assert formed(seen, name) == [True] * 3
 
 
 @pytest.mark.parametrize("name", list(LOADS)[1:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from enum import Enum
 from typing import Any
 
@@ -12,7 +13,8 @@ from ..compat import bpy
 from ..core.base.arrays import Floats
 from ..roles import BED, FINGERS, ROLE, bed_of, fingertips_of, is_local
 from ..sessions import running
-from ..sessions.running import TABLE, Running
+from ..sessions.running import TABLE, Running, name_fingers
+from ..strokes import drawn
 from ..ui_text import localize
 
 
@@ -113,27 +115,51 @@ def active_session(context: Any) -> tuple[Any, Running] | None:
     return None if session is None else (bed, session)
 
 
-#: The state by `core.session.snapshot`, poses and numbers of the fingertips at it, and the tick it is of.
+#: The state by `core.session.snapshot`, poses and numbers of the fingertips at it, the last tick; and in JSON
+#: the tick in which the stroke began that is being formed, or 0, those of the gestures before, and the
+#: strokes that are to be formed from that state, by `strokes.drawn`.
 STATE, POSE, NUMBERS, TICK = "digiclay_state", "digiclay_pose", "digiclay_fingers", "digiclay_moment"
+QUEUE = "digiclay_strokes"
 
 
 def write(bed: Any, running: Running, before: Running | None = None) -> None:
-    """Write a session into its bed's properties, except what has not changed since `before` was written."""
-    # The tick counts on even while nothing moves: it identifies the one that undo has returned to.
+    """Write a session into its bed's properties, except what has not changed since `before` was written.
+
+    No stroke stands there half-formed: it is there as drawn, with the state it begins from.
+    """
+    # The tick counts on even while nothing moves: undo reads anew only what is other bytes in a step.
     bed[TICK] = running.tick
-    if before is not None and running.snapshot is before.snapshot:
+    if before is not None and _identify(running) == _identify(before):
         return
-    numbers = bytes(running.names)
-    for name, data in ((STATE, running.snapshot), (POSE, running.poses.tobytes()), (NUMBERS, numbers)):
+    bed.data[TICK] = running.tick
+    now, started = running.standing, running.stroke_start.tick if running.stroke_start else 0
+    ticks = [one.tick for one in running.gestures if one.tick < now.tick]
+    queue = json.dumps([started, ticks, list(map(drawn.dump, running.drawn))])
+    names = bytes(name_fingers(running.numbers, len(now.poses)))
+    values = (STATE, now.snapshot), (POSE, now.poses.tobytes()), (NUMBERS, names), (QUEUE, queue)
+    for name, data in values:
         # Blender takes bytes that are assigned over others for a text: it stops at the first 0,
         # and corrupts its memory where the lengths differ.
         bed.pop(name, None)
         bed[name] = data
 
 
+def _identify(running: Running) -> tuple[Any, ...]:
+    """Return what tells apart what is written of sessions."""
+    return running.standing.snapshot, running.stroke_start, *(stroke.number for stroke in running.drawn)
+
+
+def put(running: Running) -> None:
+    """Make a value the present one of its bed's session, and write its strokes: an undo step is to come."""
+    TABLE.sessions[running.uid] = running
+    bed = find_bed(running.uid, running.name)
+    if bed is not None and not running.stale:
+        write(bed, running)
+
+
 def clear(bed: Any) -> None:
     """Remove all session data: the bed is at rest."""
-    for name in (STATE, POSE, NUMBERS, TICK):
+    for name in (STATE, POSE, NUMBERS, TICK, QUEUE):
         bed.pop(name, None)
 
 
@@ -162,6 +188,15 @@ def read_numbers(bed: Any) -> tuple[int, ...]:
 
 
 def read_tick(bed: Any) -> int:
-    """Return the tick that the stored state is of; 0 where none is stored."""
+    """Return the tick that was written last; 0 where none is stored."""
     value = bed.get(TICK)
     return value if isinstance(value, int) and value > 0 else 0
+
+
+def read_queue(bed: Any) -> tuple[int, list[int], list[str]]:
+    """Return the tick that the stored state is of, those in which its gestures began, and strokes to form."""
+    try:
+        started, ticks, lines = json.loads(bed[QUEUE])
+        return int(started) or read_tick(bed), list(map(int, ticks)), list(map(str, lines))
+    except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
+        return read_tick(bed), [], []

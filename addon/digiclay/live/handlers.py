@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy, connect, disconnect
+from ..core.base.errors import DigiclayError
 from ..overlay import views
 from ..recorded import takes
 from ..sessions import running
 from ..sessions.running import Running
-from ..sessions.sculpting import drop_strokes
 from ..ui_text import localize
 from . import beds, loop, tick
 from .beds import find_bed
@@ -90,7 +90,24 @@ def save_copy() -> str:
 def reload_states(*_: Any) -> None:
     """Have every session take up, two ticks later, what undo or redo has put into its bed."""
     for session in running.list_sessions():
-        running.put(replace(drop_strokes(session), stale=STALE))
+        running.put(replace(session, stale=STALE))
+
+
+def form_left() -> None:
+    """Form what beds without a session have stored of strokes: the file, or the step, is of mid-stroke."""
+    for bed in [thing for thing in bpy.context.scene.objects if beds.read_queue(thing)[-1]]:
+        if running.find(bed) is None and not bed.library:
+            try:
+                tick.form_strokes(bpy.context, bed)
+            except DigiclayError as error:
+                running.set_message(str(error), bed.session_uid)
+
+
+@bpy.app.handlers.persistent
+def form_soon(*_: Any) -> None:
+    """Form what is left of strokes when Blender has evaluated what it has loaded."""
+    if not (bpy.app.background or bpy.app.timers.is_registered(form_left)):
+        bpy.app.timers.register(form_left)
 
 
 #: Handlers of a running session, by the names of Blender's lists.
@@ -102,6 +119,10 @@ HANDLERS = {
     "save_post_fail": bpy.app.handlers.persistent(lambda *_: clear_recovery()),
     "load_pre": bpy.app.handlers.persistent(lambda *_: end_with_file("ended: another file was loaded")),
 }
+
+
+#: Handlers for beds without a session.
+LEFT = dict.fromkeys(("load_post", "undo_post", "redo_post"), form_soon)
 
 
 def watch() -> None:
@@ -125,6 +146,7 @@ def end(how: str, *sessions: Running) -> None:
             loop.end()
             disconnect(HANDLERS)
         views.follow()
+    form_soon()
     beds.select_active(frozenset(session.uid for session in sessions))
 
 
@@ -146,6 +168,8 @@ def end_with_file(how: str) -> None:
 
 def register() -> None:
     """Add the keys; handlers follow with the first session. Without a window there are no keymaps."""
+    if not bpy.app.background:
+        connect(LEFT)
     configuration = bpy.context.window_manager.keyconfigs.addon
     for (name, space), operator, key, modifiers in KEYS if configuration else ():
         items = configuration.keymaps.new(name=name, space_type=space).keymap_items
@@ -157,6 +181,9 @@ def register() -> None:
 def unregister() -> None:
     """End what runs, and remove the keys."""
     end_all("ended: the extension was disabled")
+    disconnect(LEFT)
+    if bpy.app.timers.is_registered(form_left):
+        bpy.app.timers.unregister(form_left)
     configuration = bpy.context.window_manager.keyconfigs.addon
     for (name, space), operator, *_ in KEYS if configuration else ():
         items = configuration.keymaps.new(name=name, space_type=space).keymap_items

@@ -35,6 +35,8 @@ class Loop:
     aside: bool = False
     #: Whether strokes are being finished: ticks are long, and draw nothing until one is finished.
     in_haste: bool = False
+    #: Whether the sessions end as soon as their strokes are formed.
+    ending: bool = False
 
 
 LOOP = Loop()
@@ -82,7 +84,7 @@ def end() -> None:
     if LOOP.timer is None:
         return
     bpy.context.window_manager.event_timer_remove(LOOP.timer)
-    LOOP.timer, LOOP.aside, LOOP.in_haste = None, False, False
+    LOOP.timer, LOOP.aside, LOOP.in_haste, LOOP.ending = None, False, False, False
     bpy.types.STATUSBAR_HT_header.remove(draw)
     redraw_status()
 

@@ -19,7 +19,7 @@ from ..device.instant import find_ellipsoids
 from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..roles import fingertips_of
-from ..sessions import running, sculpting
+from ..sessions import running, sculpting, stored
 from ..sessions.running import Running
 from ..sessions.sculpting import drop_strokes
 from ..settings import properties
@@ -53,20 +53,34 @@ def start(context: Any, bed: Any) -> list[Note]:
     reason = blocking_reason(context, bed, scene.cells)
     if reason:
         raise DigiclayError(f"The session of {bed.name} cannot start: {reason}.")
+    numbers, was, poses = tuple(fingertips_of(bed)), beds.read_numbers(bed), bridge.poses(bed)
+    stood, (*_, lines) = beds.read_poses(bed), beds.read_queue(bed)
+    if lines and stood is not None:  # the fingertip has come along a stroke, which begins anew
+        poses = sculpting.match_poses(stood, was, poses, numbers)
     begun, fault = sculpting.begin_session(
-        bed.session_uid, bed.name, scene, bridge.poses(bed), beds.read_snapshot(bed), beds.read_tick(bed),
-        tuple(fingertips_of(bed)), beds.read_numbers(bed),
-    )  # fmt: skip
+        bed.session_uid, bed.name, scene, poses, beds.read_snapshot(bed), beds.read_tick(bed), numbers, was
+    )
+    begun = stored.add_strokes(begun, lines)
     show(bed, replace(begun, settings=settings))
-    faults = [Note("WARNING", f"{bed.name}: {fault}")] if fault else []
+    if lines:
+        place_fingers(context, bed, begun)
+    damaged = len(lines) - len(begun.strokes)
+    words = (
+        localize("Stored press strokes that cannot be read ({}) were left out", damaged) if damaged else ""
+    )
+    faults = [Note("WARNING", f"{bed.name}: {each}") for each in (fault, words) if each]
     return [*(Note("INFO", words) for words in notes if words), *faults]
 
 
 def stop(uid: int) -> str:
     """End a session: its bed keeps the state, and a take of the recording; return words about the take."""
-    ended = running.drop(uid)
-    follow.end(uid)
+    ended = running.TABLE.sessions.get(uid)
     bed = find_bed(uid, ended.name) if ended else None
+    if ended is not None and bed is not None and ended.stroke_start:  # what is drawn then is whole
+        back = sculpting.restore(ended, ended.standing.snapshot, ended.standing.poses)
+        show(bed, replace(back, strokes=ended.strokes, stroke_start=None))
+    running.drop(uid)
+    follow.end(uid)
     return takes.keep_recording(bed, ended) if ended is not None and bed is not None else ""
 
 
@@ -84,6 +98,12 @@ def place_fingers(context: Any, bed: Any, session: Running) -> None:
     _evaluate(context)
 
 
+def bring_back(context: Any, bed: Any, session: Running) -> None:
+    """Show a session as it was at another moment, its fingertips too."""
+    show(bed, session)
+    place_fingers(context, bed, session)
+
+
 def _evaluate(context: Any) -> None:
     """Have Blender evaluate what has changed: only then the world's matrix of a moved fingertip is right."""
     context.view_layer.update()
@@ -94,16 +114,29 @@ def _move_fingers(bed: Any, session: Running, count: int = 1) -> None:
     bridge.move_fingertips(bed, session.poses[:count], find_ellipsoids(session.scene))
 
 
-def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
-    """Withdraw the last unfinished stroke of one session, or of each; return whether there was one."""
-    busy = [session for session in running.list_sessions() if session.strokes and uid in (None, session.uid)]
-    for session in busy:
-        bed = find_bed(session.uid, session.name)
-        if bed is not None:
-            back = sculpting.withdraw_stroke(session)
-            show(bed, back)
-            place_fingers(context, bed, back)
-    return bool(busy)
+def form_strokes(context: Any, bed: Any) -> None:
+    """Form at once what a bed without a session has stored of strokes, as far as that takes some seconds."""
+    start(context, bed)
+    session = running.TABLE.sessions[bed.session_uid]
+    end = session.state.period + takes.MOST // session.system.grid.count
+    while session.strokes and session.state.period < end:
+        session = sculpting.follow_finger(
+            replace(session, tick=session.tick + 1), session.pose, sculpting.CHUNK
+        )
+    bring_back(context, bed, session)
+    stop(session.uid)
+
+
+def take_up(context: Any, bed: Any, session: Running) -> Running:
+    """Return a session with what undo or redo has put into its bed."""
+    poses, was, queue = beds.read_poses(bed), beds.read_numbers(bed), beds.read_queue(bed)
+    if poses is None:
+        others = session.poses[:1].repeat(len(was), axis=0)
+        poses = sculpting.match_poses(session.poses, session.numbers, others, was)
+    back = stored.take_up(session, beds.read_snapshot(bed), poses, was, *queue)
+    if queue[-1]:
+        place_fingers(context, bed, back)
+    return back
 
 
 def has_strokes() -> bool:
@@ -119,8 +152,7 @@ def end_haste(context: Any) -> None:
         for session in running.list_sessions():
             bed = find_bed(session.uid, session.name)
             if bed is not None:
-                show(bed, session)
-                place_fingers(context, bed, session)
+                bring_back(context, bed, session)
 
 
 def tick(context: Any, now: float) -> list[Note]:
@@ -172,7 +204,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
             session, poses, now, most, view.picked_pins(bed), loop.find_interval(context), moment
         )
     except (DivergenceError, MethodError) as error:
-        back = sculpting.restore(session, session.snapshot, session.poses)
+        back = sculpting.restore(session, session.standing.snapshot, session.standing.poses)
         later = replace(drop_strokes(back), paused=True)
         yield Note("ERROR", localize("The session of {} is paused: {}", bed.name, error), session.uid)
     running.put(later)
@@ -218,11 +250,7 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
             session, words = _take_settings(bed, session)
             session = replace(session, settings=settings)
         if session.stale:
-            poses, was = beds.read_poses(bed), beds.read_numbers(bed)
-            if poses is None:
-                others = session.poses[:1].repeat(len(was), axis=0)
-                poses = sculpting.match_poses(session.poses, session.numbers, others, was)
-            back = sculpting.restore(session, beds.read_snapshot(bed), poses, beds.read_tick(bed), was)
+            back = take_up(context, bed, session)
             if session.recording is not None and back.recording is None:
                 words = localize(
                     "The recording ended: undo went back to before it, or redo to what it did not lead to"

@@ -1,14 +1,13 @@
 """What the Press tool's header has beside strokes: the center of symmetry, and the locks of all pins."""
 
-from dataclasses import replace
 from typing import Any
 
 from ..compat import bpy
+from ..live import beds
 from ..press import aim, brush, tool
 from ..press.pointer import HELD
-from ..sessions import running
 from ..sessions.sculpting import change_stroke, queue_stroke
-from ..strokes.stroke import SHALLOWEST, Brush
+from ..strokes.stroke import SHALLOWEST, Brush, let_go
 from ..ui_text import localize
 from .action import Drawing, Polled, action, show_status
 from .poll_messages import no_finger, no_tool, no_tool_in_view
@@ -91,18 +90,17 @@ def _tell_all(operator: Any, context: Any, kind: Brush) -> set[str] | None:
         return {"CANCELLED"}
     x, y = session.pose[:2].tolist()
     session, number = queue_stroke(session, x, y, SHALLOWEST, brush=kind)
-    running.put(change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
+    beds.put(change_stroke(session, number, let_go))
     return None
 
 
-# The session makes the undo step.
-@action("digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=())
+@action("digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=("UNDO",))
 def invert_locks(operator: Any, context: Any) -> set[str] | None:
     """Lock the pins that are not locked, and unlock those that are"""
     return _tell_all(operator, context, Brush.INVERT_LOCKS)
 
 
-@action("digiclay.press_locks_clear", "Clear Locks", no_tool_in_view, no_finger, options=())
+@action("digiclay.press_locks_clear", "Clear Locks", no_tool_in_view, no_finger, options=("UNDO",))
 def clear_locks(operator: Any, context: Any) -> set[str] | None:
     """Unlock all pins"""
     return _tell_all(operator, context, Brush.CLEAR_LOCKS)

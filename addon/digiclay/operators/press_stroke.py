@@ -14,7 +14,7 @@ from ..core.control.methods import METHODS
 from ..live import beds, loop, tick
 from ..press import aim, brush, ghost, pointer, tool
 from ..press.pointer import begin_button, read_event
-from ..sessions import running
+from ..sessions import running, sculpting
 from ..sessions.sculpting import change_stroke, find_stroke, last_place, queue_stroke
 from ..settings.declared import choice, flag, integer, number, text, title
 from ..strokes.stroke import (
@@ -30,6 +30,7 @@ from ..strokes.stroke import (
     lay_path,
     lay_ring,
     lay_square,
+    let_go,
     pull,
     start,
 )
@@ -119,8 +120,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
 
     bl_idname = "digiclay.press"
     bl_label = "Press"
-    # No undo step of its own: the session makes it when the fingertip has finished the stroke.
-    bl_options = {"INTERNAL"}
+    bl_options = {"INTERNAL", "UNDO"}
     needs = (no_place,)
 
     def prepare(self, context: Any, event: Any) -> set[str] | None:
@@ -165,15 +165,16 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         bed = brush.find_bed(bpy.context, self.uid)
         session = running.find(bed)
         stroke = session and find_stroke(session, self.number)
-        if stroke is None:
+        if session is None or stroke is None:
             if bed is None or session is None:
                 self.report({"WARNING"}, localize("The press stroke ended: its session or bed was removed"))
             return self._end({"CANCELLED", "PASS_THROUGH"})
-        if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
-            tick.withdraw_strokes(context, self.uid)
+        pressed = event.value == "PRESS"
+        if pressed and (event.type in ("ESC", "RIGHTMOUSE") or _is_undo_key(context, event)):
+            tick.bring_back(context, bed, sculpting.withdraw_stroke(session))
             return self._end({"CANCELLED"})
         if self._is_released(event):
-            self._change(lambda stroke: replace(stroke, held=False))
+            self._change(let_go)
             return self._end({"FINISHED", "PASS_THROUGH"})
         if event.type in MOVES:
             self._move(context, bed, event)
@@ -181,7 +182,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
             self._deepen(WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
-            self._change(lambda stroke: replace(stroke, held=False))
+            self._change(let_go)
             # A press while it is down: another operator has had the release. That one is another stroke.
             again = {"PASS_THROUGH"} if event.value == "PRESS" else set()
             return self._end({"FINISHED"} | again)
@@ -191,7 +192,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
-        self._change(lambda stroke: replace(stroke, held=False))
+        self._change(let_go)
         self._end(set())
 
     def _move(self, context: Any, bed: Any, event: Any) -> None:
@@ -221,7 +222,8 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         """Put a changed stroke into the session's queue."""
         session = running.find(brush.find_bed(bpy.context, self.uid))
         if session is not None:
-            running.put(change_stroke(session, self.number, change))
+            put = beds.put if change is let_go else running.put
+            put(change_stroke(session, self.number, change))
 
     def _feel(self, context: Any, bed: Any, event: Any) -> None:
         """Take a pen's pressure and tilt."""
@@ -251,6 +253,18 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         return result
 
 
+def _is_undo_key(context: Any, event: Any) -> bool:
+    """Return whether an event is the user's key for Undo: a stroke that is being drawn has no step yet."""
+    keymap = context.window_manager.keyconfigs.user.keymaps.get("Screen")
+    return any(
+        item.idname == "ed.undo"
+        and item.active
+        and item.type == event.type
+        and all(bool(getattr(item, key)) == getattr(event, key) for key in ("ctrl", "shift", "alt", "oskey"))
+        for item in (keymap.keymap_items if keymap else ())
+    )
+
+
 def find_pressed(operator: Any, context: Any, xy: tuple[float, float]) -> aim.Target | None:
     """Return the place on a bed under a pixel of the region; the operator reports what hides it."""
     target, hider = aim.look_at(context, xy)
@@ -266,6 +280,10 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
             context.view_layer.objects.active = bed
             bpy.ops.digiclay.session("INVOKE_DEFAULT")
         session = running.find(bed)
+        if session is not None and session.stale:  # the stroke is drawn on what undo has put there
+            context.view_layer.update()
+            session = tick.take_up(context, bed, session)
+            tick.show(bed, session)
         if session is None:
             raise DigiclayError(f"The session of {bed.name} could not be started; its panel says why.")
     except (DigiclayError, RuntimeError) as error:
@@ -281,6 +299,7 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
         words = localize("The session is paused: the fingertip follows after it resumes")
         operator.report({"WARNING"}, words)
     beds.deselect(bed)
+    loop.LOOP.ending = False
     return session
 
 
@@ -305,7 +324,7 @@ class PressShape(Drawing, bpy.types.Operator):
 
     bl_idname = "digiclay.press_shape"
     bl_label = "Press Line or Ring"
-    bl_options = {"INTERNAL"}
+    bl_options = {"INTERNAL", "UNDO"}
     needs = (_no_shape,)
 
     def prepare(self, context: Any, event: Any) -> set[str] | None:
@@ -381,7 +400,7 @@ class PressLine(Polled, bpy.types.Operator):
 
     bl_idname = "digiclay.press_line"
     bl_label = "Press Line from Last Stroke"
-    bl_options = {"INTERNAL"}
+    bl_options = {"INTERNAL", "UNDO"}
     needs = (no_tool,)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
@@ -414,5 +433,5 @@ def _queue_path(operator: Any, context: Any, bed: Any, path: Any, kind: Brush) -
         return {"CANCELLED"}
     (x, y), laid = path[0], _lay_stroke(brush.tool_settings(context), path, kind)
     session, number = queue_stroke(session, x, y, 0.0)
-    running.put(change_stroke(session, number, lambda queued: replace(laid, number=queued.number)))
+    beds.put(change_stroke(session, number, lambda queued: replace(laid, number=queued.number)))
     return {"FINISHED"}

@@ -45,11 +45,8 @@ class Ticking(Polled):
     in_any_mode = True
 
     def advance(self, context: Any, now: float) -> None:
-        """Advance all sessions until `now`, s; a stroke that this finishes is an undo step."""
-        drawn = _count_strokes()
+        """Advance all sessions until `now`, s."""
         self.tell(tick.tick(context, now))
-        if _count_strokes() > drawn:
-            bpy.ops.ed.undo_push(message="Press")
 
     def tell(self, notes: list[tick.Note]) -> None:
         """Report the messages, and keep them for the panel."""
@@ -74,15 +71,15 @@ class LoopMixin(Ticking):
         """Tick with the timer; pass every other event on."""
         if self.token != loop.token():
             return {"CANCELLED"}
-        if _is_undo_key(context, event) and tick.withdraw_strokes(context):
-            return {"RUNNING_MODAL"}
         if event.type == "ESC" and event.value == "PRESS" and not self.newer & _other_operators(context):
-            return {"FINISHED"} if _stop(context) else {"RUNNING_MODAL"}
+            return {"FINISHED"} if _stop(self, context) else {"RUNNING_MODAL"}
         now = time.perf_counter()
         if event.type != "TIMER" or not loop.is_due(context, now):
             return {"PASS_THROUGH"}
         self.advance(context, now)
         loop.redraw_numbers(context, now)
+        if loop.LOOP.ending and _stop(self, context):
+            return {"FINISHED"}
         if not running.list_sessions():
             handlers.end_all(handlers.STOPPED)
             return {"FINISHED"}
@@ -171,12 +168,7 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
 @action("digiclay.session_escape", "Stop Sessions", poll.driven, options=("INTERNAL",), in_any_mode=True)
 def escape(operator: Any, context: Any) -> None:
     """Stop the sessions while none of their operators receives the key"""
-    _stop(context)
-
-
-def _count_strokes() -> int:
-    """Return how many strokes the fingers of all sessions have finished."""
-    return sum(session.finished_strokes for session in running.list_sessions())
+    _stop(operator, context)
 
 
 def _estimate_time() -> float:
@@ -184,26 +176,15 @@ def _estimate_time() -> float:
     return sum(map(sculpting.estimate_time, running.list_sessions()))
 
 
-def _stop(context: Any) -> bool:
-    """Take back unfinished strokes; without any, end all sessions, and return that they ended."""
-    if tick.withdraw_strokes(context):
-        return False
-    handlers.end_all(handlers.STOPPED)
-    return True
-
-
-def _is_undo_key(context: Any, event: Any) -> bool:
-    """Return whether an event is the user's key for Undo while a stroke is unfinished: it has no step yet."""
-    if event.value != "PRESS" or not any(session.strokes for session in running.list_sessions()):
-        return False
-    keymap = context.window_manager.keyconfigs.user.keymaps.get("Screen")
-    return any(
-        item.idname == "ed.undo"
-        and item.active
-        and item.type == event.type
-        and all(bool(getattr(item, key)) == getattr(event, key) for key in ("ctrl", "shift", "alt", "oskey"))
-        for item in (keymap.keymap_items if keymap else ())
-    )
+def _stop(operator: Any, context: Any) -> bool:
+    """End all sessions as soon as drawn strokes are formed; return whether they have ended."""
+    if not tick.has_strokes():
+        handlers.end_all(handlers.STOPPED)
+        return True
+    if not loop.LOOP.ending:
+        operator.report({"INFO"}, localize("The sessions stop as soon as the drawn strokes are formed"))
+    loop.LOOP.ending = True
+    return False
 
 
 def _other_operators(context: Any) -> frozenset[int]:
@@ -331,8 +312,7 @@ def rewind_session(operator: Any, context: Any) -> None:
     if session.recording is not None and back.recording is None:
         words = takes.keep_recording(bed, session)
         operator.report({"INFO"}, words or localize("The recording ended: the gesture began before it"))
-    tick.show(bed, back)
-    tick.place_fingers(context, bed, back)
+    tick.bring_back(context, bed, back)
 
 
 @action(
@@ -353,9 +333,7 @@ def reset_session(operator: Any, context: Any) -> set[str] | None:
     bed, session = active
     # What a session has done can be taken back: its recording is stored as a take.
     words = takes.keep_recording(bed, session)
-    back = sculpting.reset(session)
-    tick.show(bed, back)
-    tick.place_fingers(context, bed, back)
+    tick.bring_back(context, bed, sculpting.reset(session))
     if words:
         operator.report({"INFO"}, words)
     return None

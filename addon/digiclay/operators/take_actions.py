@@ -130,8 +130,7 @@ def play(operator: Any, context: Any) -> None:
         session = running.find(bed)
         assert session is not None  # it has just been started
         *_, session = play_strokes(session, recorded.strokes)
-        tick.show(bed, session)
-        tick.place_fingers(context, bed, session)
+        tick.bring_back(context, bed, session)
     finally:  # when a stroke fails, the bed stays as it was
         tick.stop(bed.session_uid)
     operator.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))

@@ -13,6 +13,14 @@ from ..strokes.stroke import Stroke
 OWN = MOST_FINGERS + 1
 
 
+@dataclass(frozen=True, eq=False)
+class Gesture(Moment):
+    """Gesture that can be taken back, by its beginning; of a stroke also what was drawn, and its end."""
+
+    stroke: str = ""
+    end: Moment | None = None
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Running(LiveSession):
     """Live session at one instant; replaced by another value at each tick."""
@@ -40,8 +48,10 @@ class Running(LiveSession):
     stale: int = 0
     #: Single control periods requested while paused.
     steps: int = 0
-    #: The last gestures, oldest first, and the one that begins if the fingertip touches.
-    gestures: tuple[Moment, ...] = ()
+    #: The last gestures, oldest first, those that were taken back since the last one, and the one that begins
+    #: if the fingertip touches.
+    gestures: tuple[Gesture, ...] = ()
+    undone: tuple[Gesture, ...] = ()
     next_gesture: Moment | None = None
     #: How long the fingertip has not moved, s of simulated time.
     rest_time: float = 0.0
@@ -52,11 +62,23 @@ class Running(LiveSession):
     strokes: tuple[Stroke, ...] = ()
     #: Where the first of them began.
     stroke_start: Moment | None = None
+    #: How many were begun, also such as were taken back; and how many were finished.
+    begun_strokes: int = 0
     finished_strokes: int = 0
     #: Where the last finished stroke ended, x and y, m.
     last_place: tuple[float, float] | None = None
     #: Stored settings of the bed that `scene` was made of; None: unknown.
     settings: tuple[Any, ...] | None = None
+
+    @property
+    def standing(self) -> Moment:
+        """What the bed stores beside drawn strokes: all but the stroke that is being formed."""
+        return self.stroke_start or Moment(self.state.period, self.snapshot, self.poses, self.tick)
+
+    @property
+    def drawn(self) -> tuple[Stroke, ...]:
+        """The unfinished strokes that the hand has let go of."""
+        return tuple(stroke for stroke in self.strokes if not stroke.held)
 
     @property
     def names(self) -> tuple[int, ...]:

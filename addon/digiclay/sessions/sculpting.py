@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
 from ..core.shapes.heightmap import HeightMap
 from ..device.instant import CLEARANCE, find_ellipsoid
+from ..strokes import drawn
 from ..strokes.motion import DRAG, follow, follow_images
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.nominal import Device
@@ -27,7 +29,7 @@ from ..strokes.stroke import ALONE, FINISHING, Brush, Image, Stroke, start
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
-from .running import Running, name_fingers
+from .running import Gesture, Running, name_fingers
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
@@ -69,7 +71,7 @@ def begin_session(
         scene=scene, system=system, state=state, poses=poses, uid=uid, name=name, snapshot=now, tick=tick + 1,
         numbers=numbers[:own], clock=live_session.Clock(), monitor=accuracy.start(whole),
         trace=recent_trace.start(system.period, fingers=own),
-        next_gesture=live_session.Moment(state.period, now, poses),
+        next_gesture=live_session.Moment(state.period, now, poses, tick),
     )  # fmt: skip
     return running, lost
 
@@ -166,13 +168,25 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
 
 def _follow_stroke(running: Running, count: int) -> Running:
     """Simulate at most so many control periods of the first stroke; none where it waits for the hand."""
+    stroke = running.strokes[0]
     running, path, orders = take_path(running, count)
-    if len(path) == 1:
+    if len(path) > 1:
+        # The other fingers stay where they are.
+        paths = np.repeat(running.poses[None], len(path), axis=0)
+        paths[:, list_pressing(running)[: path.shape[1]]] = path
+        running = _follow(running, paths, orders, PAUSE)
+    return running if find_stroke(running, stroke.number) else _end_stroke(running, stroke)
+
+
+def _end_stroke(running: Running, stroke: Stroke) -> Running:
+    """Note where a stroke has ended, so that redo brings it back as it stands."""
+    running, start = _pack(replace(running, stroke_start=None)), running.stroke_start
+    *earlier, last = running.gestures or (None,)
+    if last is None or start is None or last.snapshot is not start.snapshot:  # it has touched nothing
         return running
-    # The other fingers stay where they are.
-    paths = np.repeat(running.poses[None], len(path), axis=0)
-    paths[:, list_pressing(running)[: path.shape[1]]] = path
-    return _follow(running, paths, orders, PAUSE)
+    return replace(
+        running, gestures=(*earlier, replace(last, stroke=drawn.dump(stroke), end=running.standing))
+    )
 
 
 def list_pressing(running: Running) -> list[int]:
@@ -254,8 +268,13 @@ def _mark_gesture_start(running: Running, poses: Floats, count: int) -> Running:
     next_gesture = running.next_gesture
     free = next_gesture is None and recent_trace.measure_total_force(running.system, running.state) == 0.0
     if free or (moved and running.rest_time >= REST):
-        next_gesture = live_session.Moment(running.state.period, running.snapshot, running.poses)
+        next_gesture = _mark(running)
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
+
+
+def _mark(running: Running) -> live_session.Moment:
+    """Return the moment before the tick that is being simulated."""
+    return live_session.Moment(running.state.period, running.snapshot, running.poses, running.tick - 1)
 
 
 def _count_gesture(running: Running, *, ordered: bool) -> Running:
@@ -263,8 +282,9 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
     touched = ordered or recent_trace.measure_total_force(running.system, running.state) > 0.0
     if running.next_gesture is None or not touched:
         return running
-    room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
-    return replace(running, gestures=(*running.gestures, running.next_gesture)[-room:], next_gesture=None)
+    begun, room = running.next_gesture, max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
+    gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick)
+    return replace(running, gestures=(*running.gestures, gesture)[-room:], undone=(), next_gesture=None)
 
 
 def restore(
@@ -296,7 +316,7 @@ def restore(
         poses=live_session.clamp_pose(poses.reshape(-1, 7), running.system.cell.actuator.stroke),
         monitor=running.monitor and accuracy.reset(running.monitor),
         recording=keep, gestures=gestures, tick=running.tick + 1, rest_time=0.0,
-        next_gesture=live_session.Moment(state.period, now, poses.reshape(-1, 7)) if free else None,
+        next_gesture=live_session.Moment(state.period, now, poses, running.tick) if free else None,
     )  # fmt: skip
 
 
@@ -317,18 +337,22 @@ def change_scene(
         running.tick, (*numbers, *images), running.names,
     )  # fmt: skip
 
-    def change(moment: live_session.Moment) -> live_session.Moment:
+    def change(moment: Any) -> Any:
         had = name_fingers(was, len(moment.poses))
         kept = _change_fingers(scene, plain, moment.snapshot, had, numbers)
         assert kept is not None
         return replace(moment, snapshot=kept, poses=match_poses(moment.poses, had, others, numbers))
 
     plain = assemble(scene) if images else other.system
+    # What a stroke has formed, it has with the parameters before.
+    for name in ("gestures", "undone"):
+        some = (replace(one, stroke="") for one in getattr(running, name))
+        carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
+        running = replace(running, **carried)
     if numbers != was:
-        start = running.stroke_start and change(running.stroke_start)
-        running = replace(running, gestures=tuple(map(change, running.gestures)), stroke_start=start)
-    names = ["clock", "paused", "blocking_reason", "stale", "finished_strokes", "last_place"]
-    names += [] if lost else ["gestures", "strokes", "stroke_start"]
+        running = replace(running, stroke_start=running.stroke_start and change(running.stroke_start))
+    names = ["clock", "paused", "blocking_reason", "stale", "begun_strokes", "finished_strokes", "last_place"]
+    names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:
         other = _give_fingers(other, 1)
     trace = recent_trace.pick(other.trace, running.trace.pins, other.system.grid.count)
@@ -349,7 +373,7 @@ def rewind(running: Running) -> Running:
     if not running.gestures:
         return running
     *earlier, last = running.gestures
-    return restore_gesture(replace(running, gestures=tuple(earlier)), last)
+    return restore_gesture(replace(running, gestures=tuple(earlier), undone=(*running.undone, last)), last)
 
 
 def withdraw_stroke(running: Running) -> Running:
@@ -378,10 +402,11 @@ def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the fingertip off it; this can be rewound like a gesture."""
     running = drop_strokes(running)
     # Before period 0, at which the first gesture after the reset may begin.
-    before = live_session.Moment(-1, running.snapshot, running.poses)
+    before = Gesture(-1, running.snapshot, running.poses, running.tick)
+    undone = (*running.undone, *running.gestures)[-GESTURES:]
     poses = running.poses.copy()
     poses[:, 2] = np.maximum(poses[:, 2], running.system.cell.actuator.rest_height + CLEARANCE)
-    back = restore(replace(running, gestures=()), None, poses, tick=-1)
+    back = restore(replace(running, gestures=(), undone=undone), None, poses, tick=-1)
     return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
 
 
@@ -391,9 +416,9 @@ def queue_stroke(
     *, accumulate: bool = False, stamp: HeightMap | None = None,
 ) -> tuple[Running, int]:  # fmt: skip
     """Queue the stroke of a mouse that goes down at a place; return its number as well; see `Sample`."""
-    number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
+    number = running.begun_strokes + 1
     begun = start(number, x, y, depth, images, brush, share, lean, accumulate=accumulate, stamp=stamp)
-    return replace(running, strokes=(*running.strokes, begun)), number
+    return replace(running, strokes=(*running.strokes, begun), begun_strokes=number), number
 
 
 def find_stroke(running: Running, number: int) -> Stroke | None:
@@ -433,8 +458,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     """
     stroke = running.strokes[0]
     if stroke.height is None:
-        begun = live_session.Moment(running.state.period, running.snapshot, running.poses)
-        running = replace(running, next_gesture=begun, stroke_start=begun)
+        running = replace(running, next_gesture=_mark(running), stroke_start=_mark(running))
         if stroke.brush not in WHOLE:
             tracking = None if stroke.brush in SWEEPS else find_tracking(running.scene, running.system)
             stroke = begin_stroke(stroke, running.state.row(0), running.pose[3:], tracking)
@@ -445,10 +469,8 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     running = replace(running, strokes=left)
     if stroke.done:
         end = stroke.samples[-1]
-        running = replace(
-            running, strokes=left[1:], stroke_start=None, finished_strokes=running.finished_strokes + 1,
-            last_place=(end.x, end.y),
-        )  # fmt: skip
+        finished = running.finished_strokes + 1
+        running = replace(running, strokes=left[1:], finished_strokes=finished, last_place=(end.x, end.y))
     return running, path, orders
 
 

@@ -253,6 +253,11 @@ def draw(
     return replace(stroke, samples=(*stroke.samples, Sample(x, y, _limit_depth(depth), share, lean)))
 
 
+def let_go(stroke: Stroke) -> Stroke:
+    """Return the stroke as the hand leaves it."""
+    return replace(stroke, held=False)
+
+
 def alter(stroke: Stroke, **values: Any) -> Stroke:
     """Return a stroke with some values, itself where it has them: a copy takes a tenth of a step."""
     same = all(getattr(stroke, name) == value for name, value in values.items())

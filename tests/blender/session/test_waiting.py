@@ -9,7 +9,7 @@ import pytest
 from digiclay.live import beds, handlers, tick
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
-from digiclay.sessions.sculpting import queue_stroke
+from digiclay.sessions.sculpting import queue_stroke, withdraw_stroke
 
 from tests.blender.session.live import FLOAT32, Clock, goes_on, press, shown, started, waits
 
@@ -77,7 +77,7 @@ def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed: Any, clock
     clock.until(lambda: shown(bed).min() < 39e-3)
     edit()
     clock.tick()
-    tick.withdraw_strokes(bpy.context)
+    tick.bring_back(bpy.context, bed, withdraw_stroke(running.find(bed)))
     edit("OBJECT")
     goes_on(clock)
     np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)

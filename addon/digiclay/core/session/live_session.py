@@ -274,6 +274,8 @@ class Moment:
     period: int
     snapshot: bytes
     poses: Floats
+    tick: int = 0
+    """Which of the session's ticks it is of: it tells moments apart."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

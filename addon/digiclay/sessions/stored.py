@@ -1,0 +1,45 @@
+"""Sessions and what their beds store: taken up after undo, redo and loading. No Blender."""
+
+from dataclasses import replace
+
+from ..core.base.arrays import Floats
+from ..core.session.live_session import Moment
+from ..strokes import drawn
+from .running import Gesture, Running, name_fingers
+from .sculpting import Numbers, drop_strokes, restore
+
+
+def take_up(
+    running: Running, kept: bytes | None, poses: Floats, was: Numbers, tick: int, ticks: list[int],
+    lines: list[str],
+) -> Running:  # fmt: skip
+    """Return the session with what undo or redo has put into its bed, as `restore`.
+
+    `ticks`: of its gestures. `lines`: strokes to be formed from there, by `strokes.drawn`. Those that the
+    session has formed so stand at once, and the one that it is forming goes on.
+    """
+    known, start = {one.tick: one for one in (*running.undone, *running.gestures)}, running.stroke_start
+    formed: dict[tuple[str, bytes | None], tuple[Gesture, Moment]] = {
+        (one.stroke, one.snapshot): (one, one.end) for one in known.values() if one.end
+    }
+    while lines and (lines[0], kept) in formed:
+        one, end = formed[lines[0], kept]
+        kept, poses, tick, ticks, lines = end.snapshot, end.poses, end.tick, [*ticks, one.tick], lines[1:]
+        was = name_fingers(running.numbers, len(poses))
+    if start and lines and start.snapshot == kept and drawn.dump(running.strokes[0]) == lines[0]:
+        back, ticks = replace(running, strokes=running.strokes[:1], stale=0), [*ticks, start.tick]
+        lines = lines[1:]
+    else:
+        back = restore(drop_strokes(running), kept, poses, tick, was)
+    gestures = tuple(known.pop(one) for one in ticks if one in known)
+    return add_strokes(replace(back, gestures=gestures, undone=tuple(known.values())), lines)
+
+
+def add_strokes(running: Running, lines: list[str]) -> Running:
+    """Return the session with strokes of `drawn` queued, without those that are none."""
+    for line in lines:
+        stroke = drawn.load(line, running.begun_strokes + 1)
+        if stroke is not None:
+            strokes = (*running.strokes, stroke)
+            running = replace(running, strokes=strokes, begun_strokes=stroke.number)
+    return running

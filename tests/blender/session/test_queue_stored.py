@@ -1,0 +1,216 @@
+"""A bed stores the strokes still to be formed, whole: files, undo, redo and Backspace bring them back."""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay.core.session import live_session
+from digiclay.live import beds, handlers, tick
+from digiclay.sessions import running
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
+from digiclay.strokes.stamps import load_stamp
+from digiclay.strokes.stroke import Brush, lay_path, make_images
+
+from tests.blender.session.live import FLOAT32, Clock, exact, only_bed, shown, started, undone
+
+#: Rows of the strokes, mm, and where they begin and end.
+ROWS, ENDS = (-12.0, 0.0, 12.0), (-9.0, 9.0)
+
+
+def draw(y: float, **how: Any) -> None:
+    """Draw a stroke along a row, as the Press tool does, with its undo step."""
+    session = running.find(only_bed())
+    path = [(1e-3 * x, 1e-3 * y) for x in ENDS]
+    session, number = queue_stroke(session, *path[0], 3e-3, **how)
+    beds.put(change_stroke(session, number, partial(lay_path, points=path)))
+    bpy.ops.ed.undo_push(message="Press")
+
+
+def begin(bed: Any, method: str = "plastic") -> None:
+    bed.digiclay.method = method
+    started(bed)
+    bpy.ops.ed.undo_push(message="Start Session")
+
+
+def form(clock: Clock) -> None:
+    clock.until(lambda: not running.find(only_bed()).strokes)
+    clock.tick()
+
+
+def rows() -> list[bool]:
+    """Tell which strokes are formed, each wholly or not at all."""
+    down = 40e-3 - exact(only_bed()).reshape(13, 13)[[round(6 + y / 3) for y in ROWS]][:, 4:9]
+    assert all(row.min() > 1e-3 or row.max() < 0.7e-3 for row in down), down
+    return [bool(row.min() > 1e-3) for row in down]
+
+
+def redone(clock: Clock) -> None:
+    bpy.ops.ed.redo()
+    clock.tick(handlers.STALE)
+
+
+def half_formed() -> bool:
+    return shown(only_bed()).min() < 39e-3
+
+
+WHEN: dict[str, Callable[[], object]] = {
+    "queued": lambda: True,
+    "begun": lambda: running.find(only_bed()).strokes[0].height is not None,
+    "half-formed": half_formed,
+}
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> Callable[[Clock, Callable[[], object]], None]:
+    """Wait for something on a machine that simulates a period in a tick; then it takes whole strokes."""
+
+    def wait(clock: Clock, holds: Callable[[], object]) -> None:
+        monkeypatch.setattr(live_session, "find_spare", lambda *given: 0.0)
+        clock.until(holds)
+        monkeypatch.setattr(live_session, "find_spare", lambda *given: 1e9)
+
+    return wait
+
+
+@pytest.mark.parametrize("when", WHEN)
+@pytest.mark.parametrize("how", ["a session", "at once"])
+def test_a_file_has_every_stroke_that_was_drawn(
+    bed: Any, clock: Clock, tmp_path: Path, slow: Any, when: str, how: str
+) -> None:
+    begin(bed)
+    stamp = {"brush": Brush.STAMP, "stamp": load_stamp("heart")}
+    for y, kind in zip(ROWS, ({}, {"images": make_images("X"), "accumulate": True}, stamp), strict=True):
+        draw(y, **kind)
+    slow(clock, WHEN[when])
+    path = str(tmp_path / "queue.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    form(clock)
+    formed = exact(bed)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert (exact(only_bed()) == 40e-3).all()  # nothing of it half
+    assert len(beds.read_queue(only_bed())[-1]) == 3
+    if how == "at once":
+        handlers.form_left()
+        assert running.list_sessions() == ()
+    else:
+        begin(only_bed())
+        form(clock)
+    np.testing.assert_array_equal(exact(only_bed()), formed)
+    np.testing.assert_allclose(shown(only_bed()), formed, rtol=0, atol=FLOAT32)
+    assert beds.read_queue(only_bed())[-1] == []
+
+
+@pytest.mark.parametrize("when", [*WHEN, "all formed"])
+def test_undo_takes_back_one_stroke_and_redo_brings_it_back(
+    bed: Any, clock: Clock, slow: Any, when: str
+) -> None:
+    begin(bed)
+    for y in ROWS:
+        draw(y)
+    form(clock) if when == "all formed" else slow(clock, WHEN[when])
+    for count in (2, 1, 0):
+        before = running.find(only_bed()).state.period
+        undone(clock)
+        if count == 2 and when == "half-formed":  # the first one goes on
+            assert running.find(only_bed()).state.period >= before
+        if when == "all formed":  # and none is formed once more
+            assert running.find(only_bed()).strokes == ()
+        form(clock)
+        assert rows() == [True] * count + [False] * (3 - count)
+    for count in (1, 2, 3):
+        redone(clock)
+        assert running.find(only_bed()).strokes == () or when != "all formed"
+        form(clock)
+        assert rows() == [True] * count + [False] * (3 - count)
+    gestures = [True] * 3
+    while any(gestures):  # Backspace takes back one at a time, in the order they were drawn
+        assert len(running.find(only_bed()).gestures) == sum(gestures)
+        bpy.ops.digiclay.session_rewind("EXEC_DEFAULT", True)
+        gestures[sum(gestures) - 1] = False
+        clock.tick()
+        assert rows() == gestures
+
+
+def test_undo_of_backspace_and_of_a_reset_brings_the_gestures_back(bed: Any, clock: Clock) -> None:
+    begin(bed)
+    for y in ROWS[:2]:
+        draw(y)
+        form(clock)
+    for step in ("rewind", "reset"):
+        getattr(bpy.ops.digiclay, f"session_{step}")("EXEC_DEFAULT", True)
+        undone(clock)
+        assert (rows(), len(running.find(only_bed()).gestures)) == ([True, True, False], 2)
+
+
+def test_without_a_session_undo_and_redo_leave_no_stroke_unformed(bed: Any, clock: Clock, slow: Any) -> None:
+    begin(bed)
+    draw(ROWS[0])
+    slow(clock, half_formed)
+    other = bpy.data.objects["Cube"]
+    other.location.x += 1.0
+    bpy.ops.ed.undo_push(message="Move")
+    form(clock)
+    handlers.end_all(handlers.STOPPED)
+    formed = exact(only_bed())
+    for step in (bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.redo):
+        step()
+        handlers.form_left()
+        # Pins settle by hundredths of a millimeter when the fingertip has left.
+        np.testing.assert_allclose(exact(only_bed()), formed, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(shown(only_bed()), exact(only_bed()), rtol=0, atol=FLOAT32)
+    for _ in range(3):
+        bpy.ops.ed.undo()
+    handlers.form_left()
+    np.testing.assert_allclose(shown(only_bed()), 40e-3, rtol=0, atol=FLOAT32)
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_session_that_is_stopped_keeps_strokes_for_the_next_one(
+    bed: Any, clock: Clock, slow: Any, stopped: bool
+) -> None:
+    begin(bed)
+    draw(ROWS[0])
+    draw(ROWS[2])
+    slow(clock, half_formed)
+    if stopped:
+        bpy.ops.digiclay.session_stop("EXEC_DEFAULT", True)
+        np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+        begin(bed)
+    form(clock)
+    assert rows() == [True, False, True]
+
+
+GOOD = '["LOWER", false, [[1, 0, 0, 1, 0, 0]], [[0, 0, 0.003, 1, [0, 0]]], null]'
+JUNK = {
+    "no JSON": "nothing", "another list": "[1, 2]", "no list": "7", "a nest": "[" * 100_000,
+    "an unknown brush": GOOD.replace("LOWER", "CARVE"), "no path": GOOD.replace("[[0, 0, 0.003", "[[0"),
+    "an empty path": GOOD.replace("[[0, 0, 0.003, 1, [0, 0]]]", "[]"),
+    "far away": GOOD.replace("[[0", "[[1e9"),
+    "not finite": GOOD.replace("[[0, 0", "[[NaN, 0"), "too deep": GOOD.replace("0.003", "300"),
+    "a number too few": GOOD.replace("0.003, 1, ", "0.003, "), "a text": GOOD.replace("0.003", '"0.003"'),
+    "a stamp of nothing": GOOD.replace("null", '["x", []]'), "half a stamp": GOOD.replace("null", "[]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("junk", JUNK.values(), ids=JUNK)
+def test_a_stroke_somebody_has_broken_is_left_out_with_a_message(bed: Any, clock: Clock, junk: str) -> None:
+    bed[beds.QUEUE] = json.dumps([0, [], [GOOD, junk]])
+    notes = tick.start(bpy.context, bed)
+    assert [(note.level, "left out" in note.message) for note in notes] == [("WARNING", True)]
+    assert len(running.find(bed).strokes) == 1
+    form(clock)
+    assert exact(bed).min() < 39e-3
+
+
+@pytest.mark.parametrize(
+    "junk", ["nothing", "[]", '["a", [], []]', "[0, 7, 7]", "[1e999, [], []]", 7, b"x", [1.0]]
+)
+def test_a_queue_somebody_has_broken_is_none(bed: Any, junk: Any) -> None:
+    bed[beds.QUEUE] = junk
+    started(bed)
+    assert running.find(bed).strokes == ()
