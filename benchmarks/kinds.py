@@ -11,7 +11,7 @@ from typing import Any
 
 from digiclay.commands.arguments import Help, Options, add_command, add_options, add_scene, whole_number
 from digiclay.commands.parser import Parser
-from digiclay.commands.stop import refuse_unwritable, refuse_without, refuse_without_blender
+from digiclay.commands.stop import FAILED, refuse_unwritable, refuse_without, refuse_without_blender
 from digiclay.core.base.errors import OutputError
 
 from .report import Report, Steps
@@ -129,6 +129,11 @@ BENCHMARKS = {
         ("--quick", "--python other/bin/python --out results"),
         {"--python FILE": {"action": "append", "default": [], "help": "also this Python, with its numpy"}},
     ),
+    "figures": Benchmark(
+        "figures.measure", "figures of the pages beside those of now; exit code 1 where one is stale",
+        ("", "docs/accuracy.md --quick"),
+        {"page PAGE": {"nargs": "?", "help": "one page; default: all"}},
+    ),
     "commits": Benchmark(
         "processes.measure_commits", "time of a control period at two commits",
         ("v0.1.0", "v0.1.0 main --turns 9"),
@@ -178,9 +183,10 @@ def run(name: str, arguments: argparse.Namespace) -> int:
     measure: Any = getattr(import_module(f"{__package__}.{module}"), function)
     with Steps(io.StringIO() if arguments.quiet else sys.stderr, name) as steps:
         reports: Report | list[Report] = measure(arguments, steps)
-    for report in reports if isinstance(reports, list) else [reports]:
+    reports = reports if isinstance(reports, list) else [reports]
+    for report in reports:
         text = report.text(benchmark.needs)
         print(text)
         if arguments.out is not None:
             report.write(arguments.out, report.name or name, text)
-    return 0
+    return FAILED if any(report.failed for report in reports) else 0

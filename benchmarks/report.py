@@ -110,6 +110,8 @@ class Report:
     """Of the figure, inches."""
     name: str = ""
     """Of the files; by default that of the benchmark."""
+    failed: bool = False
+    """Whether the exit code is 1."""
 
     def text(self, package: str = "") -> str:
         """Return versions, that of a package included, machine and lines."""

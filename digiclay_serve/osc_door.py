@@ -76,6 +76,7 @@ def format_osc_frame(frame: Frame, part: str) -> list[bytes]:
     state = (frame.period, frame.number, frame.time, frame.total_force, *frame.pose.tolist())
     datagrams = [
         format_osc("flags", "hi", frame.period, frame.flags),
+        *([format_osc("errors", "hdd", frame.period, *frame.errors)] if frame.errors else []),
         format_osc("state", "hh" + 9 * "d", *state),
     ]
     if frame.fingers:

@@ -60,6 +60,8 @@ BODY = struct.Struct("<QII9d")
 POSITION = struct.Struct("<7d")
 #: Identity, force and pose of a finger in a frame.
 FINGER = struct.Struct("<q8d")
+#: Estimated errors at the end of a frame, that of a height and of a pin's force; NaN: not estimated.
+ERRORS = struct.Struct("<2d")
 #: Most fingers of a session.
 MOST_FINGERS = 32
 #: No request is larger, bytes.
@@ -191,6 +193,8 @@ class Frame:
     flags: int = 0
     #: Identity, -1 for none, force, N, and pose (7,) of each of several fingertips.
     fingers: tuple[tuple[int, float, tuple[float, ...]], ...] = ()
+    #: Estimated errors of the session so far: of a height, m, and of a pin's force, N; None: not yet.
+    errors: tuple[float, float] | None = None
 
 
 def check_pose(values: Sequence[object]) -> tuple[float, ...]:
@@ -321,21 +325,26 @@ def pack_frame(frame: Frame) -> bytes:
     body = BODY.pack(*head, *frame.pose.tolist())
     pins = (np.asarray(values, "<f4").tobytes() for values in (frame.heights, frame.forces))
     fingers = (FINGER.pack(identity, force, *pose) for identity, force, pose in frame.fingers)
-    return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins, *fingers])
+    errors = ERRORS.pack(*(frame.errors or (math.nan, math.nan)))
+    return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins, *fingers, errors])
 
 
 def unpack_frame(data: bytes) -> Frame:
-    """Read a frame in binary. Raises ParameterError when it is none."""
+    """Read a frame in binary, of an older server too. Raises ParameterError when it is none."""
     start = HEAD.size + BODY.size
     mark, version, kind, pins = HEAD.unpack_from(data) if len(data) >= start else (b"", 0, 0, 0)
     end = start + 8 * pins
-    if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) < end or (len(data) - end) % FINGER.size:
+    last = len(data) - (len(data) - end) % FINGER.size
+    whole = len(data) >= end and len(data) - last in (0, ERRORS.size)
+    if (mark, version, kind) != (MARK, VERSION, STATE) or not whole:
         rule = f"must be a state, kind {STATE} of version {VERSION}"
         raise ParameterError("frame", "", rule, f"kind {kind} of {len(data)} bytes")
     period, number, flags, time, force, *pose = BODY.unpack_from(data, HEAD.size)
     heights, forces = np.frombuffer(data, "<f4", 2 * pins, start).reshape(2, pins)
-    fingers = tuple((each[0], each[1], each[2:]) for each in FINGER.iter_unpack(data[end:]))
-    return Frame(period, number, time, force, np.array(pose), heights, forces, flags, fingers)
+    fingers = tuple((each[0], each[1], each[2:]) for each in FINGER.iter_unpack(data[end:last]))
+    height, each = ERRORS.unpack(data[last:]) if data[last:] else (math.nan, math.nan)
+    errors = None if math.isnan(height) else (height, each)
+    return Frame(period, number, time, force, np.array(pose), heights, forces, flags, fingers, errors)
 
 
 def name_flags(flags: int) -> list[str]:
@@ -359,6 +368,7 @@ def format_frame(frame: Frame) -> str:
         position=frame.pose[:3].tolist(), orientation=frame.pose[3:].tolist(),
         heights=frame.heights.tolist(), forces=frame.forces.tolist(), flags=name_flags(frame.flags),
         **({"fingers": fingers} if frame.fingers else {}),
+        **dict(zip(("height_error", "force_error"), frame.errors or (None, None), strict=True)),
     )  # fmt: skip
 
 

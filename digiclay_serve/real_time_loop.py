@@ -168,9 +168,17 @@ def run_session(
     figures = {
         "period": period, "periods": schedule.planned, "left_out": schedule.left_out,
         "missed": elapsed.count_above(period), "elapsed": elapsed.describe(), "processor": spent.describe(),
-        "lateness": lateness.describe(), "flagged": dict(flagged),
+        "lateness": lateness.describe(), "flagged": dict(flagged), **_find_effort(session),
     }  # fmt: skip
     return replace(session, recording=None), figures
+
+
+def _find_effort(session: Session) -> dict[str, Any]:
+    """Return simulated time, s, and errors since the last reset, as the metrics of a run have them."""
+    simulated = {"simulated": session.state.period * session.system.period}
+    if session.errors is None:
+        return {**simulated, "errors_absent": "not yet" if session.monitor else "the step cannot be halved"}
+    return simulated | {f"{name}_error": value for name, value in session.errors._asdict().items()}
 
 
 def _restart(session: Session, writer: PartWriter | None, room: int) -> Session:

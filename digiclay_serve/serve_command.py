@@ -15,6 +15,7 @@ from digiclay.commands.stop import Stop, refuse_unwritable, refuse_without
 from digiclay.core.base.addresses import describe_exposure
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import format_json, write_whole
+from digiclay.core.metrics.metric_table import describe_errors
 from digiclay.core.scene.scene_source import Setting
 
 from .doors import Doors
@@ -159,6 +160,7 @@ def _summary(figures: Mapping[str, Any]) -> Iterator[str]:
         f"{periods} control periods of {1e3 * period:g} ms: {figures['missed']} late ({missed:.4g} %), "
         f"{figures['left_out']} of them left out; {shares}"
     )
+    yield f"{figures['simulated']:.1f} s simulated since the last reset; {describe_errors(figures)}"
     counts = dict(sorted(figures["counts"].items()))
     flagged = {f"frames {name.replace('_', ' ')}": count for name, count in figures["flagged"].items()}
     for found in (flagged, counts):

@@ -26,7 +26,7 @@ from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_unde
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session import live_session, snapshot
+from digiclay.core.session import accuracy, live_session, snapshot
 from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 
@@ -78,10 +78,12 @@ class Session(live_session.LiveSession):
 
 def begin_session(scene: Scene, limits: Limits = LIMITS, tracking: Tracking = TRACKING) -> Session:
     """Begin a session at rest, its fingertips where the paths of the scene begin. Raises DigiclayError."""
-    return _begin_at_rest(scene, assemble(scene), limits, tracking)
+    return _begin_at_rest(scene, assemble(scene), limits, tracking, accuracy.start(scene))
 
 
-def _begin_at_rest(scene: Scene, system: System, limits: Limits, tracking: Tracking) -> Session:
+def _begin_at_rest(
+    scene: Scene, system: System, limits: Limits, tracking: Tracking, monitor: accuracy.ErrorMonitor | None
+) -> Session:
     """Return the session of a bed at rest; a fingertip in the place of another one is not there."""
     state = begin(system)
     first = sample_poses(scene.trajectories(), np.zeros(1))[0]
@@ -92,6 +94,7 @@ def _begin_at_rest(scene: Scene, system: System, limits: Limits, tracking: Track
     kept = live_session.Moment(0, snapshot.dump(system, state), poses)
     return Session(
         scene=scene, system=system, state=state, poses=poses, kept=kept, limits=limits, tracking=tracking,
+        monitor=monitor,
         tracks=begin_tracks(poses), relaxed=np.zeros((len(poses), _read_pulp(scene)[1].size)),
     )  # fmt: skip
 
@@ -215,7 +218,8 @@ def _limit_way(start: list[float], goal: list[float], most: float, clear: float)
 
 def reset(session: Session) -> Session:
     """Return the session with its bed at rest and its fingertip where it began; a recording ends."""
-    fresh = _begin_at_rest(session.scene, session.system, session.limits, session.tracking)
+    monitor = session.monitor and accuracy.reset(session.monitor)
+    fresh = _begin_at_rest(session.scene, session.system, session.limits, session.tracking, monitor)
     return replace(fresh, number=session.number, diverged=session.diverged)
 
 
@@ -243,7 +247,8 @@ def make_frame(session: Session, flags: int = 0) -> Frame:
     time = state.period * system.period
     rows = session.tracks.identities.tolist(), each.tolist(), map(tuple, session.poses.tolist())
     fingers = tuple(zip(*rows, strict=True)) if system.fingers > 1 else ()
-    return Frame(state.period, session.number, time, total, session.poses[0], *pins, flags, fingers)
+    errors = session.errors and (session.errors.height, session.errors.force)
+    return Frame(state.period, session.number, time, total, session.poses[0], *pins, flags, fingers, errors)
 
 
 #: Most parts that wait for the disk.

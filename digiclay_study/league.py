@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from statistics import fmean, median, stdev
 from typing import NamedTuple
 
-from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
+from digiclay.core.metrics.metric_table import ERRORS, METHOD, METRICS, Metric
 
 from .method_trials import LIMITS, RANDOM
 
@@ -23,15 +23,16 @@ MEANS = (
 )  # fmt: skip
 #: Measures of a league, in the order of its columns; those of `LIMITS` are speeds.
 MEASURES: dict[str, Metric] = {
-    name: METHOD.get(name) or METRICS.get(name) or Metric("m/s", "", name.replace("-", " "), "mm/s")
+    name: {**METRICS, **METHOD, **ERRORS}.get(name) or Metric("m/s", "", name.replace("-", " "), "mm/s")
     for name in (
         "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "ridge_unevenness", "ridge_unevenness_touch",
         "relief_rms", "max_total_force", "losses", "contact_loss_share", *LIMITS, "period_cost", "cost_ratio",
+        *ERRORS,
     )
 }  # fmt: skip
 #: Other measures over the trajectories: the largest, the number, and the usual one.
 REDUCED: dict[str, Callable[[list[float]], float]] = {
-    "max_total_force": max, "losses": sum, "period_cost": median,
+    "max_total_force": max, "losses": sum, "period_cost": median, **dict.fromkeys(ERRORS, max),
 }  # fmt: skip
 
 #: Method, trajectory and seed of a trial.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.quantity import find_nearest_name
-from digiclay.core.metrics.metric_table import METHOD, METRICS, Metric
+from digiclay.core.metrics.metric_table import ERRORS, METHOD, METRICS, Metric
 from digiclay.core.metrics.summary import compute_metrics, perceive
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.recorder import Recorder
@@ -177,6 +177,7 @@ def draw_drags(count: int) -> list[Drawn]:
 
 Record = dict[str, Any]
 Stopped = Callable[[], bool] | None
+Measure = Callable[[Scene, Stopped], Record | None]
 
 #: Groups of the random drags and of the paper's session.
 RANDOM, SESSION = "random", "session"
@@ -199,11 +200,11 @@ QUICK = ("ridge-25", "surface", "lift")
 
 #: Metrics of a trial.
 OUTCOMES: dict[str, Metric] = {
-    name: METHOD.get(name) or METRICS[name]
+    name: {**METRICS, **METHOD, **ERRORS}[name]
     for name in (
         "set_point", "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "lag_max", "ridge_unevenness",
         "ridge_unevenness_touch", "relief_rms", "relief_largest", "max_total_force", "contact_loss_share",
-        "losses", "speed_limit", "period_cost",
+        "losses", "speed_limit", "period_cost", *ERRORS,
     )
 }  # fmt: skip
 
@@ -230,33 +231,39 @@ def list_trajectories(groups: Sequence[str], drags: int) -> list[str]:
     return [name for group in groups for name in (random if group == RANDOM else [group])]
 
 
-def place_trial(scene: Scene, trajectory: str) -> tuple[Scene, Callable[[Scene, Stopped], Record | None]]:
-    """Return a scene with a trajectory, and what measures it."""
+def place_trial(scene: Scene, trajectory: str, *, errors: bool = False) -> tuple[Scene, Measure]:
+    """Return a scene with a trajectory, and what measures it, perhaps with estimates of its errors."""
+    measure = partial(measure_trial, errors=errors)
     if trajectory in LIMITS:
         way = LIMITS[trajectory]
         place_way(scene, way, HIGH)
         return scene, partial(search_limit, way=way)
     if trajectory in PHASES:
         placed, start, end = place_way(scene, *PHASES[trajectory])
-        return lift_off(placed), partial(measure_trial, phase=(start, end))
+        return lift_off(placed), partial(measure, phase=(start, end))
     recorded = replace(scene, recorder=Recorder())
     if trajectory == SESSION:
-        return recorded, measure_trial
+        return recorded, measure
     group, _, number = trajectory.partition("-")
     drawn = draw_drags(int(number))[-1] if group == RANDOM else (list_paths() | list_hands())[trajectory]
-    return lift_off(with_paths(recorded, *drawn)), measure_trial
+    return lift_off(with_paths(recorded, *drawn)), measure
 
 
 def measure_trial(
-    scene: Scene, stopped: Stopped = None, *, phase: tuple[float, float] | None = None
+    scene: Scene,
+    stopped: Stopped = None,
+    *,
+    errors: bool = False,
+    phase: tuple[float, float] | None = None,
 ) -> Record | None:
-    """Run a trial, and return its record; None after a stop."""
+    """Run a trial, and return its record, perhaps with estimates of its errors; None after a stop."""
     begun = time.thread_time()
     done = run(scene, stopped=stopped)
     spent = time.thread_time() - begun
-    if done.incomplete:
+    estimated = done.estimate_errors(stopped=stopped) if errors else done
+    if done.incomplete or estimated is None:
         return None
-    figures = dict(done.figures)
+    figures = {**done.figures, **{name: estimated.metrics.get(name) for name in ERRORS}}
     figures["losses"] = float(len(find_unintended_losses(done)))
     if phase is not None:
         judged, part = judge(done, *phase, 0.0), select_rows(done.history, *phase)

@@ -20,7 +20,7 @@ from digiclay.core.metrics.metric_table import ERRORS
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.studies import axes
-from digiclay.core.studies.evaluation import read_metrics
+from digiclay.core.studies.evaluation import judge_all, read_metrics
 from digiclay.core.studies.sweep_plan import Folder, format_table, hash_points, open_points
 
 #: Digits of a value: 0.3, and not 0.30000000000000004.
@@ -133,24 +133,20 @@ class Subject:
     names: tuple[str, ...]
 
     @property
-    def errors(self) -> bool:
-        """Whether errors of the integration are estimated."""
-        return any(name in ERRORS for name in self.names)
-
-    @property
     def keys(self) -> tuple[str, ...]:
         """The varied parameters."""
         return tuple(varied.key for varied in self.ranges)
 
     @property
     def unchanged(self) -> axes.Point:
-        """The unchanged scene."""
-        return axes.Point(UNCHANGED, (), self.scene)
+        """The unchanged scene, of which the errors are always estimated."""
+        return axes.Point(UNCHANGED, (), self.scene, errors=True)
 
     def make_points(self, shares: Floats, first: int, progress: Any = None) -> list[axes.Point]:
         """Return the points at shares (points, parameters) of the ranges. `first`: index of the first."""
         rows = [tuple(map(Range.find_word, self.ranges, row)) for row in shares]
-        return axes.place_points(self.path, self.settings, self.keys, rows, first=first, progress=progress)
+        points = axes.place_points(self.path, self.settings, self.keys, rows, first=first, progress=progress)
+        return judge_all(points) if any(name in ERRORS for name in self.names) else points
 
     def open_folder(self, path: Path, name: str, plan: Mapping[str, Any]) -> AbstractContextManager[Folder]:
         """Open the folder of a study or a tuning, see `open_points`. `plan`: what else points depend on."""

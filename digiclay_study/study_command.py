@@ -15,8 +15,8 @@ from digiclay.commands.stop import refuse_without
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
-from digiclay.core.studies.axes import Point, Record
-from digiclay.core.studies.evaluation import FIGURES, make_bundles
+from digiclay.core.studies.axes import Point, Record, find_ends
+from digiclay.core.studies.evaluation import FIGURES, describe_effort, make_bundles
 from digiclay.core.studies.sweep_plan import format_csv
 from digiclay.plots.sweep import read_unit
 
@@ -87,21 +87,20 @@ def carry_out(arguments: argparse.Namespace) -> int:
     with Counted(sys.stderr, "study", "points read", quiet=arguments.quiet) as bar:
         shares = sample_shares(arguments.samples, count, arguments.seed, second=second)
         points = subject.make_points(shares, 1, bar)
-        bundles = make_bundles(points, errors=subject.errors)
+        bundles = make_bundles(points)
 
     def evaluate(evaluation: Evaluation) -> None:
         if subject.evaluate_unchanged(evaluation, quiet=arguments.quiet):
             evaluation.finish(bundles.every, subject.keys)
+            if len(evaluation.records) == evaluation.total:
+                evaluation.judge(find_ends(points, subject.keys), subject.keys)
 
     def write(records: dict[int, Record]) -> list[str]:
         lines = _write(arguments, subject, points, records)
         return [*lines, *bundles.describe(), f"written to {arguments.out}: start with study.md"]
 
     opened = subject.open_folder(arguments.out, "study", plan)
-    return run_series(
-        arguments, "study", total + 1, opened, evaluate, write, errors=subject.errors,
-        pieces=len(bundles.every),
-    )  # fmt: skip
+    return run_series(arguments, "study", total + 1, opened, evaluate, write, pieces=len(bundles.every))
 
 
 def _write(
@@ -128,13 +127,13 @@ def _write(
         for name, response in responses.items()
     }
     unchanged = records[UNCHANGED]["figures"]
-    findings = Findings(arguments, subject, len(points), unchanged, responses, indices)
+    findings = Findings(arguments, subject, describe_effort(records), unchanged, responses, indices)
     out: Path = arguments.out
     subject.write_table(out / "points.csv", [subject.unchanged, *points], records, LOSS)
     write_whole(out / "indices.csv", format_index_table(findings).encode())
     save(draw_indices(subject.keys, indices, f"Sobol indices, {subject.scene.name}"), out / PICTURE)
     write_whole(out / "study.md", ("\n".join(list_page(findings)) + "\n").encode())
-    return [*_summarize(findings), *notes]
+    return [*_summarize(findings), *notes, findings.effort]
 
 
 def _format_call(arguments: argparse.Namespace, subject: Subject) -> str:
@@ -152,8 +151,8 @@ class Findings(NamedTuple):
 
     arguments: argparse.Namespace
     subject: Subject
-    #: Number of runs.
-    points: int
+    #: What `evaluation.describe_effort` says.
+    effort: str
     #: Outputs of the unchanged scene, None where it has none.
     unchanged: Mapping[str, float | None]
     responses: Mapping[str, Response]
@@ -203,8 +202,9 @@ def list_page(findings: Findings) -> Iterator[str]:
     yield f"# Sensitivity of {subject.scene.name}, digiclay {__version__}\n"
     yield f"    {_format_call(arguments, subject)}\n"
     yield (
-        f"{findings.points} runs: {arguments.samples} samples of Saltelli's design, seed {arguments.seed}. "
-        "All values of a range are equally likely; on a logarithmic scale, equal ratios are.\n"
+        f"{arguments.samples} samples of Saltelli's design, seed {arguments.seed}. "
+        "All values of a range are equally likely; on a logarithmic scale, equal ratios are. "
+        f"With the unchanged scene, {findings.effort}.\n"
     )
     yield from _list_table(("parameter", "range"), [(f"`{each.key}`", each) for each in subject.ranges], 2)
     yield "\n## Outputs\n"

@@ -106,7 +106,7 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
     points: list[Point] = []
     for (method, seed), scene in scenes.items():
         for name in trajectories:
-            placed, measure = place_trial(scene, name)
+            placed, measure = place_trial(scene, name, errors=seed == first)
             points.append(Point(len(points), (method, name, str(seed)), placed, measure=measure))
     strength = sensors.force_noise if sensors else 0.0
     title = find_name(path)

@@ -14,10 +14,11 @@ from digiclay import __version__
 from digiclay.commands.gallery import make_links, make_table, wrap
 from digiclay.commands.progress import table as aligned
 from digiclay.core.studies.axes import Point, Record
+from digiclay.core.studies.speed_limits import describe_end
 from digiclay.core.studies.sweep_plan import format_csv
 
 from .league import KIND, MEASURES, Interval, Row, Table, find_interval, list_values, show_digits
-from .method_trials import LIMITS, LOW, OUTCOMES
+from .method_trials import HIGH, LIMITS, LOW, OUTCOMES
 
 
 def describe_machine(*packages: str) -> str:
@@ -39,7 +40,10 @@ def _processor() -> str:
 #: Columns of the table in a terminal.
 PRINTED = (
     "rfd", "lag_mean", "ridge_unevenness", "relief_rms", "max_total_force", "losses", *LIMITS, "cost_ratio",
+    "height_error", "force_error",
 )  # fmt: skip
+#: Where errors are estimated.
+JUDGED = "Errors: the largest of the trials with the first seed, estimated, but for speed limits."
 #: Heading of the last column of the league.
 WORSE = "RFD greater on"
 #: Measures of the table of trajectories on the page.
@@ -156,7 +160,7 @@ def print_league(league: Sequence[Row]) -> list[str]:
     """Return the lines of the league for a terminal."""
     names = [name for name in MEASURES if name in PRINTED]
     titles = [f"{MEASURES[name].label} {MEASURES[name].shown}".strip() for name in names]
-    return list(aligned(("method", *titles, WORSE), [_list_cells(row, names) for row in league]))
+    return [*aligned(("method", *titles, WORSE), [_list_cells(row, names) for row in league]), JUDGED]
 
 
 def format_page(
@@ -174,8 +178,8 @@ def format_page(
         ),
         f"<p>Means over the trajectories, the random drags together as one; ± {escape(KIND)}. Of several "
         "fingers the worst. Largest force: of all trajectories. Losses: sum. Cost: processor time, median; "
-        f"ratio to {first}. Last column: trajectories with a greater mean RFD than {first}. JND: just "
-        "noticeable differences of the set point.</p>",
+        f"ratio to {first}. {JUDGED} Last column: trajectories with a greater mean RFD than {first}. "
+        "JND: just noticeable differences of the set point.</p>",
         *(f'<p><img alt="{name}" src="{name}"></p>' for name in pictures),
     ]
     for name in SHOWN:
@@ -195,12 +199,13 @@ def format_page(
 
 
 def _list_cells(row: Row, names: Sequence[str]) -> list[str]:
-    """Return a row of the league; a largest speed that was not found is below the slowest tried."""
+    """Return a row of the league; a largest speed may be an end of its search."""
     cells = [row.method]
     for name in names:
         factor = MEASURES[name].factor
-        below = row.measures[name] is None and name in row.searched
-        cells.append(f"below {LOW * factor:g}" if below else _format(row.measures[name], factor))
+        found = row.measures[name]
+        end = describe_end(found and found.mean, LOW, HIGH) if name in row.searched else ""
+        cells.append(end or _format(found, factor))
     return [*cells, "–" if row.worse is None else f"{row.worse} of {row.trajectories}"]
 
 

@@ -16,8 +16,8 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.scene.toml_table import format_scene
-from digiclay.core.studies.axes import Point, Record
-from digiclay.core.studies.evaluation import FIGURES, find_figure, make_bundles
+from digiclay.core.studies.axes import Point, Record, find_ends
+from digiclay.core.studies.evaluation import FIGURES, describe_effort, find_figure, make_bundles
 from digiclay.plots.sweep import read_unit
 from numpy.typing import NDArray
 
@@ -67,11 +67,16 @@ def carry_out(arguments: argparse.Namespace) -> int:
     def write(records: dict[int, Record]) -> list[str]:
         return [*_write(arguments, subject, points, records, choice), f"written to {arguments.out}"]
 
-    return run_series(
-        arguments, "tune", total, subject.open_folder(arguments.out, "tuning", plan),
-        lambda evaluation: _evolve(arguments, subject, evaluation, points), write, errors=subject.errors,
-        pieces=-(-arguments.population // 4),
-    )  # fmt: skip
+    def evaluate(evaluation: Evaluation) -> None:
+        _evolve(arguments, subject, evaluation, points)
+        if len(points) + 1 == total:
+            found = find_outcome(subject, points, evaluation.collect(), choice)
+            ends = [found.every[index] for index in {found.front[0], found.front[-1], found.chosen}]
+            evaluation.judge([*find_ends(points, subject.keys), *ends], subject.keys)
+
+    opened = subject.open_folder(arguments.out, "tuning", plan)
+    pieces = -(-arguments.population // 4)
+    return run_series(arguments, "tune", total, opened, evaluate, write, pieces=pieces)
 
 
 def _read_choice(word: str, names: Sequence[str]) -> str:
@@ -94,7 +99,7 @@ def _evolve(
     while True:
         points = subject.make_points(shares, len(done) + 1)
         _refuse_others(evaluation.folder.path, subject, points, evaluation.records)
-        evaluation.finish(make_bundles(points, errors=subject.errors).every, subject.keys)
+        evaluation.finish(make_bundles(points).every, subject.keys)
         records = evaluation.collect()
         if lost := evaluation.failed.keys() - evaluation.records.keys():
             why = evaluation.failed[min(lost)]["error"]
@@ -131,12 +136,7 @@ def _write(
 
     from .study_plots import draw_front
 
-    every = [subject.unchanged, *points]
-    trials = judge_trials(subject.names, [records[point.index] for point in every], records[UNCHANGED])
-    front = trials.find_front()
-    knee = find_knee(trials.values[front])
-    least = {name: int(np.argmin(trials.values[front, i])) for i, name in enumerate(subject.names)}
-    chosen = int(front[{KNEE: knee, **least}[choice]])
+    every, trials, front, chosen = find_outcome(subject, points, records, choice)
     out: Path = arguments.out
     subject.write_table(out / "points.csv", every, records)
     subject.write_table(out / "front.csv", [every[index] for index in front], records)
@@ -161,6 +161,7 @@ def _write(
         f"{len(points)} runs, {lost} of them failed or lost the fingertip; on the front: {len(front)}",
         f"unchanged scene: {own}; better in both: {np.count_nonzero(worse)} of the front",
         f"chosen ({choice}): {outputs}; {values or 'the unchanged scene'}",
+        describe_effort(records),
     ]
 
 
@@ -225,6 +226,27 @@ class Trials(NamedTuple):
         if not front.size:
             raise OutputError("No run has both metrics without losing the fingertip: there is no front.")
         return front
+
+
+class Outcome(NamedTuple):
+    """Outcome of a tuning: all points, the unchanged scene first, their outputs, and places in the list."""
+
+    every: Sequence[Point]
+    trials: Trials
+    front: NDArray[np.intp]
+    chosen: int
+
+
+def find_outcome(
+    subject: Subject, points: Sequence[Point], records: Mapping[int, Record], choice: str
+) -> Outcome:
+    """Return the outcome of points that are done. `choice`: a metric, or the knee of the front."""
+    every = [subject.unchanged, *points]
+    trials = judge_trials(subject.names, [records[point.index] for point in every], records[UNCHANGED])
+    front = trials.find_front()
+    knee = find_knee(trials.values[front])
+    least = {name: int(np.argmin(trials.values[front, i])) for i, name in enumerate(subject.names)}
+    return Outcome(every, trials, front, int(front[{KNEE: knee, **least}[choice]]))
 
 
 def judge_trials(names: Sequence[str], records: Sequence[Record], reference: Record) -> Trials:

@@ -37,6 +37,11 @@ def folder_with(scene: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     return folder
 
 
+def timeless(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table without the run times, which are others each time."""
+    return [{name: text for name, text in row.items() if name != "run_time (s)"} for row in rows(path)]
+
+
 def left(folder: Path) -> list[str]:
     """Return what lies in the folder besides the scene, hidden things too."""
     return sorted(path.name for path in folder.iterdir() if path.name != "my.toml")

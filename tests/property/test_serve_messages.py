@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,15 +46,28 @@ def test_a_pose_is_read_as_it_was_written_in_both_formats(values: list[float], n
     assert math.hypot(*wanted.pose[3:]) == pytest.approx(1.0)
 
 
+who = st.lists(whole | st.just(-1), max_size=32)
+
+
 @given(
-    st.builds(frame_of, poses, heights, st.integers(0, 2**31 - 1), st.lists(whole | st.just(-1), max_size=32))
+    st.builds(frame_of, poses, heights, st.integers(0, 2**31 - 1), who),
+    st.none() | st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1e300)),
 )
-def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: protocol.Frame) -> None:
+def test_a_frame_is_read_as_it_was_written_in_all_formats(
+    frame: protocol.Frame, errors: tuple[float, float] | None
+) -> None:
+    packed = protocol.pack_frame(frame)
+    older = protocol.unpack_frame(packed[: -protocol.ERRORS.size])  # of a server that knew no errors
+    assert (older.errors, older.fingers, older.time) == (None, frame.fingers, frame.time)
+    frame = replace(frame, errors=errors)
     read = protocol.unpack_frame(protocol.pack_frame(frame))
+    assert read.errors == errors
     said = json.loads(protocol.format_frame(frame))
     datagrams = [OscMessage(one) for one in format_osc_frame(frame, "pins")]
     told = {one.address.removeprefix("/digiclay/"): one.params for one in datagrams}
     assert next(iter(told.items())) == ("flags", [2**40, frame.flags]) == ("flags", [2**40, read.flags])
+    assert (said["height_error"], said["force_error"]) == (errors or (None, None))
+    assert told.get("errors", [2**40])[1:] == list(errors or ())
     there = [finger for finger in frame.fingers if finger[0] >= 0]  # -1: nobody has it
     assert read.fingers == frame.fingers
     assert told.get("fingers", [2**40])[1:] == [

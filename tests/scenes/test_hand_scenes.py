@@ -19,7 +19,7 @@ from digiclay.core.studies.omissions import propose_omissions
 from digiclay.plugins.method_loader import load_method
 
 from tests.own_methods import COPY, PAD, PLACED, forgotten, small, write_method
-from tests.scene_files import folder_with, rows
+from tests.scene_files import folder_with, rows, timeless
 
 WAY = """trajectory.waypoints = [
   {{ time = 0, position = [{0}, 0, 0.041] }}, {{ time = 0.1, position = [{0}, 0, 0.038] }}]
@@ -146,7 +146,7 @@ def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(tmp_path, 
     for count in "12":
         assert main([*GAINS[:-1], "--out", count, "--workers", count]) == 0
     assert "4 points one at a time: they do not have a single finger" in capsys.readouterr().out
-    assert (folder / "1" / "sweep.csv").read_bytes() == (folder / "2" / "sweep.csv").read_bytes()
+    assert timeless(folder / "1" / "sweep.csv") == timeless(folder / "2" / "sweep.csv")
     assert main(["run", "my.toml", "--set", "control.force_gain=4", "--out", "run", "--quiet"]) == 0
     metrics = json.loads((folder / "run" / "metrics.json").read_text(encoding="utf-8"))
     assert float(rows(folder / "1" / "sweep.csv")[1]["rfd (N)"]) == metrics["rfd"]

@@ -18,7 +18,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, recent_trace, snapshot
-from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
+from digiclay.core.session.accuracy import PAUSE, SHARE, SPREAD, STRETCH, Errors
 from digiclay.core.session.live_session import (
     LEAST,
     RELEASED,
@@ -271,6 +271,28 @@ def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_o
     # Second order: a quarter of the step has a sixteenth of the error, contact events aside.
     assert fine.height < found.height / 8
     assert fine.force < found.force / 8
+
+
+def test_what_a_stretch_left_wrong_stays_in_the_errors_of_the_session() -> None:
+    # A tap within the first stretch, then a rest: the pins keep what was wrong when they were left.
+    scene = resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"stepper": "heun"}})
+    down, up = (
+        interpolate_path(*ends, 8) for ends in ((pose(), pose(z=0.037)), (pose(z=0.037), pose(z=0.05)))
+    )
+    rest = np.repeat(up[-1:], 2 * (STRETCH + PAUSE) + STRETCH * SPREAD, axis=0)
+    finger = np.concatenate([down, up[1:], rest])
+    system, monitor, found = assemble(scene), accuracy.start(scene), []
+    start = begin(system)
+    monitor = accuracy.begin_stretch(monitor, start)
+    for index, state in enumerate(simulate_path(system, start, finger)):
+        monitor = accuracy.note(monitor, state, finger[index : index + 2])
+        monitor, errors = accuracy.catch_up(monitor, state, 1)
+        found += [(errors.height, np.abs(monitor.carried).max())] if errors else []
+    (first, left), *_, (last, still) = found
+    assert len(found) == 3
+    assert first >= SHARE * left > 1e-7
+    assert last >= first
+    assert still == pytest.approx(left, rel=0.1)
 
 
 def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alone():

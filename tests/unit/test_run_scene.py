@@ -63,7 +63,11 @@ def test_the_same_scene_gives_the_same_history_bit_for_bit_or_less_of_it(result:
     thinned = run(scene(recorder={"every": 4})).history
     assert np.array_equal(thinned["height"], result.history["height"][::4])
     assert run(scene(recorder="absent")).history == {}
-    assert run(scene(fingertip="absent")).summary().endswith("real time), no contact")
+    assert (
+        run(scene(fingertip="absent"))
+        .summary()
+        .endswith("real time), no contact, errors not estimated (not asked for)")
+    )
 
 
 def test_without_control_no_force_is_deviated_from_and_what_fits_into_no_memory_is_refused() -> None:
@@ -81,8 +85,27 @@ def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
         result.scene, result.history, 40, 0.05, {**result.metrics, "rfd": 0.0612, "beyond_a_finger": ""}
     )
     made.metrics.update(simulated=26.0, real_time_factor=21.6, rfd_jnd_least=0.567, rfd_jnd_most=1.02)
-    made = Result(made.scene, made.history, 40, 1.204, made.metrics)
-    assert made.summary() == "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N (0.57 to 1 JND)"
+    made.metrics.update(run_time=1.204, height_error=1.2e-6, force_error=7e-4)
+    assert made.summary() == (
+        "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N (0.57 to 1 JND), "
+        "height error about 1.2 µm, force error about 0.7 mN"
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"recorder": {"every": 2}}, "recorder.every = 2 leaves out commands"),
+        ({"recorder": "absent"}, "recorder = 'absent' keeps no command"),
+        ({"simulation": {"physics_step": "5 us"}}, "physics_step is too short to be halved"),
+    ],
+)
+def test_a_run_whose_errors_cannot_be_estimated_says_why(changed: dict[str, Any], why: str) -> None:
+    known = run(scene(**changed)).estimate_errors()
+    assert known is not None
+    assert "height_error" not in known.metrics
+    assert why in known.metrics["errors_absent"]
+    assert f"errors not estimated ({known.metrics['errors_absent']})" in known.summary()
 
 
 @pytest.mark.parametrize(("speed", "said"), [(24e-3, ", lost once, 0.99 s"), (26e-3, ""), (5e-3, "")])

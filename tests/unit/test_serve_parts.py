@@ -10,13 +10,23 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError
+from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, from_bytes, make_take, replay
 
 from digiclay_serve.doors import Doors, Order, make_slot, open_slot, pack_order, unpack_order
-from digiclay_serve.protocol import LIMITS, VARIABLE, Flag, Limits, choose_token, is_token, unpack_frame
+from digiclay_serve.protocol import (
+    LIMITS,
+    VARIABLE,
+    Flag,
+    Limits,
+    choose_token,
+    is_token,
+    pack_frame,
+    unpack_frame,
+)
 from digiclay_serve.real_time_loop import Schedule, TimeCounts, run_session
 from digiclay_serve.served_session import (
     PartWriter,
@@ -102,6 +112,21 @@ def test_a_new_pose_begins_its_period_early_by_one_at_most(restless: bool) -> No
     assert any(time - doors.asked < (period - 1) * LONG for period, time in shown) == restless
     # Judged from its own beginning: what begins early has no time to spare.
     assert figures["elapsed"]["p50"] > 0.0
+
+
+def test_frames_and_report_have_the_errors_since_the_last_reset() -> None:
+    session = begin_session(resolve({**SMALL, "trajectory": WAIT}))
+    told = [make_frame(session).errors]
+    for number in range(1, 120):
+        targets = np.array([[0.0, 0.0, max(0.036, 0.041 - number * 2e-4), *LEVEL]])
+        session = follow(session, targets, number, 1)
+        told.append(make_frame(session).errors)
+    assert told[0] is None
+    assert told[-1] is not None
+    assert 1e-9 < told[-1][0] < 1e-4
+    assert unpack_frame(pack_frame(make_frame(session))).errors == told[-1]
+    fresh = reset(session)
+    assert (make_frame(fresh).errors, fresh.monitor is None) == (None, False)
 
 
 def test_shares_of_times_are_those_of_the_sorted_times() -> None:

@@ -12,7 +12,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.point_series import Range, fit_ranges, read_range
-from tests.scene_files import SCENE, rows
+from tests.scene_files import SCENE, rows, timeless
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
@@ -33,9 +33,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    texts = ("points.csv", "indices.csv", "study.json")
-    return {name: (folder / name).read_bytes() for name in texts}
+def files(folder: Path) -> dict[str, Any]:
+    texts = ("indices.csv", "study.json")
+    return {name: (folder / name).read_bytes() for name in texts} | {
+        "points": timeless(folder / "points.csv")
+    }
 
 
 def test_a_study_leaves_tables_a_page_and_a_plot_and_every_point_is_the_run_with_its_settings(whole):
@@ -56,6 +58,8 @@ def test_a_study_leaves_tables_a_page_and_a_plot_and_every_point_is_the_run_with
     assert "| `control.position_gain` | 100 to 1000, log |" in page
     assert "| `rfd` | N |" in page
     assert (page.count("± "), page.count("It does not vary.")) == (2 * 5 + 1, 1)
+    assert "49 runs took " in page
+    assert "of 49 points: 0, " in page
     found = rows(whole / "points.csv")
     assert len(found) == 1 + 8 * 6
     for row, settings in (

@@ -64,9 +64,13 @@ def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_se
     ]
     assert all(row["error"] == "" and float(row["period_cost (s)"]) > 0.0 for row in rows)
     assert len({row["rfd (N)"] for row in rows}) == 4
+    # Errors are estimated with the first seed; the league has the largest.
+    assert [row["height_error (m)"] != "" for row in rows] == [True, False] * 2
+    errors = {row["method"]: float(row["height_error (m)"]) for row in rows if row["height_error (m)"]}
     # The league holds means and Student's intervals of the results.
     _, ranks = read_table(league / "league.csv")
     assert [row["rank"] for row in ranks] == ["1", "2"]
+    assert {row["method"]: float(row["height_error (m)"]) for row in ranks} == errors
     assert float(ranks[0]["rfd (N)"]) <= float(ranks[1]["rfd (N)"])
     for row in ranks:
         values = [float(one["rfd (N)"]) for one in rows if one["method"] == row["method"]]

@@ -13,7 +13,7 @@ from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.tune_command import find_front, find_knee
-from tests.scene_files import SMALL_BLISTER, interrupt_after, rows
+from tests.scene_files import SMALL_BLISTER, interrupt_after, rows, timeless
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
@@ -53,9 +53,9 @@ def values(path: Path) -> Any:
     return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    names = ("points.csv", "front.csv", "chosen.toml", "tuning.json")
-    return {name: (folder / name).read_bytes() for name in names}
+def files(folder: Path) -> dict[str, Any]:
+    texts = {name: (folder / name).read_bytes() for name in ("chosen.toml", "tuning.json")}
+    return texts | {name: timeless(folder / name) for name in ("points.csv", "front.csv")}
 
 
 def test_a_tuning_leaves_tables_a_plot_and_a_scene_that_gives_the_same_metrics(whole: Path) -> None:

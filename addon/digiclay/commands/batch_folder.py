@@ -11,7 +11,7 @@ from typing import Any
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files import run_folder
-from ..core.metrics.metric_table import ERRORS, METRICS, RUN
+from ..core.metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series
@@ -132,7 +132,11 @@ class Folder:
                 for name, fact in FACTS.items()
             ),
             ("not to be trusted", metrics.get("beyond_a_finger", "")),
-            ("errors", metrics.get("errors_in_doubt", "")),
+            (
+                "errors",
+                metrics.get("errors_in_doubt")
+                or ("" if "height_error" in metrics else describe_errors(metrics)),
+            ),
             ("start of its process", _format(timing.get("start_up"), 1.0, "s")),
             ("whole job", format_duration(took)),
         ]

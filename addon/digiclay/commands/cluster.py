@@ -60,11 +60,11 @@ def call_on_worker(packed: bytes, wanted: Versions) -> Any:
     return task(*arguments, **named)
 
 
-def evaluate_on_worker(bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
+def evaluate_on_worker(bundle: Sequence[Point]) -> list[Record | None]:
     """Evaluate a bundle in a task of a Dask worker, until its records are not wanted any more."""
     from distributed import Reschedule
 
-    records = evaluate_bundle(bundle, _watch_task(), errors=errors)
+    records = evaluate_bundle(bundle, _watch_task())
     if any(record is None for record in records):
         raise Reschedule
     return records

@@ -16,7 +16,7 @@ from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
 from ..core.files.run_folder import MARK, find_name, format_json, write_whole
-from ..core.metrics.metric_table import SPEEDS
+from ..core.metrics.metric_table import ERRORS, SPEEDS, describe_errors
 from ..core.metrics.summary import find_worst_finger, sum_cells
 from ..core.model.control_interface import find_set_point
 from ..core.scene.recorder import Recorder
@@ -24,7 +24,7 @@ from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import RUN_METRICS, run
 from ..core.studies.axes import Point, Record
-from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
+from ..core.studies.speed_limits import HIGH, LOW, Criterion, Drag, Lift, describe_end, find_largest_speed
 from ..core.studies.sweep_plan import Folder, hash_points, open_points
 from ..plugins.method_loader import find_installed, is_file_word
 from .arguments import METHOD, QUIET, add_scene, command, load_by_option, say, settings_of
@@ -49,6 +49,8 @@ hold points/, a small file for each finished method or trial: after Ctrl-C the s
 #: Units people read: factor and name.
 READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, "")}
 Metrics = dict[str, float | None]
+#: Rows of the table.
+FIGURES = {**RUN_METRICS, **ERRORS, **SPEEDS}
 #: Figures and notes of a record.
 NOTED = ("figures", "beyond_a_finger")
 #: Methods where none are named.
@@ -169,11 +171,15 @@ def _measure(point: Point, arguments: argparse.Namespace) -> Record:
     assert scene is not None  # values go together, or nothing was begun
     with Bar(sys.stderr, method, scene.simulation.control_period, quiet=arguments.quiet) as bar:
         done = run(scene, progress=bar)
+    with Bar(sys.stderr, "errors", scene.simulation.control_period, quiet=arguments.quiet) as bar:
+        done = done.estimate_errors(bar) or done
+    speeds, absent = _speeds(scene) if arguments.speed else ({}, [])
     worst = find_worst_finger(done.history, scene.set_point)
     wanted = find_set_point(scene.set_point, sum_cells(worst).following)
     asked = np.where(np.isnan(wanted), None, wanted)  # type: ignore[call-overload]  # JSON has no NaN
     return {
-        "figures": done.figures | (_speeds(scene) if arguments.speed else {}),
+        "figures": done.figures | {name: done.metrics.get(name) for name in ERRORS} | speeds,
+        "absent": [*absent, *([describe_errors(done.metrics)] if "height_error" not in done.metrics else [])],
         "forces": [worst["time"].tolist(), worst["total_force"].tolist(), asked.tolist()],
         "beyond_a_finger": done.metrics.get("beyond_a_finger", ""),
         "fingers": done.metrics.get("fingers"),
@@ -187,7 +193,7 @@ def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool)
 
     several = len(scene.fingers) > 1
     measured, beyond = ({name: each[key] for name, each in every.items()} for key in NOTED)
-    units = {name: metric.unit for name, metric in {**RUN_METRICS, **SPEEDS}.items()}
+    units = {name: metric.unit for name, metric in FIGURES.items()}
     content = {"scene": scene.name, "methods": measured, "units": units, "beyond_a_finger": beyond}
     if several:
         content["fingers"] = {name: each["fingers"] for name, each in every.items()}
@@ -197,7 +203,10 @@ def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool)
     save(comparison(measured, forces, scene.name, called), out / "compare.png")
     notes = [f"{method}: {words}" for method, words in beyond.items() if words]
     alone = ", the first of the fingers alone" if several else ""
-    notes += [f"Followed{alone}: {Criterion()}."] if speed else []
+    if speed:
+        ends = f"searched from {LOW * 1e3:g} to {HIGH * 1e3:g} mm/s"
+        notes.append(f"Followed{alone}, {ends}: {Criterion()}.")
+    notes += dict.fromkeys(why for each in every.values() for why in each.get("absent", ()))
     notes += [f"Of {len(scene.fingers)} fingers the worst; metrics.json has each."] if several else []
     return [*notes, f"written to {out}"]
 
@@ -213,25 +222,31 @@ def _list_methods(words: Sequence[tuple[str, str]]) -> list[str]:
     return list(dict.fromkeys(load_by_option(word, option) for word, option in words))
 
 
-def _speeds(scene: Scene) -> Metrics:
-    """Measure the largest speeds; None where the slowest is too fast, or the bed too small."""
+def _speeds(scene: Scene) -> tuple[Metrics, list[str]]:
+    """Measure the largest speeds, None where the slowest is too fast; return why others are absent too."""
     measured: Metrics = {}
+    absent = []
     ways: tuple[Drag | Lift, ...] = Drag(), Lift()
     for name, way in zip(SPEEDS, ways, strict=True):
         try:
             measured[name] = find_largest_speed(scene, way, Criterion())
-        except ParameterError:
-            measured[name] = None
-    return measured
+        except ParameterError as error:
+            absent.append(f"{name}: not measured, {error}")
+    return measured, absent
 
 
 def table(measured: dict[str, Metrics]) -> Iterator[str]:
     """Give the lines of the table: a metric a line, a method a column, units people read."""
-    metrics, columns = {**RUN_METRICS, **SPEEDS}, list(measured)
-    names = [name for name in metrics if name in measured[columns[0]]]
+
+    def write(name: str, value: float | None, factor: float) -> str:
+        end = describe_end(value) if name in SPEEDS else ""
+        return end or ("–" if value is None else f"{value * factor:.4g}")
+
     rows = []
-    for name in names:
-        factor, unit = READ.get(metrics[name].unit, (1.0, metrics[name].unit))
-        values = (measured[method][name] for method in columns)
-        rows.append([name, unit, *("–" if value is None else f"{value * factor:.4g}" for value in values)])
-    yield from aligned(("metric", "unit", *columns), rows, left=2)
+    for name, metric in FIGURES.items():
+        if any(name in figures for figures in measured.values()):
+            factor, unit = READ.get(metric.unit, (1.0, metric.unit))
+            if name in ERRORS:
+                factor, unit = metric.factor, metric.shown
+            rows.append([name, unit, *(write(name, own.get(name), factor) for own in measured.values())])
+    yield from aligned(("metric", "unit", *measured), rows, left=2)

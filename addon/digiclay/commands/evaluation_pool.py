@@ -9,8 +9,9 @@ from itertools import takewhile
 from pathlib import Path
 
 from ..core.base.errors import DigiclayError
+from ..core.metrics.metric_table import ERRORS
 from ..core.studies.axes import Point, Record
-from ..core.studies.evaluation import Pool, evaluate_bundle
+from ..core.studies.evaluation import Pool, evaluate_bundle, has_errors, judge_all, make_bundles
 from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder
 from .arguments import QUIET, add_options, add_scene, one_of, say, whole_number
@@ -59,8 +60,6 @@ def open_pool(
     pieces: int,
     stop: Callable[[], bool],
     draw: Callable[[str], None],
-    *,
-    errors: bool = False,
 ) -> Iterator[Pool]:
     """Open what the options of `add_pool` name, for `pieces` bundles; all of it ends with the block."""
 
@@ -75,18 +74,17 @@ def open_pool(
 
         with open_cluster(arguments.scheduler, stop, draw) as cluster:
             yield partial(
-                submit, cluster, partial(evaluate_on_worker, errors=errors),
-                stopped=lambda: draw_and_ask(cluster.describe()),
-            )  # fmt: skip
+                submit, cluster, evaluate_on_worker, stopped=lambda: draw_and_ask(cluster.describe())
+            )
         return
     count = 1 if in_blender() else min(arguments.workers or count_cores(), MOST, pieces)
     if count > 1:
         from .evaluator import open_evaluators
 
-        with open_evaluators(count, stop, partial(draw, ""), errors=errors) as pool:
+        with open_evaluators(count, stop, partial(draw, "")) as pool:
             yield pool
         return
-    task = partial(evaluate_bundle, stopped=draw_and_ask, errors=errors)
+    task = partial(evaluate_bundle, stopped=draw_and_ask)
     yield lambda bundles: (
         (bundle, partial(task, bundle)) for bundle in takewhile(lambda _: not draw_and_ask(), bundles)
     )
@@ -107,16 +105,17 @@ class Evaluation(ExitStack):
         total: int,
         stop: Stop,
         *,
-        errors: bool = False,
         pieces: int = 0,
     ) -> None:
         super().__init__()
         self.folder, self.total, self.stop = folder, total, stop
-        self.records = folder.read_records(errors=errors)
+        self.records = folder.read_records()
+        #: Points of which errors are wanted and not estimated yet.
+        self.unjudged: list[Point] = []
         self.failed: dict[int, Record] = {}
         bar = Counted(sys.stderr, label, "points", len(self.records), quiet=arguments.quiet)
         self._bar = self.enter_context(bar)
-        self._open = partial(open_pool, arguments, stop=stop, draw=self._draw, errors=errors)
+        self._open = partial(open_pool, arguments, stop=stop, draw=self._draw)
         self._pieces = pieces
         self._pool: Pool | None = None
 
@@ -129,11 +128,24 @@ class Evaluation(ExitStack):
         return {index: record for index, record in every.items() if index < self.total}
 
     def finish(self, bundles: Sequence[Sequence[Point]], keys: Sequence[str]) -> None:
-        """Evaluate the bundles of which a point is missing. `keys`: the varied parameters."""
+        """Evaluate the bundles of which a point is missing, or its errors. `keys`: the varied parameters."""
+
+        def lacks(point: Point) -> bool:
+            record = self.records.get(point.index)
+            return record is None or (point.errors and not has_errors(record))
 
         def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
             for point, record in zip(bundle, found, strict=True):
-                if record is not None and point.index not in self.records:
+                if record is not None and lacks(point):
+                    # What is there remains: in another bundle the last bit of a figure may be another one.
+                    if there := self.records.get(point.index):
+                        figures = {**dict.fromkeys(ERRORS), **record.get("figures", {}), **there["figures"]}
+                        absent = record.get("error") or record.get("errors_absent")
+                        record = {
+                            **there,
+                            "figures": figures,
+                            **({"errors_absent": absent} if absent else {}),
+                        }
                     self.folder.keep(point, keys, record)
                     self.records[point.index] = record
 
@@ -144,11 +156,17 @@ class Evaluation(ExitStack):
             self._bar.tell(f"failed: {which}: {why}")
 
         # Of a bundle all points are run again: alone the last bit of a point would be another one.
-        todo = [bundle for bundle in bundles if any(point.index not in self.records for point in bundle)]
+        todo = [bundle for bundle in bundles if any(map(lacks, bundle))]
         if todo:
             if self._pool is None:
                 self._pool = self.enter_context(self._open(max(len(todo), self._pieces)))
             finish(self._pool(todo), keep, fail)
+
+    def judge(self, points: Sequence[Point], keys: Sequence[str]) -> None:
+        """Estimate the errors at finished points that have none."""
+        judged = judge_all(points)
+        self.finish(make_bundles(judged).every, keys)
+        self.unjudged = [point for point in judged if not has_errors(self.records[point.index])]
 
 
 def run_series(
@@ -160,17 +178,17 @@ def run_series(
     write: Callable[[dict[int, Record]], Sequence[str]],
     *,
     noun: str = "points",
-    errors: bool = False,
     pieces: int = 0,
 ) -> int:
     """Evaluate what is missing of a series, write its files, and print; return the exit code."""
     with opened as folder:
-        with Stop() as stop, Evaluation(
-            arguments, label, folder, total, stop, errors=errors, pieces=pieces
-        ) as evaluation:  # fmt: skip
+        with (
+            Stop() as stop,
+            Evaluation(arguments, label, folder, total, stop, pieces=pieces) as evaluation,
+        ):
             evaluate(evaluation)
             records = evaluation.collect()
-        if stop() and len(records) < total:
+        if stop() and (len(records) < total or evaluation.unjudged):
             kept = f"{len(records)} of {total} {noun} are done and kept in {folder.path}"
             say(arguments, f"Stopped: {kept}. The same command goes on from there.")
             return STOPPED

@@ -77,10 +77,10 @@ class Evaluator(Process):
     def __init__(self) -> None:
         super().__init__([], ".commands.evaluator", stdout=subprocess.PIPE)
 
-    def evaluate(self, bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
+    def evaluate(self, bundle: Sequence[Point]) -> list[Record | None]:
         """Return the records of a bundle; EOFError when the process has died."""
         try:
-            pickle.dump((tuple(bundle), errors), self.input)
+            pickle.dump(tuple(bundle), self.input)
             self.input.flush()
             records: list[Record | None] = pickle.load(self.process.stdout)  # type: ignore[arg-type]
         except (OSError, ValueError, pickle.UnpicklingError):  # it died, or was stopped, in the middle
@@ -89,17 +89,15 @@ class Evaluator(Process):
 
 
 @contextmanager
-def open_evaluators(
-    count: int, stop: Callable[[], bool], draw: Callable[[], None], *, errors: bool
-) -> Iterator[Pool]:
+def open_evaluators(count: int, stop: Callable[[], bool], draw: Callable[[], None]) -> Iterator[Pool]:
     """Yield an evaluation of bundles in processes, each waited for by a thread."""
     with ThreadPoolExecutor(count) as threads, Processes[Evaluator](stop, draw) as processes:
-        task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
+        task = partial(evaluate_elsewhere, processes, list[Evaluator]())
         yield partial(submit, threads, task, stopped=processes.stopped)
 
 
 def evaluate_elsewhere(
-    processes: Processes[Evaluator], idle: list[Evaluator], bundle: Sequence[Point], *, errors: bool
+    processes: Processes[Evaluator], idle: list[Evaluator], bundle: Sequence[Point]
 ) -> list[Record | None]:
     """Evaluate a bundle in an idle process; in another one when that dies, DigiclayError when both do."""
     how = ""
@@ -111,7 +109,7 @@ def evaluate_elsewhere(
                 break
             evaluator = started
         try:
-            records = evaluator.evaluate(bundle, errors=errors)
+            records = evaluator.evaluate(bundle)
         except EOFError:
             how = processes.wait(evaluator)
             if processes.stopping():
@@ -143,9 +141,8 @@ def serve() -> None:
             bundles.put(None)
 
     threading.Thread(target=read, daemon=True).start()
-    while (asked := bundles.get()) is not None:
-        bundle, errors = asked
-        records = evaluate_bundle(bundle, ended.is_set, errors=errors)
+    while (bundle := bundles.get()) is not None:
+        records = evaluate_bundle(bundle, ended.is_set)
         try:
             pickle.dump(records, replies)
             replies.flush()

@@ -19,7 +19,7 @@ from ..core.scene.schema import Scene
 from ..core.session.run_scene import Result
 from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
 from .arguments import QUIET, add_scene, command, formats, say, scene_of
-from .run import plan_meshes, simulate, write_run
+from .run import NO_ERRORS, plan_meshes, simulate, write_run
 from .stop import Stop, allow_interrupt, defer_interrupt, require_surface
 
 EXAMPLES = f"""\
@@ -45,6 +45,7 @@ OPTIONS = {
     "--out DIR": (Path, "folder; default: the shape's name in the working folder"),
     "--overwrite": "replace an older run at the end",
     "--export F,...": (formats, "mesh formats; default stl", ["stl"]),
+    **NO_ERRORS,
     "--quiet": QUIET,
 }  # fmt: skip
 

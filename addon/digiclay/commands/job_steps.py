@@ -209,6 +209,8 @@ class Work:
                 if judged is None:
                     raise KeyboardInterrupt
                 result = judged
+        else:
+            result = result.without_errors(f"errors = false in {JOB}")
         with step("save"):
             save(result, out)
         history = result.history

@@ -82,6 +82,12 @@ def report(fit: Fitted) -> Iterator[str]:
 
 #: Sections whose parameters can make a session too large.
 SIZES = ("layout", "recorder", "simulation", "trajectory", "delay")
+#: What the folder of a run says where a stop came before its errors.
+UNJUDGED = "stopped before they were"
+#: Option of the commands that write a run's folder.
+NO_ERRORS = {
+    "--no-errors": "without error estimates, which take about as long as the run",
+}
 EXAMPLES = """\
 examples:
   digiclay run ridge_mound_valley
@@ -102,7 +108,7 @@ OPTIONS: dict[str, Any] = {
     ),
     "--plots": "also plots, session.png and surface.png",
     "--render": "also a picture, pins.png (needs bpy)",
-    "--no-errors": "without error estimates, which take about as long as the run",
+    **NO_ERRORS,
     "--quiet": QUIET,
 }  # fmt: skip
 
@@ -122,16 +128,10 @@ def carry_out(arguments: argparse.Namespace) -> int:
             scene = fit.scene
         with Stop() as stop:
             result = simulate(arguments, scene, path, stop)
-            judged: Result | None = result
-            if not arguments.no_errors:
-                period = scene.simulation.control_period
-                with Bar(sys.stderr, "errors", period, quiet=arguments.quiet) as bar:
-                    judged = result.estimate_errors(bar, stop)
-                result = judged or result
             if fit:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
             extras = _plan_extras(arguments, result)
-            return write_run(arguments, claim, result, extras, stop, unjudged=judged is None)
+            return write_run(arguments, claim, result, extras, stop)
 
 
 def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
@@ -197,15 +197,20 @@ def plan_meshes(
 
 
 def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop) -> Result:
-    """Run the session of a scene under a progress bar; `path`: of its file."""
+    """Run the session of a scene and estimate its errors under progress bars; `path`: of its file."""
     versions = {"digiclay": __version__}
     if scene.method in list_added():
         from ..plugins.method_loader import describe_origin
 
         versions |= describe_origin(scene)
+    period, quiet = scene.simulation.control_period, arguments.quiet
     try:
-        with Bar(sys.stderr, scene.name, scene.simulation.control_period, quiet=arguments.quiet) as bar:
-            return run(scene, progress=bar, stopped=stop, versions=versions)
+        with Bar(sys.stderr, scene.name, period, quiet=quiet) as bar:
+            result = run(scene, progress=bar, stopped=stop, versions=versions)
+        if arguments.no_errors:
+            return result.without_errors("--no-errors")
+        with Bar(sys.stderr, "errors", period, quiet=quiet) as bar:
+            return result.estimate_errors(bar, stop) or result.without_errors(UNJUDGED)
     except ParameterError as error:
         changed = any(setting.key.split(".")[0] in SIZES for setting in arguments.settings)
         raise SceneError(f"{'--set' if changed else path.name}: {error}") from None
@@ -213,12 +218,9 @@ def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop
 
 def write_run(
     arguments: argparse.Namespace, claim: Claim, result: Result, extras: Iterable[Extra], stop: Stop,
-    *notes: str, unjudged: bool = False,
+    *notes: str,
 ) -> int:  # fmt: skip
-    """Write the folder of a run with its extras, print, and return the exit code.
-
-    `notes`: lines before the summary; `unjudged`: whether a stop prevented the estimation of the errors.
-    """
+    """Write the folder of a run with its extras, print, and return the exit code; `notes` come first."""
     skipped: list[Extra] = []
     wrong: list[Exception] = []
     with claim.write() as folder:
@@ -237,7 +239,7 @@ def write_run(
                 wrong.append(error)
     out = claim.out
     say(arguments, *notes, result.summary(), f"written to {out}")
-    if unjudged:
+    if result.metrics.get("errors_absent") == UNJUDGED:
         tell_stopped_before("its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"])
     for extra in skipped:
         tell_stopped_before(", ".join(extra.files), extra.later(out))

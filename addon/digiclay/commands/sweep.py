@@ -11,11 +11,17 @@ from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import write_whole
 from ..core.metrics.metric_table import ERRORS
 from ..core.scene.scene_source import find
-from ..core.studies.axes import Axis, Column, Record, make_columns, make_points, read_axis
-from ..core.studies.evaluation import explain_failed_batches, make_bundles, read_metrics
+from ..core.studies.axes import Axis, Column, Record, find_ends, make_columns, make_points, read_axis
+from ..core.studies.evaluation import (
+    describe_effort,
+    explain_failed_batches,
+    judge_all,
+    make_bundles,
+    read_metrics,
+)
 from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
 from .arguments import command, name_methods, settings_of
-from .evaluation_pool import add_series, run_series
+from .evaluation_pool import Evaluation, add_series, run_series
 from .progress import Counted
 
 EXAMPLES = """\
@@ -27,8 +33,8 @@ examples:
 The folder holds points/, a small file for each finished point; sweep.csv; and for one or two
 axes a picture of each metric. After Ctrl-C the same command continues. It repeats a failed point
 if its file is removed. Points of one bed, parts and steps run together in one call, a batch,
-in a fraction of the time; the others are listed. For the metrics height_error,
-force_error and total_force_error every point is integrated once more.
+in a fraction of the time; the others are listed. Errors of the integration are estimated at
+the ends of what varies; for the metrics height_error, force_error and total_force_error at every point.
 """
 
 
@@ -48,8 +54,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
         points = make_points(find(arguments.scene), settings_of(arguments), axes, bar)
         if not any(point.scene and point.scene.recorder for point in points):
             raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
-        errors = any(name in ERRORS for name in names)
-        bundles = make_bundles(points, errors=errors)
+        if any(name in ERRORS for name in names):
+            points = judge_all(points)
+        bundles = make_bundles(points)
 
     def write(records: dict[int, Record]) -> list[str]:
         columns = make_columns(points, axes)
@@ -62,15 +69,18 @@ def carry_out(arguments: argparse.Namespace) -> int:
         if len(failed) == len(points):
             raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
         tail = f", {len(failed)} of them failed: see the column error" if failed else ""
-        ways = [*bundles.describe(), *explain_failed_batches(records)]
+        ways = [*bundles.describe(), *explain_failed_batches(records), describe_effort(records)]
         return [f"{len(points)} points{tail}", *ways, *notes, f"written to {arguments.out}"]
 
     keys = [axis.key for axis in axes]
     opened = open_sweep(arguments.out, points, axes, __version__)
-    return run_series(
-        arguments, "sweep", len(points), opened, lambda series: series.finish(bundles.every, keys), write,
-        errors=errors,
-    )  # fmt: skip
+
+    def evaluate(series: Evaluation) -> None:
+        series.finish(bundles.every, keys)
+        if len(series.records) == len(points):
+            series.judge(find_ends(points, keys), keys)
+
+    return run_series(arguments, "sweep", len(points), opened, evaluate, write)
 
 
 def _draw_pictures(

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.model.fingers import MOST_FINGERS
-from ..core.session.accuracy import ErrorMonitor, Errors
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
 from ..strokes.stroke import Stroke
@@ -37,9 +36,6 @@ class Running(LiveSession):
     tick: int
     clock: Clock
     trace: RecentTrace
-    monitor: ErrorMonitor | None
-    #: Latest estimate.
-    errors: Errors | None = None
     #: By the user.
     paused: bool = False
     #: Why the session waits although it is not paused; empty: it does not.

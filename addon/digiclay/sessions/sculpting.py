@@ -237,27 +237,17 @@ def _pack(running: Running) -> Running:
 
 def _follow(running: Running, path: Floats, orders: Orders | None, pause: int) -> Running:
     """Simulate control periods of a path (k + 1, f, 7), `pause` of them between two error estimates."""
-    system, monitor = running.system, running.monitor
-    rows, first, trace = [], running.state.period + 1, running.trace
+    system, rows, trace = running.system, [], running.trace
     started = time.perf_counter()
-    monitor = monitor and accuracy.begin_stretch(monitor, running.state, pause)
 
     def watch(state: State) -> None:
-        nonlocal monitor
-        index = state.period - first
-        monitor = monitor and accuracy.note(monitor, state, path[index : index + 2], pause)
         if state.period % trace.every == 0:
             row = recent_trace.sample(system, state, running.scene.set_point, trace.pins)
             rows.append(row[: trace.rows.shape[1]])
 
-    gone, errors = live_session.follow_path(running, path, orders, running.tick, watch), None
-    if monitor:
-        monitor, errors = accuracy.catch_up(monitor, gone.state, len(path) - 1)
+    gone = live_session.follow_path(running, path, orders, running.tick, watch, pause)
     clock = live_session.update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
-    gone = replace(
-        gone, clock=clock, monitor=monitor, errors=errors or running.errors,
-        trace=recent_trace.extend(trace, rows),
-    )  # fmt: skip
+    gone = replace(gone, clock=clock, trace=recent_trace.extend(trace, rows))
     return _count_gesture(gone, ordered=orders is not None and orders.given)
 
 
@@ -314,7 +304,7 @@ def restore(
     return replace(
         running, state=state, snapshot=now, clock=running.clock.stopped(), stale=0,
         poses=live_session.clamp_pose(poses.reshape(-1, 7), running.system.cell.actuator.stroke),
-        monitor=running.monitor and accuracy.reset(running.monitor),
+        monitor=running.monitor and accuracy.reset(running.monitor), errors=None,
         recording=keep, gestures=gestures, tick=running.tick + 1, rest_time=0.0,
         next_gesture=live_session.Moment(state.period, now, poses, running.tick) if free else None,
     )  # fmt: skip

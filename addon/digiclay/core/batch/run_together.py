@@ -22,7 +22,7 @@ from ..scene.assembly import assemble
 from ..scene.columns import Batch, begin, make_batch
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
-from ..session.accuracy import Errors, compare, has_every_command, make_reference
+from ..session.accuracy import Errors, compare, explain_absence, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_scene import Ended, Result, evaluate, report
 from .packing import (
@@ -293,7 +293,8 @@ def _run(
     _refuse_unlike(running)
     play = begin_play(running, systems)
     watching = observer(running, scenes[0].recorder, play)
-    monitor = _start(running) if errors and has_every_command(scenes[0]) else None
+    absent = explain_absence(scenes[0])
+    monitor = _start(running) if errors and not absent else None
     for now in play_all(play, {run: scene.periods for run, scene in running.items()}, stopped):
         watching.observe(now)
         monitor = monitor and _follow(monitor, now.play)
@@ -305,6 +306,8 @@ def _run(
             result = watching.finish(now, index)
             if monitor:
                 result = result.with_errors(Errors.estimate(monitor.largest[:, index]))
+            elif errors:
+                result = result.without_errors(absent)
             yield run, result
 
 
@@ -326,7 +329,7 @@ def measure_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes as `run_together` does, and measure them without ever having their histories.
 
-    The metrics are those with a history. With `errors`, theirs are estimated too, where
-    `accuracy.has_every_command`; references, see `accuracy.make_reference`, must be of one structure as well.
+    The metrics are those with a history. With `errors`, theirs are estimated too, or it is said why not;
+    references, see `accuracy.make_reference`, must be of one structure as well.
     """
     return _run(scenes, Sums, stopped, errors=errors)

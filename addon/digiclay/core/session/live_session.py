@@ -18,7 +18,7 @@ from ..engine.state import State
 from ..engine.system import System
 from ..model.trajectory import interpolate_poses
 from ..scene.schema import Scene
-from . import snapshot
+from . import accuracy, snapshot
 
 #: Over how much of the wall's time the real-time factor is taken, s.
 WINDOW = 1.0
@@ -290,6 +290,9 @@ class LiveSession:
     """(f, 7): The fingertips', up to which the session has followed them."""
     recording: Recording | None = None
     """Of the fingertip path."""
+    monitor: accuracy.ErrorMonitor | None = None
+    errors: accuracy.Errors | None = None
+    """Estimate so far."""
 
     @property
     def pose(self) -> Floats:
@@ -307,16 +310,30 @@ def follow_path(
     orders: Orders | None = None,
     tick: int = 0,
     watch: Callable[[State], None] | None = None,
+    pause: int = accuracy.PAUSE,
 ) -> Session:
-    """Simulate and record the control periods of a path (t + 1, f, 7); DivergenceError uses it up."""
-    system, state = session.system, session.state
+    """Simulate and record the control periods of a path (t + 1, f, 7); DivergenceError uses it up.
+
+    `pause`: control periods between two stretches of its monitor.
+    """
+    system, state, monitor = session.system, session.state, session.monitor
+    monitor = monitor and accuracy.begin_stretch(monitor, state, pause)
+    errors, first = None, state.period + 1
     # The force of a pressed pin grows exponentially; the session itself reports what exceeds all floats.
     with np.errstate(over="ignore", invalid="ignore"):
         for state in simulate_path(system, session.state, path, orders):
+            if monitor:
+                index = state.period - first
+                monitor = accuracy.note(monitor, state, path[index : index + 2], pause)
             if watch:
                 watch(state)
+    if monitor:
+        monitor, errors = accuracy.catch_up(monitor, state, len(path) - 1)
     recording = session.recording and session.recording.extend(path[1:], tick, orders)
-    return replace(session, state=state, poses=path[-1], recording=recording)
+    return replace(
+        session, state=state, poses=path[-1], recording=recording, monitor=monitor,
+        errors=errors or session.errors,
+    )  # fmt: skip
 
 
 def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:
@@ -329,4 +346,7 @@ def go_back(session: Session, moment: Moment) -> Session:
     """Return the session at an earlier moment; what was recorded since is cut off."""
     recording = session.recording and session.recording.cut_at_period(moment.period)
     state = snapshot.load(session.system, moment.snapshot)
-    return replace(session, state=state, poses=moment.poses, recording=recording)
+    monitor = session.monitor and accuracy.reset(session.monitor)
+    return replace(
+        session, state=state, poses=moment.poses, recording=recording, monitor=monitor, errors=None
+    )

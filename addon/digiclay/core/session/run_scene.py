@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..base.errors import explain_os_error
 from ..engine.simulation import begin, periods
 from ..engine.system import System
-from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_losses
+from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses, describe_time
 from ..metrics.summary import compute_metrics, find_losses, split_fingers, take_worst
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
@@ -25,7 +25,7 @@ from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT, format_scene
-from .accuracy import Errors, describe_bends, estimate_errors, has_every_command
+from .accuracy import Errors, describe_bends, estimate_errors, explain_absence
 from .memory_limit import check_memory
 
 History = dict[str, NDArray[Any]]
@@ -71,17 +71,10 @@ class Result:
         if self.metrics.get("rfd_jnd_least") is not None:
             felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
         felt += f", {lost}" if (lost := describe_losses(self.metrics)) else ""
-        simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
         end = " (incomplete: stopped)" if self.incomplete else ""
-        errors = ""
-        if "height_error" in self.metrics:
-            height, force = self.metrics["height_error"] * 1e6, self.metrics["force_error"] * 1e3
-            errors = f", height error about {height:.2g} µm, force error about {force:.2g} mN"
-            errors += f" ({doubt})" if (doubt := self.metrics.get("errors_in_doubt")) else ""
         beyond = self.metrics.get("beyond_a_finger")
         warning = f"; {beyond}" if beyond else ""
-        speed = f"{self.run_time:.2g} s ({factor:.3g} x real time)"
-        return f"{simulated:.1f} s simulated in {speed}{felt}{errors}{end}{warning}"
+        return f"{describe_time(self.metrics)}{felt}, {describe_errors(self.metrics)}{end}{warning}"
 
     def _name_worst(self) -> str:
         """Return which finger has the largest RFD, where there are several."""
@@ -95,14 +88,18 @@ class Result:
         doubt = {"errors_in_doubt": text} if (text := describe_bends(self.scene)) else {}
         return replace(self, metrics={**self.metrics, **added, **doubt, "units": units})
 
+    def without_errors(self, why: str) -> Result:
+        """Return the result with the reason for which its errors are not estimated."""
+        return replace(self, metrics={**self.metrics, "errors_absent": why})
+
     def estimate_errors(
         self,
         progress: Callable[[int, int], None] | None = None,
         stopped: Callable[[], bool] | None = None,
     ) -> Result | None:
-        """Return the result with its errors, as it is where they cannot be estimated; None when `stopped`."""
-        if self.incomplete or not has_every_command(self.scene):
-            return self
+        """Return the result with its errors, or the reason for which there are none; None when `stopped`."""
+        if absent := "the session was stopped" if self.incomplete else explain_absence(self.scene):
+            return self.without_errors(absent)
         errors = estimate_errors(self.scene, self.history, progress=progress, stopped=stopped)
         return self.with_errors(errors) if errors else None
 

@@ -49,6 +49,8 @@ class Point:
     error: str = ""
     #: By default the figures of the session, see `evaluation.evaluate`.
     measure: Measure | None = None
+    #: Whether the errors of the integration are estimated.
+    errors: bool = False
 
 
 @dataclass(frozen=True)
@@ -236,3 +238,31 @@ def find_value(scene: Scene, key: str, word: str) -> Any:
     """Return what a scene made of a word, if it is a number, the same for all fingers; else the word."""
     numbers = find_numbers(scene, key)
     return numbers[0] if len(numbers) == 1 else word
+
+
+#: So many different words at most count as the ends of a parameter.
+WORDS = 8
+
+
+def find_ends(points: Sequence[Point], keys: Sequence[str]) -> list[Point]:
+    """Return the points at the ends of each parameter, or with each of its words, in their order.
+
+    Of several at an end: the two that are lowest and highest in the other parameters, corners of a grid.
+    """
+    sound = [(point, point.scene) for point in points if point.scene]
+    if not sound:
+        return []
+    places = np.empty((len(keys), len(sound)))
+    ends: list[Sequence[int]] = []
+    for number, key in enumerate(keys):
+        values = np.array([find_value(scene, key, point.words[number]) for point, scene in sound])
+        different, places[number] = np.unique(values, return_inverse=True)
+        last = len(different) - 1
+        ends.append(range(last + 1) if values.dtype.kind == "U" and last < WORDS else (0, last))
+    height = (places / np.maximum(places.max(axis=1, keepdims=True), 1)).sum(axis=0)
+    chosen: set[int] = set()
+    for row, own in zip(places, ends, strict=True):
+        for end in own:
+            there = np.flatnonzero(row == end)
+            chosen |= {int(there[height[there].argmin()]), int(there[height[there].argmax()])}
+    return [sound[index][0] for index in sorted(chosen)]

@@ -2,8 +2,8 @@
 
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from ..base.errors import DigiclayError, ParameterError, one_line
@@ -11,7 +11,7 @@ from ..base.quantity import find_nearest_name
 from ..batch.packing import Findings, describe_structure
 from ..batch.run_together import measure_together
 from ..control.methods import find_method
-from ..metrics.metric_table import ERRORS, METRICS, RUN
+from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
 from ..scene.schema import Scene
 from ..session.accuracy import describe_bends, make_reference
 from ..session.run_scene import Result, run
@@ -79,12 +79,37 @@ class Bundles:
         return [*lines, *self.why]
 
 
-def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
+def judge_all(points: Iterable[Point]) -> list[Point]:
+    """Return points of which the errors are estimated."""
+    return [replace(point, errors=True) for point in points]
+
+
+def has_errors(record: Record) -> bool:
+    """Return whether the errors of a point were estimated, or it failed."""
+    return "error" in record or record["figures"].keys() >= ERRORS.keys()
+
+
+def describe_effort(records: Mapping[int, Record]) -> str:
+    """Return the run time of points and their largest errors, and where these were estimated."""
+    figures = {index: record["figures"] for index, record in sorted(records.items()) if "figures" in record}
+    judged = {index: found for index, found in figures.items() if found.get("height_error") is not None}
+    spent = sum(found.get("run_time") or 0.0 for found in figures.values())
+    absent = (record["errors_absent"] for record in records.values() if record.get("errors_absent"))
+    worst: dict[str, object] = {"errors_absent": next(absent, "")}
+    where = ""
+    if judged:
+        worst = {name: max(found[name] for found in judged.values()) for name in ERRORS}
+        named = "" if len(judged) == len(figures) else f": {', '.join(map(str, judged))}"
+        where = f" at most, estimated at {len(judged)} of {len(figures)} points{named}"
+    return f"{len(figures)} runs took {spent:.2g} s; {describe_errors(worst)}{where}"
+
+
+def make_bundles(points: Sequence[Point]) -> Bundles:
     """Put points of one structure together, as many as make a batch; in the order of the points.
 
     The bundles depend on the points alone, not on what is done already or on the number of workers: the same
-    sweep has the same results to the last bit. `points`: all of the sweep; `errors`: whether errors are
-    estimated: the references of a batch must then be of one structure too.
+    sweep has the same results to the last bit. `points`: all of the sweep. Where errors are estimated, the
+    references of a batch must be of one structure too.
     """
     alike: dict[object, list[Point]] = {}
     findings = Findings()
@@ -100,7 +125,7 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
             why[reason] += 1
             continue
         try:
-            judge = describe_structure(make_reference(point.scene), findings) if errors else None
+            judge = describe_structure(make_reference(point.scene), findings) if point.errors else None
         except ParameterError:  # reported when the point runs
             alone.append(point)
         else:
@@ -118,7 +143,7 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
         reason = f"fewer than {LEAST} have the same bed, parts and steps"
         why[reason if few else "they have too many rows to keep for many at once"] += len(group)
     alone.sort(key=lambda point: point.index)
-    doubts = Counter(describe_bends(point.scene) for point in points if errors and point.scene)
+    doubts = Counter(describe_bends(point.scene) for point in points if point.errors and point.scene)
     notes = tuple(f"{_count(doubts[text], 'point')} with errors as told {text}" for text in doubts if text)
     return Bundles(tuple(batches), tuple((point,) for point in alone), (*_explain(why), *notes))
 
@@ -173,7 +198,8 @@ def evaluate(
 def _make_record(result: Result, *, errors: bool) -> Record:
     """Return the record of a finished session; `ERRORS` only if they were requested."""
     names = [name for name in FIGURES if errors or name not in ERRORS]
-    return {"figures": {name: result.metrics.get(name) for name in names}}
+    absent = {"errors_absent": why} if (why := result.metrics.get("errors_absent")) else {}
+    return {"figures": {name: result.metrics.get(name) for name in names}, **absent}
 
 
 class BatchWarning(RuntimeWarning):
@@ -181,9 +207,9 @@ class BatchWarning(RuntimeWarning):
 
 
 def evaluate_bundle(
-    bundle: Sequence[Point], stopped: Callable[[], bool] | None = None, *, errors: bool = False
+    bundle: Sequence[Point], stopped: Callable[[], bool] | None = None
 ) -> list[Record | None]:
-    """Run a bundle; return the record of each of its points, None for one that was stopped.
+    """Run a bundle, with all errors or none; return records of its points, None for one that was stopped.
 
     When a batch fails as a whole, its points are run one by one, and each record states why as ``alone``;
     `BatchWarning` if it was neither lack of memory nor an error a user can cause.
@@ -192,7 +218,7 @@ def evaluate_bundle(
     if not scenes:  # values that do not go together are in no batch
         return [{"error": point.error} for point in bundle]
     records: list[Record | None] = [None] * len(scenes)
-    why = ""
+    errors, why = bundle[0].errors, ""
     if len(scenes) > 1:
         try:
             for number, result in measure_together(scenes, errors=errors, stopped=stopped):

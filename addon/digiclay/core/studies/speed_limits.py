@@ -25,6 +25,8 @@ from ..session.run_scene import Result, run, select_rows
 
 #: How long the fingertip rests at the ends of a phase, s.
 REST = 0.3
+#: Between which speeds the largest one is searched, m/s.
+LOW, HIGH = 2e-3, 40e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,8 +172,8 @@ def find_largest_speed(
     way: Drag | Lift,
     criterion: Criterion,
     *,
-    low: float = 2e-3,
-    high: float = 40e-3,
+    low: float = LOW,
+    high: float = HIGH,
     resolution: float = 0.5e-3,
     report: Callable[[Follows], object] = lambda judged: None,
 ) -> float | None:
@@ -183,6 +185,13 @@ def find_largest_speed(
         return judged.meets(criterion)
 
     return bisect(holds, low, high, resolution)
+
+
+def describe_end(speed: float | None, low: float = LOW, high: float = HIGH) -> str:
+    """Return the end of a search where it is all that was found of a largest speed, mm/s; else ``""``."""
+    if speed is None:
+        return f"below {low * 1e3:g}"
+    return f"at least {high * 1e3:g}" if speed >= high else ""
 
 
 def find_free_speed(scene: Scene) -> float:

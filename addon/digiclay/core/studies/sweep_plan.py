@@ -25,6 +25,8 @@ from .series import Kind, open_series
 
 #: The folder of the points.
 POINTS = "points"
+#: Figures of every table, beside those asked for.
+EFFORT = ("run_time", "height_error", "force_error")
 #: The comment at the end of a line of a scene file.
 NOTE = re.compile(r'  # [^"\n]*$', re.MULTILINE)
 
@@ -35,15 +37,14 @@ class Folder:
 
     path: Path
 
-    def read_records(self, *, errors: bool = False) -> dict[int, Record]:
-        """Return the finished points by index, with `errors` only those that have `ERRORS` or failed."""
+    def read_records(self) -> dict[int, Record]:
+        """Return the finished points by index."""
         records = {}
         for path in self.path.glob(f"{POINTS}/*.json"):
             record = read_json(path)  # a file that cannot be read is a point to be done again
             if not path.stem.isdecimal() or record is None or not record.keys() & {"figures", "error"}:
                 continue
-            if not errors or "error" in record or record["figures"].keys() >= ERRORS.keys():
-                records[int(path.stem)] = record
+            records[int(path.stem)] = record
         return records
 
     def keep(self, point: Point, keys: Sequence[str], record: Record) -> None:
@@ -160,7 +161,8 @@ def format_table(
     records: Iterable[Record],
     names: Sequence[str],
 ) -> str:
-    """Return points as CSV: the varied parameters, the metrics, and the error; SI units, in the header."""
+    """Return points as CSV: varied parameters, metrics, time and errors, failure; SI units, in the header."""
+    names = list(dict.fromkeys((*names, *EFFORT)))
     units = [*varied, *((name, FIGURES[name].unit) for name in names)]
     table: list[Sequence[Any]] = [[*(f"{name} ({unit})" if unit else name for name, unit in units), "error"]]
     for values, record in zip(rows, records, strict=True):
