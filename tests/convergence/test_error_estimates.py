@@ -143,7 +143,7 @@ def draw_scene(random: np.random.Generator, stepper: str) -> Scene:
 FORMING = ("virtual_master", "cell_states", "hybrid", "elastic", "plastic", "viscous")
 
 
-@pytest.mark.parametrize("stepper", ["bernoulli", "richardson"])
+@pytest.mark.parametrize("stepper", ["bernoulli", "richardson", "adaptive"])
 def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper: str) -> None:
     random, missed = np.random.default_rng(38), []
     for number in range(MANY):
