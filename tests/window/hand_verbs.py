@@ -57,14 +57,14 @@ def script(blender: Any) -> Iterator[float | None]:
 def locks(blender: Any, settings: Any) -> Iterator[float | None]:
     """Turn the locks over, undo that, and clear them; take one off by Ctrl before."""
     settings.brush = "LOCK"
-    blender.call(bpy.ops.digiclay.press_locks_invert, "INVOKE_DEFAULT")
+    blender.call(bpy.ops.digiclay.press_locks_invert, "INVOKE_DEFAULT", True)
     yield from finish(blender, hand("sleep 0.1"))
     keep(blender, "inverted")
     yield from act(blender, to(on_the_screen(blender, 0.0, 30.0)), "key ctrl+z")
     keep(blender, "inverting undone")
     yield from stroke(blender, "unlocked", (0.0, -LONG), (0.0, 0.0), *HOW, key="ctrl")
     keep(blender, "unlocked")
-    blender.call(bpy.ops.digiclay.press_locks_clear, "INVOKE_DEFAULT")
+    blender.call(bpy.ops.digiclay.press_locks_clear, "INVOKE_DEFAULT", True)
     yield from finish(blender, hand("sleep 0.1"))
     keep(blender, "cleared")
 
