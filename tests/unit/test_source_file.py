@@ -77,7 +77,8 @@ np.save(OBJECTS, np.array([{}, {}], dtype=object), allow_pickle=True)
         ("nan.obj", b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "must have vertices that are finite numbers"),
         ("half.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "must be a PLY file that can be read"),
         ("half.glb", b"glTF\x02\0\0\0\xff\0\0\0", "must be whole"),
-        ("notes.txt", b"hello", "must be a mesh, a picture or an array"),
+        ("notes.doc", b"hello", "must be a mesh, a picture or an array"),
+        ("notes.txt", b"hello", "must be a grid of numbers that can be read"),
         ("empty.npy", b"", "must hold one array of numbers"),
         ("rubbish.npy", b"rubbish", "must hold one array of numbers"),
         ("objects.npy", OBJECTS.getvalue(), "must hold one array of numbers"),  # not unpickled
@@ -97,7 +98,7 @@ def test_a_file_that_holds_no_shape_is_refused_by_name(tmp_path, name, content, 
 @pytest.mark.parametrize(
     ("word", "said"),
     [("craters", "Did you mean crater?"), ("no/where.stl", "no/where.stl: there is no such file."),
-     (".", ".: there is no such file."), ("a\0b", "neither a file nor a sample shape"),
+     (".", ". is a folder, not a file."), ("a\0b", "neither a file nor a sample shape"),
      (300 * "a", "neither a file nor a sample shape")],
 )  # fmt: skip
 def test_a_shape_that_is_not_there_is_told(word: str, said: str) -> None:

@@ -86,9 +86,10 @@ def finish(
     if surface is None:
         nominal = find_nominal(stroke, device, stroke.height)
         surface = np.where(nominal.near, nominal.height, np.nan)
-    # What the method has moved beside the path, or still does, comes back to where it was.
+    # What the method has moved beside the path, or still does, comes back to where it was. It is seen at the
+    # looks only, however many control periods are simulated at a time.
     astray = np.isnan(surface) & (np.abs(stroke.height - now) > LEAST_CHANGE)
-    if stroke.finish is None or astray.any():
+    if stroke.waited % LOOK == 0 and (stroke.finish is None or astray.any()):
         stroke = replace(stroke, finish=np.where(astray, stroke.height, surface))
     assert stroke.finish is not None
     # A method that still looks for the fingertip would move pins once more.
