@@ -60,7 +60,7 @@ def write_turned(path: Any, orientation: int) -> None:
     Image.fromarray(pixels).save(path, exif=exif, quality=100)
 
 
-def write_geotiff(path: Any, kind: str, absent: str) -> np.ndarray:
+def write_geotiff(path: Any, kind: str, absent: str, *, big: bool = False) -> np.ndarray:
     """Write a slope from -40 to 900 m whose left half has no data, as GDAL marks it; return the heights."""
     heights = np.tile(np.linspace(-40.0, 900.0, 12), (10, 1)).astype(kind)
     heights[:, :6] = float(absent)
@@ -68,7 +68,8 @@ def write_geotiff(path: Any, kind: str, absent: str) -> np.ndarray:
     tags[42113], tags.tagtype[42113] = absent, 2
     tags[339], tags.tagtype[339] = {"f": 3, "i": 2, "u": 1}[kind[0]], 3
     mode = {"f4": "F", "i2": "I;16", "u2": "I;16", "i4": "I"}[kind]
-    Image.frombytes(mode, (12, 10), heights.tobytes()).save(path, tiffinfo=tags)
+    Image.frombytes(mode, (12, 10), heights.tobytes()).save(path, tiffinfo=tags, big_tiff=big)
+    assert path.read_bytes()[2] == 42 + big
     return heights
 
 

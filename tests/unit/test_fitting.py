@@ -309,9 +309,10 @@ def test_a_picture_stands_as_its_exif_data_say(tmp_path, ending, orientation):
     assert np.abs(seen - pictures.UPRIGHT).max() < 0.2  # what a JPEG leaves
 
 
+@pytest.mark.parametrize("big", [False, True])
 @pytest.mark.parametrize(("kind", "absent"), pictures.NO_DATA)
-def test_what_a_geotiff_has_no_data_of_is_no_part_of_the_shape(tmp_path, kind, absent):
-    known = pictures.write_geotiff(tmp_path / "dem.tif", kind, absent)
+def test_what_a_geotiff_has_no_data_of_is_no_part_of_the_shape(tmp_path, kind, absent, big):
+    known = pictures.write_geotiff(tmp_path / "dem.tif", kind, absent, big=big)
     read = read_pixels(tmp_path / "dem.tif")
     assert np.array_equal(np.ma.getmaskarray(read), np.tile(np.arange(12) < 6, (10, 1)))
     assert np.array_equal(read[:, 6:], known[::-1, 6:])

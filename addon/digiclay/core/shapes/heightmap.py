@@ -27,8 +27,15 @@ FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 #: Numbers of tags, of a TIFF file or of the EXIF data in another one.
 WIDTH, HEIGHT, BITS, PHOTOMETRIC, ORIENTATION, CHANNELS, PLANES = 256, 257, 258, 262, 274, 277, 284
 ALPHA, FORMAT, NO_DATA = 338, 339, 42113
-#: Bytes of an item, by the kind of a tag: texts, and whole numbers of 16 and 32 bits.
-ITEMS = {2: 1, 3: 2, 4: 4}
+#: Bytes of an item, by the kind of a tag: texts, and whole numbers of 16, 32 and 64 bits.
+ITEMS = {2: 1, 3: 2, 4: 4, 16: 8}
+#: Most tags of a picture that are read, those of a TIFF that is not a BigTIFF.
+MOST_TAGS = 0xFFFF
+#: First bytes of a TIFF, of which BigTIFF has 43; its order of bytes; its offsets, count of tags, and tag.
+TIFFS = {
+    b"II\x2a\0": ("<", "I", "H", "HHI4s"), b"MM\0\x2a": (">", "I", "H", "HHI4s"),
+    b"II\x2b\0": ("<", "Q", "Q", "HHQ8s"), b"MM\0\x2b": (">", "Q", "Q", "HHQ8s"),
+}  # fmt: skip
 #: All that is raised over a head that makes no sense.
 UNKNOWN = (struct.error, IndexError, KeyError, ValueError)
 
@@ -74,14 +81,19 @@ def _find_tags(file: BinaryIO, head: bytes) -> int:
 
 def _read_tags(file: BinaryIO, start: int) -> dict[int, Any]:
     """Return the first list of tags in TIFF data that begin at a byte."""
+
+    def read(kind: str, count: int = 1) -> bytes:
+        return file.read(struct.calcsize(order + kind) * count)
+
     file.seek(start)
-    order = {b"II\x2a\0": "<", b"MM\0\x2a": ">"}[file.read(4)]
-    file.seek(start + struct.unpack(f"{order}I", file.read(4))[0])
-    (count,) = struct.unpack(f"{order}H", file.read(2))
+    order, offset, number, entry = TIFFS[file.read(4)]
+    file.seek(start + struct.calcsize(offset))
+    file.seek(start + struct.unpack(order + offset, read(offset))[0])
+    (count,) = struct.unpack(order + number, read(number))
     tags: dict[int, Any] = {}
-    for tag, kind, items, content in struct.iter_unpack(f"{order}HHI4s", file.read(12 * count)):
+    for tag, kind, items, content in struct.iter_unpack(order + entry, read(entry, min(count, MOST_TAGS))):
         if ITEMS.get(kind, 0) * items > len(content):
-            file.seek(start + struct.unpack(f"{order}I", content)[0])
+            file.seek(start + struct.unpack(order + offset, content)[0])
             content = file.read(min(items, 99))
         if kind == 2:
             tags[tag] = content[:items].rstrip(b"\0").decode("latin-1")
