@@ -7,6 +7,7 @@ import logging
 import math
 import os
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
@@ -116,14 +117,15 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
         ways = await _listen(stack, arguments, take) if packets is None else ""
         if arguments.record:  # nothing is left behind by what is refused before
             file = stack.enter_context(arguments.record.open("x", encoding="utf-8"))
-        print(f"listening at {ways}" if ways else f"playing {arguments.play}", flush=True)
+        lasts = f", {packets[-1][0] - packets[0][0]:.1f} s" if packets else ""
+        print(f"listening at {ways}" if ways else f"playing {arguments.play}{lasts}", flush=True)
         late = time.monotonic() - packets[0][0] if packets else 0.0
-        while not stop() and packets != []:
+        while not stop() and (packets is None or packets):
             with suppress(TimeoutError):
                 await asyncio.wait_for(came.wait(), AGAIN if packets is None else AGAIN / 10.0)
             came.clear()
             while packets and packets[0][0] + late <= time.monotonic():
-                take(packets.pop(0)[1])
+                take(packets.popleft()[1])
             await send(source.fingers(time.monotonic()))
 
 
@@ -149,17 +151,24 @@ async def _listen(stack: AsyncExitStack, arguments: argparse.Namespace, take: Ca
     return f"{host}:{port}, by UDP{' and TCP' * (arguments.source == 'hts')}"
 
 
-def read_packets(path: Path) -> list[tuple[float, bytes]]:
+def read_packets(path: Path) -> deque[tuple[float, bytes]]:
     """Return the packets of a recording with their times, s: lines of JSON, a character a byte."""
+    packets: deque[tuple[float, bytes]] = deque()
+    number, last = 0, -1e300
     try:
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        whole = [json.loads(line) for line in lines if line.endswith("\n") or len(lines) == 1]
-        packets = [(float(at), str(text).encode("latin-1")) for at, text in whole]  # the last may be cut
-        if not all(math.isfinite(at) for at, _ in packets):
-            raise ValueError("a time is not finite")
-    except (OSError, ValueError, TypeError) as error:
+        for number, line in enumerate(lines, 1):
+            if number > 1 and not line.endswith("\n"):
+                break  # the last may be cut
+            at, text = json.loads(line)
+            packets.append((float(at), str(text).encode("latin-1")))
+            if not last <= float(at) < math.inf:
+                raise ValueError(f"a time must be finite and not before that of the line above ({at})")
+            last = float(at)
+    except (OSError, ValueError, TypeError, OverflowError, RecursionError) as error:
         rule = "must be a recording of 'digiclay hands --record'"
-        raise OutputError(f"--play {path} {rule} ({getattr(error, 'strerror', None) or error}).") from None
+        reason = getattr(error, "strerror", None) or f"line {number}: {error}"
+        raise OutputError(f"--play {path} {rule} ({reason}).") from None
     return packets
 
 

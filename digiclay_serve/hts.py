@@ -13,7 +13,8 @@ from digiclay.core.base.errors import ParameterError
 
 #: Identity of a hand's thumb; rows of fingertips; numbers of a line: place and x, y, z, w of a turn; joints.
 HANDS, TIPS, LINES = {"left": 0, "right": 5}, [4, 8, 12, 16, 20], {"wrist": 7, "landmarks": 63}
-#: Time after which a hand is gone; after which both are put over the bed anew, s; height there, m.
+#: Time after which a hand is gone; after which a wrist is too old for joints, and both hands are put over
+#: the bed anew, s; height there, m.
 GONE, ANEW, OVER = 0.05, 1.0, 20e-3
 
 
@@ -23,7 +24,8 @@ class Hands:
 
     #: m: of the clay at rest.
     height: float
-    wrists: dict[str, Floats] = field(default_factory=dict)
+    #: When each was seen, s, and the numbers of its wrist (7,).
+    wrists: dict[str, tuple[float, Floats]] = field(default_factory=dict)
     #: When each was seen, s, and its fingertips (5, 3) in axes of the bed, m.
     tips: dict[str, tuple[float, Floats]] = field(default_factory=dict)
     #: (3,), m: of the bed's frame in the room.
@@ -44,9 +46,12 @@ class Hands:
         if values.size != LINES[kind] or not (np.abs(values) < 100.0).all():
             rule = f"must be {LINES[kind]} numbers below 100 m, with decimal points"
             raise ParameterError("line", f"{side} {kind}", rule, repr(rest[:40]))
-        if kind == "wrist" or side not in self.wrists:
-            return replace(self, wrists={**self.wrists, side: values}) if kind == "wrist" else self
-        (place, axis, real), local = np.split(self.wrists[side], [3, 6]), values.reshape(21, 3)[TIPS]
+        if kind == "wrist":
+            return replace(self, wrists={**self.wrists, side: (now, values)})
+        seen, wrist = self.wrists.get(side, (-math.inf, values))
+        if now - seen > ANEW:
+            return self
+        (place, axis, real), local = np.split(wrist, [3, 6]), values.reshape(21, 3)[TIPS]
         twice = 2.0 * np.cross(axis, local) / max(math.hypot(*axis, *real), 1e-3) ** 2
         room: Any = place + local + real * twice + np.cross(axis, twice)
         tips = room[:, [0, 2, 1]]  # Unity's y is up: the exchange also makes the axes right-handed

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.errors import OutputError, ParameterError
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from digiclay_serve.door_link import DoorLink, FrequentError
 from digiclay_serve.doors import LAYOUT, Order, make_slot, pack_order, unpack_order
+from digiclay_serve.hands_command import read_packets
 from digiclay_serve.hts import Hands
 from digiclay_serve.osc_door import read_osc, read_request
 from digiclay_serve.protocol import Bed, Poses, check_fingers, read_json
@@ -176,6 +177,16 @@ def test_a_hand_is_gone_after_50_ms_and_after_a_second_begins_over_the_middle_ag
     assert np.mean([tip[0] for tip in late.values()]) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize(("pause", "seen"), [(0.0, 5), (0.9, 5), (1.1, 0), (60.0, 0), (1e5, 0)])
+def test_joints_are_put_on_a_wrist_of_a_second_ago_but_of_none_from_before_a_pause(pause, seen):
+    hands = Hands(0.04).take(lines(), 1.0).take(lines().split(b"\n")[1], 1.0 + pause)
+    assert len(hands.fingers(1.0 + pause)) == seen
+    # The next wrist places the hand over the middle.
+    hands = hands.take(lines(wrist="0.3502" + WRIST[6:]), 1.03 + pause)
+    middle = np.mean([tip[0] for tip in hands.fingers(1.03 + pause).values()])
+    assert middle == pytest.approx(0.1 if seen else 0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("packet", "message"),
     [
@@ -299,14 +310,50 @@ def test_a_datagram_that_is_none_is_refused_and_changes_nothing(data: bytes) -> 
         ("--depth=-3 --token=a-token-of-tests", "--depth must be above 0"),
         ("--play missing --token=a-token-of-tests", "must be a recording"),
         ("--play bad --token=a-token-of-tests", "must be a recording"),
-        ("--play nan --token=a-token-of-tests", "must be a recording"),
         ("--record bad --to osc://127.0.0.1:1 --port 9123 --token=a-token-of-tests", "File exists: bad"),
         ("--record new --to ws://127.0.0.1:1/ --token=a-token-of-tests", "has ended"),
     ],
 )
 def test_a_wrong_option_of_hands_is_refused_in_one_line(words, message, here, refused, monkeypatch):
     monkeypatch.delenv("DIGICLAY_SERVE_TOKEN", raising=False)
-    for name, text in (("empty", ""), ("bad", "[1]\n"), ("nan", '[NaN, "a"]\n')):
+    for name, text in (("empty", ""), ("bad", "[1]\n")):
         (here / name).write_text(text, encoding="utf-8")
     refused(["hands", *words.split()], message)
     assert not (here / "new").exists()
+
+
+GOES_BACK = "line 3: a time must be finite and not before that of the line above"
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        (["1", "2", "3"], ""),
+        (["1", "1", "1"], ""),
+        (["1", "2", "7200"], ""),
+        (["-5", "-4", "0"], ""),
+        (["1", "2", "1.9"], GOES_BACK),
+        (["1", "2", "NaN"], GOES_BACK),
+        (["1", "2", "-Infinity"], GOES_BACK),
+        (["1", "2", "1e999"], GOES_BACK),
+        (["1", "2", "9" * 400], "line 3: "),
+        (["1", "2", '"a"'], "line 3: "),
+        (["1", "2", "null"], "line 3: "),
+        (["1", "2", "[" * 9000], "line 3: "),
+    ],
+)
+def test_a_recording_has_every_packet_in_the_order_of_its_times_or_is_refused_with_the_line(
+    times, said, tmp_path
+):
+    path = tmp_path / "hands.txt"
+    path.write_text("".join(f'[{at}, "{row}"]\n' for row, at in enumerate(times)), encoding="utf-8")
+    if not said:
+        packets = [(float(at), str(row).encode()) for row, at in enumerate(times)]
+        assert list(read_packets(path)) == packets
+        return
+    with pytest.raises(OutputError) as caught:
+        read_packets(path)
+    message = str(caught.value)
+    assert said in message
+    assert "\n" not in message
+    assert len(message.replace(str(path), "")) <= 400
