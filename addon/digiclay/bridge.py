@@ -193,14 +193,14 @@ def uniform(bed: Any) -> float:
     """Return the scale of a bed in the world; raise DigiclayError where lengths in it mean nothing."""
     fault = find_scale_fault(bed)
     if fault:
-        raise DigiclayError(fault)
+        raise DigiclayError(f"{fault}.")
     return _judge_scale(tuple(map(tuple, bed.matrix_world)))[0]
 
 
 def find_scale_fault(bed: Any) -> str:
     """Return why lengths in a bed mean nothing, or an empty text; see `uniform`."""
     fault = _judge_scale(tuple(map(tuple, bed.matrix_world)))[1]
-    remedy = "Set it with Object > Apply or in the sidebar's Item tab."
+    remedy = "Set it with Object > Apply or in the sidebar's Item tab"
     return fault and f"The scale of {bed.name}, that of its parents included, {fault}. {remedy}"
 
 

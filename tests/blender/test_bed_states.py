@@ -19,7 +19,7 @@ from digiclay.roles import fingertip_of, is_bed
 from digiclay.sessions import running
 from digiclay.settings import own_presets, properties
 
-from tests.blender.at_hand import beds, in_the_view, new_bed, select
+from tests.blender.at_hand import beds, done, in_the_view, new_bed, select
 
 #: What an operator does: it adds a bed, or reads data or pins of one, or changes its settings and parts, or
 #: forms and displays something with its pins.
@@ -306,3 +306,132 @@ def test_the_table_has_every_operator():
     every = {kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)}
     assert CALLS.keys() | ELSEWHERE == every
     assert not CALLS.keys() & ELSEWHERE
+
+
+def apply_scale(*scale: float) -> Callable[[Any], object]:
+    def applied(bed: Any) -> None:
+        bed.scale = scale
+        bpy.ops.object.transform_apply(location=False, rotation=False)
+
+    return applied
+
+
+def apply_turn(bed: Any) -> None:
+    bed.rotation_euler.z = 0.5
+    bpy.ops.object.transform_apply()
+
+
+def join(active: Callable[[Any], Any]) -> Callable[[Any], object]:
+    def joined(bed: Any) -> None:
+        select(bpy.data.objects["Cube"], bed)
+        bpy.context.view_layer.objects.active = active(bed)
+        bpy.ops.object.join()
+
+    return joined
+
+
+def in_edit_mode(work: Callable[[], object]) -> Callable[[Any], object]:
+    def worked(bed: Any) -> None:
+        for vertex in bed.data.vertices:
+            vertex.select = vertex.index < 10
+        bpy.ops.object.mode_set(mode="EDIT")
+        work()
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    return worked
+
+
+def make_single(bed: Any) -> None:
+    bpy.ops.object.duplicate(linked=True)
+    select(bed)
+    bpy.ops.object.make_single_user(object=True, obdata=True)
+
+
+def convert(target: str) -> Callable[[Any], object]:
+    return lambda _: bpy.ops.object.convert(target=target)
+
+
+def shuffle() -> None:
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.sort_elements(type="RANDOMIZE", elements={"VERT"}, seed=3)
+
+
+def reverse_some() -> None:
+    """Exchange the pins between the first and the last of a row."""
+    bed = bpy.context.object
+    bpy.ops.object.mode_set(mode="OBJECT")
+    first, last = bed.data.vertices[11].co.copy(), bed.data.vertices[13].co.copy()
+    bed.data.vertices[11].co, bed.data.vertices[13].co = last, first
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def move_one() -> None:
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for vertex in bpy.context.object.data.vertices:
+        vertex.select = vertex.index == 12
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.transform.translate(value=(0.01, 0.0, 0.0))
+
+
+LAYOUT, ROWS = "The pins differ from the parameters of Layout: press Rebuild", "at least, in rows along x"
+NOT_PINS, SOME = "mesh is no longer that of its pins: undo that", "pins now instead of 25: undo that"
+#: What Blender's own verbs make of a bed, which are selected then, and what is said against a session and a
+#: bake of each bed, and against its export as it is drawn; nothing: they are right.
+VERBS: dict[str, tuple[Callable[[Any], object], str, str]] = {
+    "joined with a cube": (join(lambda bed: bed), SOME, SOME),
+    "scale applied": (apply_scale(2.0, 2.0, 2.0), LAYOUT, ""),
+    "stretch applied": (apply_scale(2.0, 1.0, 1.0), LAYOUT, ""),
+    "mirror applied": (apply_scale(-1.0, 1.0, 1.0), LAYOUT, ""),
+    "height applied": (apply_scale(1.0, 1.0, 2.0), "", ""),
+    "turn applied": (apply_turn, LAYOUT, ROWS),
+    "converted to a mesh": (convert("MESH"), NOT_PINS, NOT_PINS),
+    "converted to a curve, which it cannot be": (convert("CURVE"), "", ""),
+    "modifier applied": (lambda bed: bpy.ops.object.modifier_apply(modifier=bed.modifiers[0].name),
+                         NOT_PINS, NOT_PINS),
+    "pins separated": (in_edit_mode(lambda: bpy.ops.mesh.separate(type="SELECTED")), SOME, SOME),
+    "pins duplicated": (in_edit_mode(bpy.ops.mesh.duplicate), SOME, SOME),
+    "pins in another order": (in_edit_mode(shuffle), LAYOUT, "must fill rows of 2 pins"),
+    "pins of a row in another order": (in_edit_mode(reverse_some), LAYOUT, "must order the pins row by row"),
+    "a pin moved aside": (in_edit_mode(move_one), LAYOUT, ""),
+    "duplicated, linked": (lambda _: bpy.ops.object.duplicate(linked=True), "", ""),
+    "made a single user": (make_single, "", ""),
+    "instances made real": (lambda _: bpy.ops.object.duplicates_make_real(), "", ""),
+    "instances made real, with parents": (
+        lambda _: bpy.ops.object.duplicates_make_real(use_base_parent=True, use_hierarchy=True), "", "",
+    ),
+    "joined into a cube": (join(lambda _: bpy.data.objects["Cube"]), "no bed", "no bed"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_what_blenders_own_verbs_make_of_a_bed_is_formed_right_or_refused_with_its_cause(folder, verb):
+    work, of_session, of_export = VERBS[verb]
+    bed = prepare(SESSION, "plain")
+    drawn = read_attributes(bed.data)
+    if of_session == "":
+        assert [call_on(bed, name) for name in (SESSION, "digiclay.bake")] == ["", ""]
+        formed = read_attributes(bed.data)
+        bed = prepare(SESSION, "plain")
+    select(bed)
+    work(bed)
+    done(verb)
+    assert (beds() == []) == (of_session == "no bed")
+    for each in beds():
+        if of_session == "":
+            drawn_now = read_attributes(each.data)
+            assert drawn_now == drawn or verb == "height applied"
+        said = {name: call_on(each, name) for name in (SESSION, "export_mesh.digital_clay", "digiclay.bake")}
+        for name, message in said.items():
+            wanted = of_export if name.startswith("export") else of_session
+            assert bool(message) == bool(wanted), name
+            assert wanted in message, name
+            assert "\n" not in message.strip(), name
+            assert len(message) <= 400, name
+        if of_session == "":
+            assert read_attributes(each.data) == formed
+
+
+def call_on(bed: Any, name: str) -> str:
+    """Return what is said against a session or an operator of a bed that is selected alone."""
+    select(bed)
+    return (start(bed) if name == SESSION else call(bed, name))[0]

@@ -9,8 +9,11 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from .. import bridge
 from ..compat import bpy, read_stored
+from ..core.base.arrays import Floats
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters, list_quantities
 from ..core.control.methods import METHODS, find_method, list_methods
@@ -194,16 +197,14 @@ def find_layout_mismatch(bed: Any, layout: Layout) -> str:
     pins, wanted = len(bed.data.vertices), layout.rows * layout.columns
     if pins != wanted:
         return f"The bed has {pins} pins, not {wanted}"
-    for index, place in _layout_key(layout):
-        x, y, _ = bed.data.vertices[index].co
-        if abs(x / bridge.SCALE - place[0]) > AWAY or abs(y / bridge.SCALE - place[1]) > AWAY:
-            return "The pins differ from the parameters of Layout"
+    places = np.empty(3 * pins, np.float32)
+    bed.data.vertices.foreach_get("co", places)
+    if np.abs(places.reshape(-1, 3)[:, :2] / bridge.SCALE - _find_places(layout)).max() > AWAY:
+        return "The pins differ from the parameters of Layout"
     return ""
 
 
 @lru_cache(maxsize=32)
-def _layout_key(layout: Layout) -> tuple[tuple[int, list[float]], ...]:
-    """Return index and place of the pins that tell layouts of as many pins apart, m."""
-    places = make_grid(layout).positions
-    last = layout.rows * layout.columns - 1
-    return tuple((index, places[index].tolist()) for index in sorted({0, min(layout.columns, last), last}))
+def _find_places(layout: Layout) -> Floats:
+    """Return where the pins of a layout stand (n, 2), m."""
+    return make_grid(layout).positions

@@ -68,41 +68,58 @@ def test_the_bed_follows_a_fingertip_moved_by_other_means(bed: Any, clock: Clock
     assert exact(bed).min() < 39e-3
 
 
-#: A playback: time between two ticks, s, ticks from a frame that is shown to the next, and frames till then.
+#: A playback: time between two ticks, s, ticks from a frame that is shown to the next, frames till then, the
+#: first frame, and settings of the scene's time.
 PLAYBACKS = {
-    "in time": (TICK, 1.25, 1),
-    "at a tenth of the speed": (10.0 / 24.0, 1.0, 1),
-    "at a tenth of the speed, ticks between": (TICK, 12.5, 1),
-    "five of six frames left out": (6.0 / 24.0, 1.0, 6),
+    "in time": (TICK, 1.25, 1, 1, {}),
+    "at a tenth of the speed": (10.0 / 24.0, 1.0, 1, 1, {}),
+    "at a tenth of the speed, ticks between": (TICK, 12.5, 1, 1, {}),
+    "five of six frames left out": (6.0 / 24.0, 1.0, 6, 1, {}),
+    "of 29.97 frames a second": (TICK, 1.0, 1, 1, {"fps": 30, "fps_base": 1.001}),
+    "by steps of three frames": (TICK, 3.75, 3, 1, {"frame_step": 3}),
+    "from frame 101 on": (TICK, 1.25, 1, 101, {"frame_start": 101}),
+    "stretched to twice its time": (TICK, 1.25, 1, 1, {"frame_map_new": 200}),
+    "pressed into half its time": (TICK, 1.25, 1, 1, {"frame_map_new": 50}),
 }
 
 
 @pytest.mark.parametrize("how", PLAYBACKS)
 def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed: Any, clock: Clock, how: str) -> None:
-    wall, ticks, frames = PLAYBACKS[how]
+    wall, ticks, frames, start, settings = PLAYBACKS[how]
     tip, scene = fingertip_of(bed), bpy.context.scene
-    for frame, z in ((1, 46.0), (13, 37.0), (25, 37.0), (49, 43.0)):
+    keys, heights = start + np.array([0, 12, 24, 48]), (46.0, 37.0, 37.0, 43.0)
+    for frame, z in zip(keys.tolist(), heights, strict=True):
         tip.location.z = (z + 8.0) * 1e-3 * bridge.SCALE
         tip.keyframe_insert("location", frame=frame)
+    for name, value in settings.items():
+        setattr(scene.render if hasattr(scene.render, name) else scene, name, value)
     for key in (key for group in curves(tip) for curve in group for key in curve.keyframe_points):
         key.interpolation = "LINEAR"
-    scene.frame_set(1)
+    scene.frame_set(start)
     started(bed)
-    period = running.find(bed).system.period
-    *_, baked = bake.sample_path(scene, bed, 1, 49, period)
+    period, render = running.find(bed).system.period, scene.render
+    stretched = render.frame_map_new / 100
+    rate = render.fps / render.fps_base
+    frame_numbers = start + np.arange(49)
+    of_frames = 1e-3 * np.interp(frame_numbers / stretched, keys, heights)
+    in_frames = start + np.arange(int(48 / rate / period + 1e-6) + 1) * period * rate
+    expected = np.interp(in_frames, frame_numbers, of_frames)
+    if stretched == 1.0:
+        *_, baked = bake.sample_path(scene, bed, start, start + 48, period)
+        np.testing.assert_allclose(baked[:, 0, 2], expected, rtol=0, atol=1e-7)
     clock.tick(3)
     bpy.ops.screen.animation_play()
     clock.tick()
     running.put(sculpting.set_recording(running.find(bed), True))
     for count in range(int(ticks * 48 / frames) + 2):
-        scene.frame_set(min(1 + frames * int(count / ticks), 49))
+        scene.frame_set(start + min(frames * int(count / ticks), 48))
         clock.now += wall - TICK
         assert clock.tick() == []
     bpy.ops.screen.animation_cancel(restore_frame=False)
     path = running.find(bed).recording.path
-    assert len(path) == len(baked)
-    # A frame lasts no whole number of periods: the way of one, at 18 mm/s, may be gone a period early.
-    np.testing.assert_allclose(path, baked, rtol=0, atol=18e-3 * period)
+    assert len(path) == len(expected)
+    # A frame lasts no whole number of periods: the way of one, at 0.75 mm a frame, may be gone early.
+    np.testing.assert_allclose(path[:, 0, 2], expected, rtol=0, atol=0.75e-3 / stretched * rate * period)
     clock.tick(3)
     assert len(running.find(bed).recording.path) == len(path) + 20  # 0.1 s by the wall's clock
 
