@@ -16,6 +16,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, from_bytes, make_take, replay
 
+from digiclay_serve import serve_command
 from digiclay_serve.doors import Doors, Order, make_slot, open_slot, pack_order, unpack_order
 from digiclay_serve.protocol import (
     LIMITS,
@@ -379,3 +380,11 @@ def test_what_cannot_be_opened_is_told_in_a_line(here: Path, refused: Any) -> No
         command = ["serve", *FEW_PINS, "--osc-port", "0", "--port", port, "--out", "take"]
         refused(command, f"Port {port} of 127.0.0.1 cannot be opened: ")
     assert left(here) == []
+
+
+@pytest.mark.parametrize(("late", "share"), [(0, "0 %"), (1, "0.5 %"), (200, "100 %"), (199, "99.5 %")])
+def test_the_summary_gives_the_share_of_late_periods_in_plain_digits(late: int, share: str) -> None:
+    shares = {"p50": 0.0, "p99": 0.0, "p99.9": 0.0, "longest": 0.0}
+    figures = {"elapsed": shares, "period": 1e-3, "periods": 200, "missed": late, "left_out": 0}
+    first = next(serve_command._summary({**figures, "counts": {}, "flagged": {}}))
+    assert f"{late} late ({share})" in first
