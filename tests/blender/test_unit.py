@@ -147,6 +147,16 @@ def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked, along):
         assert (len(beds()), whole(*beds())) == (count, True)
 
 
+def test_what_is_done_right_after_undo_is_not_undone_with_it():
+    duplicate(added())
+    bpy.ops.ed.undo()  # to the copy as Blender made it, without a fingertip
+    bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(1.0, 0.0, 0.0))  # listed, with an undo step
+    looked()
+    assert (sorted(bed.location.x for bed in beds()), whole(*beds())) == ([0.0, 1.0], True)
+    undone()
+    assert (len(beds()), whole(*beds())) == (1, True)
+
+
 def test_several_beds_are_copied_at_once_and_the_first_ones_deleted_before_anybody_looks():
     first = [added(), added(1.0)]
     select(*first)

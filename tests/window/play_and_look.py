@@ -303,6 +303,21 @@ def pressed(blender: Any, name: str, kind: str, **held: bool) -> Iterator[float 
     yield from looked(blender, name)
 
 
+def changed_by_f9(blender: Any, name: str) -> Iterator[float | None]:
+    """Click on "Linked" in the panel of a copy that F9 opens beside the mouse, and leave the panel."""
+    x, y = blender.middle()
+    blender.event("MOUSEMOVE", "NOTHING", (x, y))
+    yield 0.2
+    blender.key("F9", (x, y))
+    yield 0.5
+    yield from blender.click((x + 137, y - 51))
+    yield from looked(blender, name)
+    blender.SEEN["linked by F9"] = len({bed.data.name for bed in blender.beds()}) == 1
+    for at in ((x, y + 60), (x - 250, y + 150)):
+        blender.event("MOUSEMOVE", "NOTHING", at)
+        yield 0.3
+
+
 def units(blender: Any) -> Iterator[float | None]:
     """Delete a bed, undo and redo that; drag a copy off, undo and redo that; hide; delete in mid-session."""
     blender.event("MOUSEMOVE", "NOTHING", blender.middle())
@@ -322,6 +337,7 @@ def units(blender: Any) -> Iterator[float | None]:
     yield 0.5
     blender.key("LEFTMOUSE", (x + 120, y))
     yield from looked(blender, "copied")
+    yield from changed_by_f9(blender, "copy changed by F9")
     yield from pressed(blender, "copy undone", "Z", ctrl=True)
     yield from pressed(blender, "copy redone", "Z", ctrl=True, shift=True)
     blender.select(blender.beds()[0])

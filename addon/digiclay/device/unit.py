@@ -411,9 +411,11 @@ def _repair(faults: Faults) -> None:
 
 
 def _repeat_step(came: str) -> bool:
-    """Undo or redo one more step; return whether there was one."""
+    """Undo or redo one more step, unless something was done since; return whether one was."""
     operator = getattr(bpy.ops.ed, came)
-    if operator.poll():
+    # Both free the operators that are listed, and one that is was run later. It may be shown by F9, and
+    # Blender crashes when what its panel shows is freed.
+    if operator.poll() and not bpy.context.window_manager.operators:
         operator()
     return bool(_watch.came)
 
