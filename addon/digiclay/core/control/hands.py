@@ -31,7 +31,7 @@ NEW, UNDER = 0.65, 0.5
 REACHED = 6e-3
 #: How far a pin may stand above a fingertip's underside and tell where it is, m: one that another fingertip's
 #: blister holds up beside it would draw its master there.
-ASIDE = 2e-3
+ASIDE = 1e-3
 #: How near a pressed pin two undersides must be for both to be able to press it, m.
 UNCLEAR = 0.2e-3
 #: Share of a pin that a finger does not see.
@@ -73,10 +73,10 @@ class HandControl:
         return CAPTURE * (1.0 + RELATIVE_TOLERANCE) * np.array(self.sizes)
 
     @cached_property
-    def _sizes(self) -> tuple[Cells, Floats, Floats, Floats]:
-        """The fingers, their sizes, m, squares of `capture`, m², and their heights, m, (f, 1) each."""
-        numbers, sizes, heights = np.arange(len(self.runs)), np.array(self.sizes), np.array(self.heights)
-        return numbers[:, None], sizes[:, None], self.capture[:, None] ** 2, heights[:, None]
+    def _sizes(self) -> tuple[Cells, Floats, Floats]:
+        """The fingers, their sizes, m, and squares of `capture`, m², (f, 1) each."""
+        numbers = np.arange(len(self.runs))
+        return numbers[:, None], np.array(self.sizes)[:, None], self.capture[:, None] ** 2
 
     @property
     def rows(self) -> int:
@@ -226,14 +226,14 @@ class HandControl:
         """Return the undersides of fingers over pins of a `height`, (f, q), m; infinite where one is far."""
         x, y = self._place(memory).T
         square = measure_square(x, y, basis)
-        _, size, reach, tall = self._sizes
+        _, size, reach = self._sizes
         far: Flags = square > reach
         if not self._predicts:
             tops = np.array([getattr(own, "height", 0.0) for own in memory.fingers])[:, None]
             square /= size * size
             heights = continue_ball(square)
-            heights *= tall
-            heights += tops + tall
+            heights *= size
+            heights += tops + size
             heights[far] = np.inf
             return heights
         under = np.full(square.shape, np.inf)
@@ -315,7 +315,11 @@ class HandTogether(HandControl):
         self, memory: tuple[Any, ...], touched: Measurement, pressed: Cells, owner: Cells, under: Floats
     ) -> list[tuple[Any, Disc | None]]:
         """Let each see the pressed cells, without the forces on those of the others."""
-        near = find_lowest(np.where(under < touched.height[pressed] - ASIDE, np.inf, under))
+        # `under` takes a fingertip for a ball; it is less tall than wide.
+        tops = np.array([finger.height for finger in memory])[:, None]
+        flatness = np.array(self.heights)[:, None] / self._sizes[1]
+        tips = tops + (under - tops) * flatness
+        near = find_lowest(np.where(tips < touched.height[pressed] - ASIDE, np.inf, tips))
         owner = np.where(near == NOBODY, owner, near)
         own = owner[:, None] == self._sizes[0].T
         columns = touched._replace(
