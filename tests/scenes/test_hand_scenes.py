@@ -96,7 +96,7 @@ def test_a_command_takes_a_scene_of_two_fingers(command, made, tmp_path, monkeyp
     ("command", "said"),
     [
         ([*SHAPED[:-2], "--finger", "press"], "formed by the first of 2 fingers alone"),
-        (["compare", "my.toml", "--speed", "--out", "out"], "Followed, the first of the fingers alone, searched"),
+        (["compare", "my.toml", "--speed", "--out", "out"], "Followed, the first of the fingers alone, "),
         (["compare", "my.toml", "--out", "out"], "Of 2 fingers the worst; metrics.json has each."),
     ],
 )
