@@ -87,23 +87,6 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeyp
     assert (job.name, job.scene and job.scene.simulation.duration) == ("Übung_1", 0.25)
 
 
-ODD_NAMES = ["100 %", "#1", "it's", 'a "b"', "-lead", "%20", "a;b&c", "$HOME", "~", "漢 é"]
-
-
-def test_scenes_with_any_signs_in_their_names_are_jobs_with_safe_names_of_their_own():
-    for number, name in enumerate(ODD_NAMES, 1):
-        Path(f"{name}.toml").write_text(f"simulation.duration = {number}", encoding="utf-8")
-    names = [f"{name}.toml" for name in ODD_NAMES]
-    made = read_jobs(write(f"scenes = {json.dumps(names)}")).jobs
-    assert [job.scene and job.scene.simulation.duration for job in made] == [*range(1, len(names) + 1)]
-    assert len({job.name for job in made}) == len(names)
-    assert all(re.fullmatch(r"[\w+][\w.+-]*", job.name) for job in made)
-    Path("a\nb.toml").write_text("", encoding="utf-8")
-    with pytest.raises(SceneError, match="name must be printable") as caught:
-        read_jobs(write('scenes = ["a\\nb.toml"]'))
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("said", "told"),
     [

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +12,7 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands.batch_folder import open_batch
-from digiclay.core.base.errors import OutputError
+from digiclay.core.base.errors import OutputError, SceneError
 from digiclay.core.files import run_folder
 from digiclay.core.files.file_lock import find_host
 from digiclay.core.session.finished_run import is_whole
@@ -33,6 +34,26 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
     (work / "jobs.toml").write_text('scenes = ["my.toml"]', encoding="utf-8")
     return folder_with(SCENE, work, monkeypatch)
+
+
+ODD_NAMES = ["100 %", "#1", "it's", 'a "b"', "-lead", "%20", "a;b&c", "$HOME", "~", "漢 é"]
+
+
+def test_scenes_with_any_signs_in_their_names_are_jobs_with_safe_names_of_their_own():
+    for number, name in enumerate(ODD_NAMES, 1):
+        Path(f"{name}.toml").write_text(f"simulation.duration = {number}", encoding="utf-8")
+    names = [f"{name}.toml" for name in ODD_NAMES]
+    jobs = Path("jobs.toml")
+    jobs.write_text(f"scenes = {json.dumps(names)}", encoding="utf-8")
+    made = read_jobs(jobs).jobs
+    assert [job.scene and job.scene.simulation.duration for job in made] == [*range(1, len(names) + 1)]
+    assert len({job.name for job in made}) == len(names)
+    assert all(re.fullmatch(r"[\w+][\w.+-]*", job.name) for job in made)
+    Path("a\nb.toml").write_text("", encoding="utf-8")
+    jobs.write_text('scenes = ["a\\nb.toml"]', encoding="utf-8")
+    with pytest.raises(SceneError, match="name must be printable") as caught:
+        read_jobs(jobs)
+    assert "\n" not in str(caught.value)
 
 
 @given(st.text())
