@@ -31,7 +31,7 @@ NEW, UNDER = 0.65, 0.5
 REACHED = 6e-3
 #: How far a pin may stand above a fingertip's underside and tell where it is, m: one that another fingertip's
 #: blister holds up beside it would draw its master there.
-ASIDE = 1e-3
+ASIDE = 1.5e-3
 #: How near a pressed pin two undersides must be for both to be able to press it, m.
 UNCLEAR = 0.2e-3
 #: Share of a pin that a finger does not see.

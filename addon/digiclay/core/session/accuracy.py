@@ -191,7 +191,9 @@ def describe_bends(scene: Scene) -> str:
 def _measure_bends(paths: tuple[Path, ...], step: float, duration: float) -> float:
     """Return how far fingertips leave the straight way within a physics step, m."""
     trajectories, largest = [path.trajectory() for path in paths], 0.0
-    count = math.ceil(duration / step)
+    # After its last waypoint a fingertip stays, however long the session is.
+    moved = min(duration, max((trajectory.duration for trajectory in trajectories), default=0.0))
+    count = math.ceil(moved / step)
     for first in range(0, count, BLOCK):
         steps = min(BLOCK, count - first)
         times = (first + np.arange(steps * PARTS + 1) / PARTS) * step
