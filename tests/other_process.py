@@ -25,8 +25,9 @@ def dead() -> int:
 def start(script: str, *arguments: str, env: dict[str, str] | None = None, **options: Any) -> Any:
     """Start Python on a script that may import the package."""
     return subprocess.Popen(
-        [sys.executable, "-c", script, *arguments], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": PACKAGES, **(env or {})}, **options,
+        [sys.executable, "-c", script, *arguments], text=True, encoding="utf-8", stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": PACKAGES, **(env or {})}, **options,
     )  # fmt: skip
 
 

@@ -83,7 +83,7 @@ def serve(folder: Path, *options: str, rate: int = 200) -> Iterator[Server]:
     command += ["--osc-port", "0", "--token", TOKEN, "--report", "report.json", *options]
     path = os.pathsep.join([str(ROOT / "addon"), str(ROOT)])
     process = subprocess.Popen(
-        command, cwd=folder, env={**os.environ, "PYTHONPATH": path}, text=True,
+        command, cwd=folder, env={**os.environ, "PYTHONPATH": path}, text=True, encoding="utf-8",
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         # Its end by SIGHUP is tested, also below a nohup, which would have it ignored.
         preexec_fn=partial(signal.signal, signal.SIGHUP, signal.SIG_DFL),
