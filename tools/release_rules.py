@@ -9,7 +9,7 @@ import subprocess
 import tomllib
 from pathlib import Path
 
-INIT = "addon/digiclay/__init__.py"
+VERSION_FILE = "addon/digiclay/core/version.py"
 MANIFEST = "addon/digiclay/blender_manifest.toml"
 CHANGELOG = "CHANGELOG.md"
 REPORTS = ".reports"
@@ -36,11 +36,13 @@ def tag_of(version: str) -> str:
 
 def read_versions(root: Path) -> dict[str, str]:
     """Return the version in each file that has one, empty where there is none."""
-    version = re.search(r'^__version__ = "([^"]*)"$', (root / INIT).read_text(encoding="utf-8"), re.MULTILINE)
+    version = re.search(
+        r'^__version__ = "([^"]*)"$', (root / VERSION_FILE).read_text(encoding="utf-8"), re.MULTILINE
+    )
     manifest = tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
     heading = HEADING.search((root / CHANGELOG).read_text(encoding="utf-8"))
     return {
-        INIT: version[1] if version else "",
+        VERSION_FILE: version[1] if version else "",
         MANIFEST: str(manifest.get("version", "")),
         CHANGELOG: heading[1].split(" ")[0] if heading else "",
     }
@@ -117,7 +119,7 @@ def find_obstacles(root: Path, version: str, folder: Path) -> list[str]:
         return [f"the version must be three numbers such as 0.1.0 (got {version!r})."]
     if git(root, "rev-parse", "--verify", "HEAD").returncode:
         return [f"{root} is no git repository with a commit."]
-    missing = [path for path in (INIT, MANIFEST, CHANGELOG) if not (root / path).is_file()]
+    missing = [path for path in (VERSION_FILE, MANIFEST, CHANGELOG) if not (root / path).is_file()]
     if missing:
         return [f"{path} is missing." for path in missing]
     wrong = _find_in_history(root, version)

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .core.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from os import PathLike
 
     from .core.scene.schema import Scene
     from .core.session.run_scene import Result
-
-__version__ = "0.2.0"
 
 
 def register() -> None:
@@ -90,4 +90,4 @@ def run(scene: Scene, progress: Callable[[int, int], None] | None = None) -> Res
     """
     from .core.session import run_scene
 
-    return run_scene.run(scene, progress=progress, versions={"digiclay": __version__})
+    return run_scene.run(scene, progress=progress)

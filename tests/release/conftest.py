@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 FOLDER = f"dist/digiclay-{__version__}"
 TAG = f"v{__version__}"
 CHANGELOG = "CHANGELOG.md"
-INIT = "addon/digiclay/__init__.py"
+VERSION_FILE = "addon/digiclay/core/version.py"
 MANIFEST = "addon/digiclay/blender_manifest.toml"
 #: Wheels fetched before; without a copy of them each release would fetch them again.
 WHEELS = "build/wheels"

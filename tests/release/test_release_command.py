@@ -14,9 +14,9 @@ from tests.release.conftest import (
     CHANGELOG,
     ENVIRONMENT,
     FOLDER,
-    INIT,
     MANIFEST,
     TAG,
+    VERSION_FILE,
     commit,
     edit,
     git,
@@ -70,7 +70,10 @@ FAILED = "tests in a window: FAILED (status 1)\n"
 BROKEN: dict[str, tuple[Change, str]] = {
     "a change that is not committed": (write("README.md", "Changed."), "README.md is not committed"),
     "a file that git does not know": (write("addon/digiclay/new.py", ""), "addon/digiclay/new.py is not"),
-    "another version of the package": (edit(INIT, __version__, "9.9.9"), f"{INIT} has version 9.9.9, and"),
+    "another version of the package": (
+        edit(VERSION_FILE, __version__, "9.9.9"),
+        f"{VERSION_FILE} has version 9.9.9, and",
+    ),
     "another version of the extension": (
         edit(MANIFEST, f'\nversion = "{__version__}"', '\nversion = "9.9.9"'),
         f"{MANIFEST} has version 9.9.9",

@@ -8,13 +8,13 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files import run_folder
 from ..core.metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series
+from ..core.version import __version__
 from ..plugins.method_loader import write_code
 from .gallery import NAMES, Card, page
 from .job_steps import ERROR, RUNS, TIMING, find_error, is_done, read_tail

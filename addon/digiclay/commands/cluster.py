@@ -21,11 +21,11 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from .. import __version__
 from ..core.base.addresses import describe_exposure
 from ..core.base.errors import DigiclayError, one_line
 from ..core.studies.axes import Point, Record
 from ..core.studies.evaluation import evaluate_bundle
+from ..core.version import __version__
 from .stop import allow_interrupt
 
 

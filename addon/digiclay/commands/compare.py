@@ -11,7 +11,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from .. import __version__
 from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
@@ -26,6 +25,7 @@ from ..core.session.run_scene import RUN_METRICS, run
 from ..core.studies.axes import Point, Record
 from ..core.studies.speed_limits import HIGH, LOW, Criterion, Drag, Lift, describe_end, find_largest_speed
 from ..core.studies.sweep_plan import Folder, hash_points, open_points
+from ..core.version import __version__
 from ..plugins.method_loader import find_installed, is_file_word
 from .arguments import METHOD, QUIET, add_scene, command, load_by_option, say, settings_of
 from .outside import SUITE, find_beside, refuse_absent

@@ -11,7 +11,6 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, one_line
 from ..core.files import run_folder
 from ..core.scene.scene_source import load, load_recorded
@@ -20,6 +19,7 @@ from ..core.session.finished_run import Run, has_files, is_whole, read_run
 from ..core.session.render_settings import format_range, list_missing, name_frame, read_range
 from ..core.session.run_scene import run, save
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
+from ..core.version import __version__
 from ..plugins.method_loader import CODE, describe_origin
 from .arguments import formats
 from .export import exported
@@ -199,7 +199,7 @@ class Work:
             timing[name] = time.perf_counter() - began
 
         with step("run") as progress:
-            versions = {"digiclay": __version__, **describe_origin(scene)}
+            versions = describe_origin(scene)
             result = run(scene, progress=progress, stopped=stopped, versions=versions)
             if result.incomplete:
                 raise KeyboardInterrupt

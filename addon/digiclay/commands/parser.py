@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, NoReturn
 
-from .. import __version__
 from ..core.base.errors import one_line
 from ..core.base.quantity import find_nearest_name
+from ..core.version import __version__
 from .arguments import Help
 from .stop import WRONG
 

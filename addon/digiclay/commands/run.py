@@ -14,7 +14,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .. import __version__
 from ..core.base.errors import OutputError, ParameterError, SceneError
 from ..core.control.methods import list_added
 from ..core.files.run_folder import Claim, claim_folder, find_name
@@ -198,11 +197,11 @@ def plan_meshes(
 
 def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop) -> Result:
     """Run the session of a scene and estimate its errors under progress bars; `path`: of its file."""
-    versions = {"digiclay": __version__}
+    versions = dict[str, str]()
     if scene.method in list_added():
         from ..plugins.method_loader import describe_origin
 
-        versions |= describe_origin(scene)
+        versions = describe_origin(scene)
     period, quiet = scene.simulation.control_period, arguments.quiet
     try:
         with Bar(sys.stderr, scene.name, period, quiet=quiet) as bar:

@@ -6,7 +6,6 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import write_whole
 from ..core.metrics.metric_table import ERRORS
@@ -20,6 +19,7 @@ from ..core.studies.evaluation import (
     read_metrics,
 )
 from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
+from ..core.version import __version__
 from .arguments import command, name_methods, settings_of
 from .evaluation_pool import Evaluation, add_series, run_series
 from .progress import Counted

@@ -25,6 +25,7 @@ from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT, format_scene
+from ..version import __version__
 from .accuracy import Errors, describe_bends, estimate_errors, explain_absence
 from .memory_limit import check_memory
 
@@ -173,6 +174,7 @@ def report(
         "method": scene.method if scene.control else ABSENT,
         "stepper": scene.simulation.stepper,
         "versions": {
+            "digiclay": __version__,
             **versions,
             "numpy": np.__version__,
             "python": platform.python_version(),
