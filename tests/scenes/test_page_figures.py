@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 import pytest
-from digiclay.core.batch.run_together import begin_play, play_all
+from digiclay.core.batch.play import begin_play, play_all
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session.run_scene import run

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DivergenceError, ParameterError
-from digiclay.core.batch.packing import describe_structure
-from digiclay.core.batch.run_together import begin_play, measure_together, play_all, run_together
+from digiclay.core.batch.play import begin_play, play_all
+from digiclay.core.batch.run_together import measure_together, run_together
+from digiclay.core.batch.structure import describe_structure
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.metrics.metric_table import METRICS

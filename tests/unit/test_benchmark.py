@@ -10,7 +10,7 @@ from types import FrameType
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError, OutputError
-from digiclay.core.batch.packing import describe_structure
+from digiclay.core.batch.structure import describe_structure
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.studies.axes import Point

@@ -16,7 +16,7 @@ from digiclay.cli import main
 from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere, submit
 from digiclay.commands.worker import Processes
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
-from digiclay.core.batch.packing import Findings, describe_structure
+from digiclay.core.batch.structure import Findings, describe_structure
 from digiclay.core.scene.assembly import assemble, count_rows, make_motion
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.accuracy import estimate_errors

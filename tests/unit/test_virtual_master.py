@@ -10,6 +10,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.masters import VirtualMasterBatch, VirtualMasterColumns, gather
+from digiclay.core.control.side_by_side import join_controllers
 from digiclay.core.control.travel import Heading
 from digiclay.core.control.virtual_master import (
     MANY,
@@ -23,7 +24,6 @@ from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.valve import Fluid, Valve
-from digiclay.core.scene.columns import join_controllers
 
 from tests.assemble import make_basis, make_system, master, path, record
 

@@ -1,6 +1,5 @@
 """Sessions of many scenes in one call: played in step, recorded, evaluated."""
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,104 +10,18 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import DigiclayError, ParameterError
 from ..base.modes import Mode
-from ..engine.simulation import repeat_period, simulate_period
-from ..engine.state import ActiveSet, State
+from ..engine.simulation import repeat_period
+from ..engine.state import ActiveSet
 from ..engine.system import System
 from ..metrics.summary import CellSums, compute_metrics_from_sums, sum_row
-from ..model.fingertip import require_one
-from ..model.touch import FingerPath, FingerPeriod
-from ..model.trajectory import Trajectory
 from ..scene.assembly import assemble
-from ..scene.columns import Batch, begin, make_batch
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, explain_absence, make_reference
 from ..session.memory_limit import check_memory
-from ..session.run_scene import Ended, Result, evaluate, report
-from .packing import (
-    Findings,
-    describe_structure,
-    extend_path,
-    find_diverged,
-    make_divergence_error,
-    select_runs,
-)
-
-
-@dataclass(frozen=True, eq=False)
-class Play:
-    """Sessions under way, and all it takes to go on."""
-
-    ways: Mapping[int, Trajectory]
-    """By the numbers of their runs."""
-    runs: tuple[int, ...]
-    """Whose the last axis is."""
-    batch: Batch
-    state: State
-    path: FingerPath | None = None
-    """Of the fingertips, in the coming periods as far as it is computed."""
-
-    @property
-    def finger(self) -> FingerPeriod | None:
-        """Fingertip path in the coming control period."""
-        return self.path.at(self.state.period) if self.path else None
-
-
-def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Play:
-    """Return sessions before their first control period. `scenes`: by the numbers of their runs."""
-    batch = make_batch([systems[run] for run in scenes])
-    ways = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
-    return Play(ways, tuple(scenes), batch, begin(batch))
-
-
-def locate_fingers(play: Play) -> Play:
-    """Return the sessions with the way of their fingers through the coming control period."""
-    ways = [play.ways[run] for run in play.runs]
-    return replace(play, path=extend_path(play.path, play.batch.systems, ways, play.state.period))
-
-
-def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
-    """Return some of the sessions. `runs`: those that go on."""
-    places = [play.runs.index(run) for run in runs]
-    batch = make_batch([play.batch.systems[place] for place in places])
-    return replace(play, runs=runs, batch=batch, state=select_runs(play.state, places), path=None)
-
-
-@dataclass(frozen=True, eq=False)
-class Instant:
-    """The sessions after a control period."""
-
-    play: Play
-    over: NDArray[np.bool_]
-    failed: NDArray[np.bool_]
-    """(b,): Which have come to their end, and which of them in an error."""
-    share: float
-    """The time each has taken, s: every period's, divided by the runs that were in the batch."""
-
-    def ended(self, index: int) -> Ended:
-        """Return how far the run at an index of the last axis has come."""
-        state = self.play.state
-        return Ended(state.period, self.share, getattr(state.memory[index], "losses", None))
-
-
-def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:
-    """Yield the sessions after each control period; what is at its end leaves before the next one."""
-    share = 0.0
-    while play.runs:
-        started = time.perf_counter()
-        play = locate_fingers(play)
-        play = replace(play, state=simulate_period(play.batch, play.state, play.finger))
-        failed = find_diverged(play.state)
-        share += (time.perf_counter() - started) / len(play.runs)
-        if stopped and stopped():
-            return
-        over = failed | [ends[run] == play.state.period for run in play.runs]
-        yield Instant(play, over, failed, share)
-        if over.all():
-            return
-        if over.any():
-            play = keep_runs(play, tuple(run for run, gone in zip(play.runs, over, strict=True) if not gone))
-
+from ..session.run_scene import Result, evaluate, report
+from .play import Instant, Play, begin_play, keep_runs, locate_fingers, make_divergence_error, play_all
+from .structure import Findings, describe_structure
 
 #: A plain number: numpy compares with it ten times as fast.
 FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)
@@ -267,7 +180,7 @@ def _refuse_unlike(scenes: Mapping[int, Scene]) -> None:
     first, wanted = next(iter(structures.items()))
     for run, structure in structures.items():
         if structure != wanted:
-            rule = "must have the bed, the parts and the steps of each other (packing.describe_structure)"
+            rule = "must have the bed, the parts and the steps of each other (structure.describe_structure)"
             raise ParameterError("Batch", "scenes", rule, f"number {run} unlike number {first}")
 
 
@@ -316,10 +229,10 @@ def run_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes from rest to their ends, all at once.
 
-    The scenes are of one finger each, and of one `packing.describe_structure`. When `stopped`, asked after
+    The scenes are of one finger each, and of one `structure.describe_structure`. When `stopped`, asked after
     each control period, says True, the runs that are not done are given up. Yields the number of a scene at
     its end, and what `run_scene.run` would return or raise; the history is valid until the next result is
-    asked for, and the run time is a share, see `run_together.Instant`.
+    asked for, and the run time is a share, see `play.Instant`.
     """
     return _run(scenes, Histories, stopped)
 

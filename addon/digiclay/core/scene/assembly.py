@@ -233,7 +233,7 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     from ..control.cell_hands import CellHands
     from ..control.hands import HandInGroups, HandTogether
     from ..control.servo import BatchControl
-    from .columns import join_controllers
+    from ..control.side_by_side import join_controllers
 
     if not (hasattr(controllers[0], "blister") and hasattr(controllers[0].begin(), "place")):
         return controllers[0]  # it follows no fingertip

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
-from ..batch.packing import Findings, describe_structure
 from ..batch.run_together import measure_together
+from ..batch.structure import Findings, describe_structure
 from ..control.methods import find_method
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
 from ..scene.schema import Scene

@@ -1,22 +1,11 @@
-"""Batch: which scenes go together, the paths of their fingertips, and the runs that go on."""
+"""Structure of scenes: those of one structure go together in a batch."""
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..base.errors import DivergenceError
-from ..engine.simulation import CHUNK, find_divergence
-from ..engine.state import State
-from ..engine.system import System
 from ..model.layout import Grid, make_grid
-from ..model.touch import FingerPath, join_paths, trace_finger
-from ..model.trajectory import Trajectory
 from ..scene.assembly import Motion, count_rows, make_motion
-from ..scene.columns import Batch
 from ..scene.schema import Scene
 from ..steppers.bernoulli import BernoulliPlan
 
@@ -30,74 +19,9 @@ def classify(value: Any) -> Any:
     return float if isinstance(value, float) else value
 
 
-def extend_path(
-    path: FingerPath | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
-) -> FingerPath | None:
-    """Return the fingertip path of a batch in a period and some more; None where nothing touches."""
-    if systems[0].cell.touch is None or (path and period < path.first + len(path.forms)):
-        return path
-    runs = {_list_causes(*run): run for run in zip(systems, ways, strict=True)}
-    alone = runs.values() if len(runs) == 1 else zip(systems, ways, strict=True)
-    return join_paths([_trace_run(system, way, period) for system, way in alone])
-
-
-def _list_causes(system: System, way: Trajectory) -> tuple[Any, ...]:
-    """Return what a run's fingertip path depends on."""
-    arrays = (system.instants, way.times, way.positions, way.orientations)
-    touch = system.cell.touch
-    return touch and touch.fingertip, way.interpolation, system.period, *(one.tobytes() for one in arrays)
-
-
-def _trace_run(system: System, way: Trajectory, first: int) -> FingerPath:
-    """Compute the fingertip path of one run in some periods."""
-    assert system.cell.touch is not None
-    starts = (first + np.arange(CHUNK)) * system.period
-    poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(CHUNK, -1, 7)
-    return trace_finger(system.cell.touch.fingertip, poses, first)
-
-
-def find_diverged(state: State) -> NDArray[np.bool_]:
-    """Return which runs, (b,), hold numbers that are not finite."""
-    block = state.active.block
-    # One sum tells that all is well, as it nearly always is.
-    if math.isfinite(np.add.reduce(block, axis=None)):
-        return np.zeros(block.shape[2], np.bool_)
-    finite: NDArray[np.bool_] = np.isfinite(block.sum(axis=(0, 1)))
-    return ~finite
-
-
-def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceError:
-    """Return the error of a run, by its index, with a number that is not finite after a control period."""
-    former = state.active
-    error = find_divergence(
-        batch.systems[run], former.cells[:, run], former.block[..., run], state.period - 1
-    )
-    assert error is not None
-    return error
-
-
-def select_runs(state: State, runs: Sequence[int]) -> State:
-    """Return the state of some of the runs. `runs`: their indices on the last axis."""
-    chosen, former = np.array(runs, np.intp), state.active
-    # The discs are not worth keeping: the set is made anew.
-    active = replace(
-        former,
-        cells=former.cells[:, chosen],
-        block=former.block[..., chosen],
-        mode=former.mode[:, chosen],
-        quadratic_basis=former.quadratic_basis[..., chosen],
-        peak=former.peak[chosen],
-        until=0,
-        own=tuple(former.own[run] for run in runs) if former.own else (),
-    )
-    several = (state.rows, state.modes, state.aged)
-    rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
-    memory = [state.memory[run] for run in runs]
-    return State(state.period, rows, modes, aged, state.peak[chosen], active, memory)
-
-
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
+
 
 #: Parts that decide how cells move.
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
