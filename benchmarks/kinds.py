@@ -11,7 +11,8 @@ from typing import Any
 
 from digiclay.commands.arguments import Help, Options, add_command, add_options, add_scene, whole_number
 from digiclay.commands.parser import Parser
-from digiclay.commands.stop import FAILED, refuse_unwritable, refuse_without, refuse_without_blender
+from digiclay.commands.refusals import refuse_unwritable, refuse_without, refuse_without_blender
+from digiclay.commands.stop import FAILED
 from digiclay.core.base.errors import OutputError
 
 from .report import Report, Steps

@@ -8,7 +8,7 @@ from math import cos, radians, sin
 from pathlib import Path
 
 import numpy as np
-from digiclay.commands.stop import refuse_unwritable
+from digiclay.commands.refusals import refuse_unwritable
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError, explain_os_error
 from digiclay.core.model.fingertip import LEVEL

@@ -8,7 +8,8 @@ from typing import Any
 
 from digiclay.commands.arguments import Options, add_command, add_options
 from digiclay.commands.progress import Line
-from digiclay.commands.stop import Stop, refuse_without
+from digiclay.commands.refusals import refuse_without
+from digiclay.commands.stop import Stop
 from digiclay.core.files.run_folder import check_folder, write_folder
 
 EXAMPLES = """\

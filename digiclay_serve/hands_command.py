@@ -15,7 +15,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from digiclay.commands.arguments import Options, add_command, add_options, millimeters, whole_number
-from digiclay.commands.stop import Stop, refuse_without
+from digiclay.commands.refusals import refuse_without
+from digiclay.commands.stop import Stop
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, OutputError
 

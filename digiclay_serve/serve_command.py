@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from digiclay.commands.arguments import Options, add_command, add_options, add_scene, scene_of, whole_number
-from digiclay.commands.stop import Stop, refuse_unwritable, refuse_without
+from digiclay.commands.refusals import refuse_unwritable, refuse_without
+from digiclay.commands.stop import Stop
 from digiclay.core.base.addresses import describe_exposure
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import format_json, write_whole

@@ -10,7 +10,7 @@ from digiclay import __version__
 from digiclay.commands.arguments import METHOD, add_options, settings_of, whole_number
 from digiclay.commands.evaluation_pool import add_pool, run_series
 from digiclay.commands.progress import format_command
-from digiclay.commands.stop import refuse_without
+from digiclay.commands.refusals import refuse_without
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.control.methods import METHODS
 from digiclay.core.files.run_folder import find_name, write_whole

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from digiclay.commands.arguments import add_command, add_options, whole_number
 from digiclay.commands.evaluation_pool import Evaluation, run_series
-from digiclay.commands.stop import refuse_without
+from digiclay.commands.refusals import refuse_without
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.files.run_folder import write_whole

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 from digiclay.compat import strips
-from digiclay.device import unit
+from digiclay.device import repair
 from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE, fingertip_of, is_bed
 
 #: Files with a bed each, by how it was added.
@@ -62,7 +62,7 @@ def done(step: str) -> None:
 
 def looked() -> None:
     bpy.context.view_layer.update()
-    unit.settle()
+    repair.settle()
     bpy.context.view_layer.update()
 
 

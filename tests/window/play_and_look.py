@@ -289,7 +289,7 @@ def counted(blender: Any, name: str) -> None:
 
 
 def looked(blender: Any, name: str) -> Iterator[float | None]:
-    watch = blender.part("device.unit")
+    watch = blender.part("device.repair")
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
     if blender.sessions():

@@ -31,7 +31,8 @@ from .arguments import METHOD, QUIET, add_scene, command, load_by_option, say, s
 from .outside import SUITE, find_beside, refuse_absent
 from .progress import Bar
 from .progress import table as aligned
-from .stop import STOPPED, allow_interrupt, refuse_without
+from .refusals import refuse_without
+from .stop import STOPPED, allow_interrupt
 
 EXAMPLES = """\
 examples:

@@ -16,7 +16,8 @@ from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder
 from .arguments import QUIET, add_options, add_scene, one_of, say, whole_number
 from .progress import Counted
-from .stop import STOPPED, Stop, refuse_without
+from .refusals import refuse_without
+from .stop import STOPPED, Stop
 from .worker import count_cores, in_blender
 
 #: The most processes of a command.

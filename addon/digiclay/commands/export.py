@@ -18,7 +18,7 @@ from ..core.surface.formed import Body, Formed, make_formed
 from ..core.surface.skins import SKINS
 from .arguments import RUN, command, formats, millimeters, say, seconds, told_as_options, whole_number
 from .progress import table as aligned
-from .stop import require_surface
+from .refusals import require_surface
 
 
 def list_choices(choices: Mapping[str, str], form: str = "{}: {}", separator: str = "; ") -> str:

@@ -24,8 +24,8 @@ from ..plugins.method_loader import CODE, describe_origin
 from .arguments import formats
 from .export import exported
 from .gallery import of_heights, of_picture
+from .refusals import refuse_without_blender, require_surface
 from .render import ARRAYS, draw_moving, draw_still, stage_moving
-from .stop import refuse_without_blender, require_surface
 
 #: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.
 RUNS, TIMING, FILES = "runs", "timing.json", "files"

@@ -11,7 +11,7 @@ from ..core.control.methods import METHODS
 from ..core.files.run_folder import make_folder, write_whole
 from ..plugins.method_loader import name_method
 from .arguments import command, say
-from .stop import refuse_unwritable
+from .refusals import refuse_unwritable
 
 EXAMPLES = """\
 examples:

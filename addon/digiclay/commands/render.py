@@ -19,15 +19,8 @@ from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntab
 from ..core.session.run_scene import History
 from .arguments import RUN, Options, command, one_of, say, seconds, size, told_as_options
 from .progress import Counted
-from .stop import (
-    STOPPED,
-    Stop,
-    refuse_file,
-    refuse_unwritable,
-    refuse_without,
-    refuse_without_blender,
-    require_surface,
-)
+from .refusals import refuse_file, refuse_unwritable, refuse_without, refuse_without_blender, require_surface
+from .stop import STOPPED, Stop
 
 if TYPE_CHECKING:
     from ..device.instant import Instant

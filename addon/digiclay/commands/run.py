@@ -30,7 +30,8 @@ from .arguments import (
     told_as_options,
 )
 from .progress import Bar, Line, format_command, table
-from .stop import STOPPED, Stop, refuse_without, refuse_without_blender, require_surface
+from .refusals import refuse_without, refuse_without_blender, require_surface
+from .stop import STOPPED, Stop
 
 if TYPE_CHECKING:
     from ..core.studies.omissions import Fitted

@@ -14,7 +14,7 @@ import numpy as np
 from .. import bridge, preferences
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError, DivergenceError, MethodError
-from ..device import unit, view
+from ..device import repair, view
 from ..device.instant import find_ellipsoids
 from ..recorded import takes
 from ..recorded.bake import is_baked
@@ -48,7 +48,7 @@ def start(context: Any, bed: Any) -> list[Note]:
     if bed.data.users > 1:
         bed.data = bed.data.copy()
         notes.append(localize("{} got pins of its own: it shared them with another bed", bed.name))
-    notes.append(unit.give_fingertip(bed, scene))
+    notes.append(repair.give_fingertip(bed, scene))
     context.view_layer.update()
     reason = blocking_reason(context, bed, scene.cells)
     if reason:

@@ -16,7 +16,7 @@ from ..core.scene.toml_table import PRESETS, resolve
 from ..core.shapes.fitting import list_shapes
 from ..core.shapes.request import Shape
 from ..core.studies.job_table import embed_heights
-from ..device import palettes, unit, view
+from ..device import palettes, repair, view
 from ..device.instant import Instant, find_ellipsoids, read
 from ..exchange import shape_show
 from ..live import beds
@@ -199,7 +199,7 @@ def rebuild(bed: Any) -> Scene:
         tree = drawing.node_group
         view.add_modifier(bed, instant)
         _discard(tree)
-    unit.give_fingertip(bed, scene)
+    repair.give_fingertip(bed, scene)
     for tip, finger in zip(fingertips_of(bed).values(), instant.fingers, strict=False):
         bridge.resize_fingertip(tip, finger)
     view.hold_parts(bed)

@@ -12,7 +12,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import COLORS
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session import snapshot
-from digiclay.device import parts, unit
+from digiclay.device import parts, repair
 from digiclay.live import beds, handlers, tick
 from digiclay.overlay import views
 from digiclay.recorded import takes
@@ -33,13 +33,13 @@ PLACES = {1: (-10.0, -10.0), 2: (10.0, 10.0), 3: (10.0, -10.0)}
 def watched() -> Iterator[None]:
     """Look after beds as in a window."""
     yield
-    unit.unregister()
+    repair.unregister()
 
 
 @pytest.fixture
 def pair(bed: Any) -> Any:
     """A bed with two fingertips above it."""
-    unit.watch()
+    repair.watch()
     select(bed)
     bpy.ops.digiclay.add_fingertip()
     select(bed)

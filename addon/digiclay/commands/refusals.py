@@ -1,0 +1,54 @@
+"""Refusals of a command before any work, in one line: missing libraries, folders and files that cannot be."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..core.base.errors import OutputError
+from .stop import defer_interrupt
+
+if TYPE_CHECKING:
+    from ..core.scene.schema import Scene
+
+
+def require_surface(scene: Scene, option: str) -> None:
+    """Refuse to make a surface of a bed that has none. `option`: what asks for the surface."""
+    if min(scene.layout.rows, scene.layout.columns) < 2:
+        raise OutputError(
+            f"{option} needs at least 2 x 2 cells (got {scene.layout.rows} x {scene.layout.columns})."
+        )
+
+
+def refuse_without(option: str, extra: str, *modules: str) -> None:
+    """Refuse what needs libraries of an extra of this package that are not installed."""
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            raise OutputError(f"{option} needs {module}: run 'pip install digiclay[{extra}]'.")
+
+
+def refuse_without_blender() -> None:
+    """Refuse without Blender's module, with the command that installs it."""
+    with defer_interrupt():
+        importlib.import_module("..compat", __package__)
+
+
+def refuse_unwritable(folder: Path) -> None:
+    """Refuse a folder that is none, or that cannot be made or written to."""
+    above = next(path for path in (folder, *folder.resolve().parents) if os.path.lexists(path))
+    if not os.path.isdir(above):
+        raise OutputError(f"{folder} cannot be a folder: {above.name} is a file.")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise OutputError(f"{folder} cannot be written to.")
+
+
+def refuse_file(out: Path, ending: str) -> None:
+    """Refuse a file that cannot be written, or whose name promises another format."""
+    if out.suffix.lower() != ending:
+        raise OutputError(f"--out must end with {ending} (got {out}).")
+    if os.path.isdir(out):
+        raise OutputError(f"--out must be a file ({out} is a folder).")
+    refuse_unwritable(out.parent)
