@@ -25,13 +25,14 @@ settings.register_profile(
     max_examples=50,
     suppress_health_check=[HealthCheck.too_slow],
 )
-# Where it only counts that a test fails, as in tools/mutants.py: no failing example is made simpler.
+# Where it only counts that a test fails, as in make mutants: no failing example is made simpler.
 settings.register_profile(
     "first_failure",
     settings.get_profile("repeatable"),
     phases=(Phase.explicit, Phase.generate),
     max_examples=20,
 )
+settings.register_profile("many", settings.get_profile("repeatable"), max_examples=5_000)
 settings.load_profile(os.environ.get("DIGICLAY_HYPOTHESIS", "repeatable"))
 
 WINDOW = Path(__file__).parent / "window"
