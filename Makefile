@@ -57,11 +57,11 @@ form: ## mend style, format and generated pages; then check types, layers, names
 	@status=0; .venv/bin/python tools/mend_form.py $(if $(CHECK),--check) || status=1; \
 	rm -f .reports/form.txt; $(PART) .reports/form.txt "form" 300 -- $(HANGS) -n auto tests/form || status=1; exit $$status
 
-# All mutants of some modules: make mutants MODULES="valve steppers.bernoulli"
+# All mutants of some modules: make mutants MODULES="model.valve steppers.bernoulli"
 MODULES ?=
 mutants: ## change the core's physics, engine, control and metrics here and there, and list what no test notices
 	@$(ENVIRONMENT) requirements/mutation.txt $(IN_311)
-	@rm -f .reports/mutants.txt; .venv/bin/python tools/mutants.py --report .reports/mutants.txt --count 100 --limit 900 --most 0.21 $(MODULES)
+	@mkdir -p .reports; set -o pipefail; .venv/bin/python tools/mutants.py --most 0.21 $(MODULES) | tee .reports/mutants.txt
 
 # Some of them: make test-matrix BLENDERS="4.2 5.2"
 BLENDERS ?= 4.2 4.5 5.0 5.2
