@@ -196,7 +196,7 @@ def go_on(draw: Draw) -> None:
 
 def spoil_array(draw: Draw, usual: NDArray[Any]) -> NDArray[Any]:
     """Return an array of another type or shape, or with an odd number in it."""
-    kind = draw(st.sampled_from(["type", "shape", "number"]))
+    kind = draw(st.sampled_from(["type", "shape", "number", "near", "near", "near"]))
     if kind == "type":
         other = np.dtype(draw(TYPES))
         with np.errstate(all="ignore"):
@@ -206,14 +206,15 @@ def spoil_array(draw: Draw, usual: NDArray[Any]) -> NDArray[Any]:
         other = draw(st.integers(0, 6))
         return (flat, usual[None], flat[:0], flat[:1], usual.T, np.array(3.0), flat[:-1])[other]
     changed = usual.copy()
-    number = round_to(draw(NUMBERS), usual.dtype)
-    changed.reshape(-1)[draw(st.integers(0, usual.size - 1))] = number
+    flat, at = changed.reshape(-1), draw(st.integers(0, usual.size - 1))
+    near = flat[at] * draw(st.sampled_from([0.0, 0.9, 1.1, -1.0]))
+    flat[at] = round_to(near if kind == "near" else draw(NUMBERS), usual.dtype)
     return changed
 
 
 def pack(draw: Draw, arrays: dict[str, NDArray[Any]]) -> bytes:
     """Return arrays as a file .npz, some of them odd, or their heads."""
-    for name in draw(st.sets(st.sampled_from(sorted(arrays)), min_size=1, max_size=2)):
+    for name in draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2, unique=True)):
         arrays = arrays | {name: spoil_array(draw, arrays[name])}
     heads = ((b"False", b"True "), (b"), }", b"L),}"), (b"descr", b"descx"), (b"<f8", b"<M8"))
     file = io.BytesIO()
@@ -278,7 +279,7 @@ def test_what_is_odd_is_taken_or_refused_in_one_line(use: Callable[[Draw], None]
 
     check()
     # Neither is everything refused, nor is everything taken: the cases reach beyond the first check.
-    assert 0.05 < refusals.count("") / len(refusals) < 0.95
+    assert 0.02 < refusals.count("") / len(refusals) < 0.98
 
 
 @pytest.mark.parametrize(
