@@ -104,7 +104,7 @@ def build(parameters, device):
 SESSION = """
 import json, sys, tomllib
 import numpy as np
-from digiclay.core.batch.batch import make_batch
+from digiclay.core.batch.columns import make_batch
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.model.contact import Contact
 from digiclay.core.scene.assembly import assemble

@@ -15,7 +15,7 @@ from digiclay.commands.cluster import evaluate_on_worker, open_cluster
 from digiclay.commands.evaluator import submit
 from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, count_true
 from digiclay.core.base.errors import OutputError
-from digiclay.core.batch.batch import begin, make_batch
+from digiclay.core.batch.columns import begin, make_batch
 from digiclay.core.batch.play import extend_path
 from digiclay.core.engine.simulation import simulate_period
 from digiclay.core.scene.assembly import assemble

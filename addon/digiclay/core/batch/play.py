@@ -18,7 +18,7 @@ from ..model.touch import FingerPath, FingerPeriod, join_paths, trace_finger
 from ..model.trajectory import Trajectory
 from ..scene.schema import Scene
 from ..session.run_scene import Ended
-from .batch import Batch, begin, make_batch
+from .columns import Batch, begin, make_batch
 
 
 def extend_path(
